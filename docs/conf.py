@@ -70,7 +70,7 @@ def helped(page: str) -> str:
     """Append the help of every command."""
     import typer.main
 
-    from limitsets.cli.app import app
+    from limitsets.face.cli.app import app
 
     group = typer.main.get_command(app)
     texts = [page, "\n## The help of each command\n"]

@@ -16,78 +16,121 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from importlib.util import spec_from_loader
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # each from the file that holds it: most rooms have a file of the same name
-    from limitsets import engine, interval, maps, plot, resilience
-    from limitsets.analysis import analyse
-    from limitsets.animation import animate
-    from limitsets.assembly import assemble
-    from limitsets.auditing import audit
-    from limitsets.cells import grid
-    from limitsets.explorer import explore
-    from limitsets.feeding import feed
-    from limitsets.fitting import fit
-    from limitsets.graph.morse import morse_graph
-    from limitsets.graph.transitions import transitions
-    from limitsets.inverse import design, robust_design
-    from limitsets.maps import critical_points, orbit, register
-    from limitsets.policies import feedback
-    from limitsets.proofs.certify import certify
-    from limitsets.proofs.confirm import recheck
-    from limitsets.robust.margins.finding import margin
-    from limitsets.robust.noise.statistics import noise_statistics
-    from limitsets.robust.sheet.sheet_run import robustness
-    from limitsets.scene import dump, load, scenes
-    from limitsets.sets.attractors import attractors
-    from limitsets.sets.basins import basins
-    from limitsets.sets.cycles import cycles
-    from limitsets.sets.limit_set import limit_set
-    from limitsets.sweep.continuation import continuation
-    from limitsets.sweep.parameter_atlas import atlas
-    from limitsets.trays.filling import tray
+if TYPE_CHECKING:
+    from limitsets.cell.assembly import assemble as assemble
+    from limitsets.cell.feeding import feed as feed
+    from limitsets.cell.trays import tray as tray
+    from limitsets.face import plot as plot
+    from limitsets.face.animation import animate as animate
+    from limitsets.face.explorer import explore as explore
+    from limitsets.feeder import engine as engine
+    from limitsets.feeder.scene import dump as dump
+    from limitsets.feeder.scene import load as load
+    from limitsets.feeder.scene import scenes as scenes
+    from limitsets.numbers import interval as interval
+    from limitsets.parameters.analysis import analyse as analyse
+    from limitsets.parameters.atlas import atlas as atlas
+    from limitsets.parameters.continuation import continuation as continuation
+    from limitsets.parameters.design import design as design
+    from limitsets.parameters.design import robust_design as robust_design
+    from limitsets.parameters.fitting import fit as fit
+    from limitsets.parameters.margins.single import margin as margin
+    from limitsets.parameters.noise import noise_statistics as noise_statistics
+    from limitsets.parameters.sheet.sheet_run import robustness as robustness
+    from limitsets.proofs.auditing import audit as audit
+    from limitsets.proofs.policies import feedback as feedback
+    from limitsets.proofs.prover import certify as certify
+    from limitsets.proofs.prover.certificate import recheck as recheck
+    from limitsets.systems import maps as maps
+    from limitsets.systems import resilience as resilience
+    from limitsets.systems.cells import grid as grid
+    from limitsets.systems.graph import morse_graph as morse_graph
+    from limitsets.systems.graph import transitions as transitions
+    from limitsets.systems.maps import critical_points as critical_points
+    from limitsets.systems.maps import orbit as orbit
+    from limitsets.systems.maps import register as register
+    from limitsets.systems.sets import attractors as attractors
+    from limitsets.systems.sets import basins as basins
+    from limitsets.systems.sets import cycles as cycles
+    from limitsets.systems.sets import limit_set as limit_set
 
 __version__ = "0.1.0"
 
-# Public name -> the room it comes from, or the file where a module bears the same name: that module could stand in for
-# the function.  A namespace is its own room.
-_ROOMS = {
-    "analyse": "analysis",
-    "animate": "animation",
-    "atlas": "sweep.parameter_atlas",
-    "attractors": "sets.attractors",
-    "audit": "auditing",
-    "basins": "sets.basins",
-    "certify": "proofs.certify",
-    "continuation": "sweep.continuation",
-    "critical_points": "maps",
-    "cycles": "sets.cycles",
-    "design": "inverse",
-    "dump": "scene",
-    "engine": "engine",
-    "assemble": "assembly",
-    "explore": "explorer",
-    "feed": "feeding",
-    "feedback": "policies",
-    "fit": "fitting",
-    "grid": "cells",
-    "interval": "interval",
-    "limit_set": "sets.limit_set",
-    "load": "scene",
-    "maps": "maps",
-    "margin": "robust.margins.finding",
-    "morse_graph": "graph",
-    "noise_statistics": "robust.noise.statistics",
-    "orbit": "maps",
-    "plot": "plot",
-    "recheck": "proofs.confirm",
-    "register": "maps",
-    "resilience": "resilience",
-    "robust_design": "inverse",
-    "robustness": "robust.sheet.sheet_run",
-    "scenes": "scene",
-    "transitions": "graph.transitions",
-    "tray": "trays",
+# Public name -> where it stands: `room:name` of a function, a room where the name is that of a room.  Rooms keep
+# these names wherever they stand: README, docs and code of users import them, and those who call `limitsets.robust`
+# need not know which wing has it.
+_PUBLIC = {
+    "analyse": "parameters.analysis:analyse",
+    "animate": "face.animation:animate",
+    "assemble": "cell.assembly:assemble",
+    "atlas": "parameters.atlas:atlas",
+    "attractors": "systems.sets:attractors",
+    "audit": "proofs.auditing:audit",
+    "basins": "systems.sets:basins",
+    "certify": "proofs.prover:certify",
+    "continuation": "parameters.continuation:continuation",
+    "critical_points": "systems.maps:critical_points",
+    "cycles": "systems.sets:cycles",
+    "design": "parameters.design:design",
+    "dump": "feeder.scene:dump",
+    "explore": "face.explorer:explore",
+    "feed": "cell.feeding:feed",
+    "feedback": "proofs.policies:feedback",
+    "fit": "parameters.fitting:fit",
+    "grid": "systems.cells:grid",
+    "limit_set": "systems.sets:limit_set",
+    "load": "feeder.scene:load",
+    "margin": "parameters.margins.single:margin",
+    "morse_graph": "systems.graph:morse_graph",
+    "noise_statistics": "parameters.noise:noise_statistics",
+    "orbit": "systems.maps:orbit",
+    "recheck": "proofs.prover.certificate:recheck",
+    "register": "systems.maps:register",
+    "robust_design": "parameters.design:robust_design",
+    "robustness": "parameters.sheet.sheet_run:robustness",
+    "scenes": "feeder.scene:scenes",
+    "transitions": "systems.graph:transitions",
+    "tray": "cell.trays:tray",
+    "analysis": "parameters.analysis",
+    "animation": "face.animation",
+    "arguments": "base.arguments",
+    "assembly": "cell.assembly",
+    "auditing": "proofs.auditing",
+    "cells": "systems.cells",
+    "cli": "face.cli",
+    "engine": "feeder.engine",
+    "errors": "base.errors",
+    "explorer": "face.explorer",
+    "feeding": "cell.feeding",
+    "files": "base.files",
+    "fitting": "parameters.fitting",
+    "geometry": "feeder.geometry",
+    "goals": "feeder.goals",
+    "graph": "systems.graph",
+    "interval": "numbers.interval",
+    "inverse": "parameters.design",
+    "jit": "numbers.jit",
+    "maps": "systems.maps",
+    "plot": "face.plot",
+    "policies": "proofs.policies",
+    "progress": "base.progress",
+    "regions": "parameters.regions",
+    "report": "face.report",
+    "resilience": "systems.resilience",
+    "robust": "parameters.noise",
+    "scene": "feeder.scene",
+    "sets": "systems.sets",
+    "sweep": "parameters.atlas",
+    "tables": "base.tables",
+    "thrower": "feeder.thrower",
+    "topology": "systems.topology",
+    "trays": "cell.trays",
 }
 
 __all__ = [
@@ -130,16 +173,45 @@ __all__ = [
 ]
 
 
+class _Rooms(MetaPathFinder, Loader):
+    """Find a room, and what is in it, under its public name: the module itself, never a second copy."""
+
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        package, _, name = fullname.partition(".")
+        room = name.partition(".")[0]
+        known = package == __name__ and room in _PUBLIC and ":" not in _PUBLIC[room]
+        return spec_from_loader(fullname, self) if known else None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        room, _, rest = spec.name.removeprefix(f"{__name__}.").partition(".")
+        module = import_module(f"{__name__}.{_PUBLIC[room]}" + (f".{rest}" if rest else ""))
+        spec.loader_state = module.__spec__
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Give the module its own name back: the import machinery has just set that of the alias."""
+        spec = module.__spec__
+        if spec is not None and spec.loader is self:
+            module.__spec__ = spec.loader_state
+
+
+if not any(type(finder).__name__ == _Rooms.__name__ for finder in sys.meta_path):
+    sys.meta_path.insert(
+        0, _Rooms()
+    )  # before the finder of files, which would read a file in a room a second time
+
+
 if not TYPE_CHECKING:  # a checker of types has the imports above, and finds a name that is not there
 
     def __getattr__(name: str) -> Any:
-        room = _ROOMS.get(name)
-        if room is None:
+        place = _PUBLIC.get(name)
+        if place is None:
             # Python proposes a similar name where it knows whose name is missing
             own = sys.modules[__name__]
             raise AttributeError(f"module 'limitsets' has no attribute {name!r}", name=name, obj=own)
-        module = import_module(f"limitsets.{room}")
-        return module if room == name else getattr(module, name)
+        room, _, function = place.partition(":")
+        module = import_module(f"{__name__}.{room}")
+        return getattr(module, function) if function else module
 
 
 def __dir__() -> list[str]:

@@ -11,7 +11,7 @@ INTERRUPTED = 130
 def main() -> int:
     """Run the command line; the exit code."""
     try:
-        from limitsets.cli import main as run
+        from limitsets.face.cli import main as run
 
         return run()
     except KeyboardInterrupt:

@@ -4,7 +4,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
-from limitsets.jit import cache
+from limitsets.numbers.jit import cache
 
 
 def kept(loop: Any) -> Any:

@@ -9,17 +9,17 @@ from unittest import mock
 import numpy as np
 
 import limitsets as ls
-import limitsets.interval as iv
-from limitsets.cells import Grid
-from limitsets.graph.images import METHODS
-from limitsets.graph.images.sampled import sampled
-from limitsets.graph.images.samples import SamplePoints
-from limitsets.interval import Interval
-from limitsets.interval.number import hull_of
-from limitsets.jit import proof_kernel
-from limitsets.maps import OUTSIDE
-from limitsets.maps.derived import NO_WITNESS
-from limitsets.maps.textbook.slots import Line, Plane, Point, plane
+import limitsets.numbers.interval as iv
+from limitsets.numbers.interval import Interval
+from limitsets.numbers.interval.number import hull_of
+from limitsets.numbers.jit import proof_kernel
+from limitsets.systems.cells import Grid
+from limitsets.systems.graph.images import METHODS
+from limitsets.systems.graph.images.sampled import sampled
+from limitsets.systems.graph.images.undecided import SamplePoints
+from limitsets.systems.maps import OUTSIDE
+from limitsets.systems.maps.derived import NO_WITNESS
+from limitsets.systems.maps.textbook.shared import Line, Plane, Point, plane
 
 
 @proof_kernel

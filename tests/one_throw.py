@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from limitsets.maps import advance
-from limitsets.robust.noise.scattering import thrown
+from limitsets.feeder.scattering import thrown
+from limitsets.systems.maps import advance
 
 
 def mean_after(scene, scatter, rows, x, side, count):

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from limitsets.arguments import arguments_checked
-from limitsets.errors import AnswerError
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
 
 
 class Scene:

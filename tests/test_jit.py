@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 
 import limitsets
-from limitsets.jit import cache as jit_cache
-from limitsets.jit import compiling, generic, kernel, proof_kernel
-from limitsets.maps import drivers
+from limitsets.numbers.jit import cache as jit_cache
+from limitsets.numbers.jit import compiling, generic, kernel, proof_kernel
+from limitsets.systems.maps import drivers
 
 FUSED = re.compile(r"\bv?fn?m(?:add|sub|la|ls)\w*")
 
 # A small entry kernel, put into the copy of the package.
 PROBE = """
 from limitsets.jit import kernel
-from limitsets.maps.kernels import image, on_side
+from limitsets.systems.maps.kernels import image, on_side
 
 @kernel(entry=True)
 def one(params, x):

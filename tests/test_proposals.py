@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from limitsets.proposals import proposed
+from limitsets.base.proposals import proposed
 
 
 @pytest.mark.parametrize(

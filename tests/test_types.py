@@ -16,18 +16,18 @@ USER = """
 import limitsets as ls
 
 scene = ls.load("paper-designed")
-reveal_type(scene)  # limitsets.scene.scene.Scene
+reveal_type(scene)  # limitsets.feeder.scene.scene.Scene
 graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=4096))
 found = ls.attractors(graph)
-reveal_type(found)  # tuple[limitsets.sets.attractors.Attractor, ...]
+reveal_type(found)  # tuple[limitsets.systems.sets.attracting.Attractor, ...]
 reveal_type(ls.basins(graph, found).exits)  # dict[str, float]
 analysis = ls.analyse(scene)
-reveal_type(analysis)  # limitsets.analysis.run.Analysis
+reveal_type(analysis)  # limitsets.parameters.analysis.run.Analysis
 reveal_type(ls.certify(scene).proved)  # bool
-reveal_type(ls.margin(scene, "throw.speed"))  # tuple[limitsets.robust.margins.margin_result.Margin, ...]
+reveal_type(ls.margin(scene, "throw.speed"))  # tuple[limitsets.parameters.margins.margin_result.Margin, ...]
 reveal_type(ls.plot.limit_set(scene, found))  # matplotlib.figure.Figure
-reveal_type(ls.atlas(scene, "throw.speed=150:160:3"))  # limitsets.sweep.parameter_atlas.Atlas
-reveal_type(ls.feed(scene))  # limitsets.feeding.feeding_run.Feeding
+reveal_type(ls.atlas(scene, "throw.speed=150:160:3"))  # limitsets.parameters.atlas.parameter_atlas.Atlas
+reveal_type(ls.feed(scene))  # limitsets.cell.feeding.feeding_run.Feeding
 reveal_type(ls.audit(scene).table().csv())  # str
 reveal_type(ls.orbit(ls.maps.Henon(), (0.1, 0.1), 0, 10).stopped)  # str | None
 reveal_type(ls.__version__)  # str

@@ -4,19 +4,233 @@ docs/certificates.md, "Probabilities", number 22.  The checker makes the steps i
 within those claimed.
 """
 
+import itertools
 import math
 from collections.abc import Callable
 from fractions import Fraction
+from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb
 
 from .averages import INFLATE, OUTERMOST, Mesh, Rows, Spread, mean_rows
-from .balls import Array
-from .chain import Chain
-from .chances import ANY, LEFT, Chances
+from .balls import Array, exact
+from .file import (
+    LENGTHS,
+    hex_float,
+    number_and_unit,
+    plain,
+    quantity,
+    read_array,
+    read_side,
+    require,
+    rounded,
+    rows,
+    table,
+)
+from .landings import MOST_PLACE, Chain, Noisy
 from .links import ABSORBED, HARD, LIVE, chain_of
-from .texts import plain, rounded
+from .scene import Scene, read_noise, read_scene
+
+# ----------------------------------------------------------------
+# The claim `probabilities`, brackets of where a noisy chain ends, and when: how it is read, and put in words.
+#
+# docs/certificates.md, "Probabilities".  The file holds laws, starts, places that absorb, nodes and strata, and the
+# brackets claimed.
+
+
+ANY, LEFT = "any", "exits"
+MOST_NODES, MOST_STRATA, MOST_BRACKETS = 120_000, 64, 2_000
+Place = tuple[int, Fraction, Fraction]  # side, from x, to x
+
+
+class Chances(NamedTuple):
+    """What is claimed: read, and not yet believed; lengths in the scene's unit."""
+
+    raw: dict[str, Any]
+    laws: dict[str, str]
+    scene: Scene
+    noisy: Noisy
+    starts: list[Place]
+    absorbing: dict[str, list[Place]]
+    edges: list[Array]
+    within: dict[str, Array]  # by name two columns: lower and upper bound after 0, 1, ... throws
+    quantiles: list[tuple[str, Fraction, int, int]]
+    mean: tuple[float, float] | None
+
+
+def holds_chances(header: dict[str, Any]) -> bool:
+    """Whether a file claims probabilities."""
+    claims = header.get("claims")
+    return isinstance(claims, list) and any(
+        isinstance(c, dict) and c.get("claim") == "probabilities" for c in claims
+    )
+
+
+def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chances:
+    """Read a file; raises BadFileError."""
+    (claim,) = rows(header["claims"], "claims of probabilities", 1, 1)
+    table(claim, "a claim", "claim section")
+    keys = "scene laws starts absorbing strata names quantiles mean"
+    section = table(claim["section"], "section of probabilities", keys)
+    alone = header["boxes"] == [] and header["noise"] is None and header["tolerance"] is None
+    require(alone, "a file of probabilities has no boxes, no other noise and no tolerance")
+    laws = read_laws(section["laws"])
+    scene = read_scene(section["scene"], laws)
+    require(
+        all(side.concave for side in scene.sides), "kappa > ell is not given: the impact may not be unique"
+    )
+    require(scene.arm[0] == scene.arm[1] and not scene.cuts(), "a quantity of the scene is an interval")
+    still = read_scene({k: v for k, v in scene.raw.items() if k != "effects"}, None)
+    speed = read_noise(laws, "throw.speed", "share")
+    landing = read_noise(laws, "landing.x", "length").lo / LENGTHS[scene.unit]
+    require(landing > 0, "landing.x: without scatter of the landing place nothing is rechecked")
+    # far nodes hold where throws land at all, and what is not followed lies off the arm on both branches
+    near = all(bool(abs(side.shift) < MOST_PLACE / 2) for side in scene.sides)
+    require(near and landing < MOST_PLACE, "landings are too far out")
+    strata = section["strata"]
+    require(type(strata) is int and 1 <= strata <= MOST_STRATA, f"strata is not from 1 to {MOST_STRATA}")
+    noisy = Noisy(still.sides, still.k_lo.union(still.k_hi), speed.lo, landing, strata)
+    n_sides = len(scene.sides)
+    places = {
+        plain(name): read_places(some, name, scene)
+        for name, some in table_of(section["absorbing"], "absorbing").items()
+    }
+    require(not {ANY, LEFT} & set(places), f"{ANY} and {LEFT} name no places")
+    require(not overlapping(places), "two places that absorb overlap")
+    starts = read_places(section["starts"], "starts", scene)
+    require(not overlapping({"starts": starts}), "two stretches of starts overlap: they would count twice")
+    names = rows(section["names"], "names", 1, 100)
+    known = all(isinstance(name, str) and name in (ANY, LEFT, *places) for name in names)
+    require(known and len(set(names)) == len(names), "names are not those of places that absorb")
+    said = header["arrays"]
+    wanted = {**{f"edges.{i}": 1 for i in range(n_sides)}, **{f"within.{k}": 2 for k in range(len(names))}}
+    there = isinstance(said, dict) and set(said) == set(wanted)
+    require(
+        there and {f"{name}.npy" for name in wanted} == set(entries), "the arrays are others than expected"
+    )
+    read = {
+        name: read_array(entries[f"{name}.npy"], name, "<f8", columns, said[name])
+        for name, columns in wanted.items()
+    }
+    edges = [read[f"edges.{i}"] for i in range(n_sides)]
+    require_edges(edges, scene)
+    within = {name: read[f"within.{k}"] for k, name in enumerate(names)}
+    lengths = {len(each) for each in within.values()}
+    require(len(lengths) == 1 and 1 <= lengths.pop() <= MOST_BRACKETS + 1, "the brackets are not alike many")
+    quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
+    mean = None if section["mean"] is None else read_mean(section["mean"])
+    return Chances(scene.raw, laws, scene, noisy, starts, places, edges, within, quantiles, mean)
+
+
+def table_of(value: object, where: str) -> dict[str, Any]:
+    """Read an object whose keys are names."""
+    known = table(value, where, "", " ".join(value) if isinstance(value, dict) else "")
+    require(len(known) <= 100 and all(k and plain(k) == k for k in known), f"{where}: an odd name")
+    return known
+
+
+def read_laws(value: object) -> dict[str, str]:
+    """Read the laws, of which one kind is known: uniform, within a deviation."""
+    laws = table(value, "laws", "landing.x", "throw.speed")
+    for name, law in laws.items():
+        kind = table(law, f"law of {name}", "", " ".join(law) if isinstance(law, dict) else "")
+        require(list(kind) == ["uniform"], f"law of {name}: this checker knows uniform laws only")
+        require(isinstance(kind["uniform"], str), f"law of {name}: its bound is not a text")
+    return {name: law["uniform"] for name, law in laws.items()}
+
+
+def read_places(value: object, where: str, scene: Scene) -> list[Place]:
+    """Read places: side, from x, to x; null for the end of the arm."""
+    found: list[Place] = []
+    where = plain(where)
+    for row in rows(value, where, 1, 1000):
+        number, lo, hi = rows(row, where, 3, 3)
+        side = read_side(number, len(scene.sides))
+        first = length_of(lo, where, scene)
+        last = scene.arm[0] if hi is None else length_of(hi, where, scene)
+        on = first < last <= scene.arm[0] and bool(exact(first) > scene.sides[side].a)
+        require(on, f"{where}: a place is not one of the arm")
+        found.append((side, first, last))
+    return found
+
+
+def length_of(value: object, where: str, scene: Scene) -> Fraction:
+    """Read a length in the scene's unit."""
+    q = quantity(value, "length", where)
+    require(q.lo == q.hi, f"{where}: an interval is no place")
+    return q.lo / LENGTHS[scene.unit]
+
+
+def overlapping(places: dict[str, list[Place]]) -> bool:
+    """Whether two of the places have inner points in common."""
+    every = sorted(place for some in places.values() for place in some)
+    return any(a[0] == b[0] and b[1] < a[2] for a, b in itertools.pairwise(every))
+
+
+def require_edges(edges: list[Array], scene: Scene) -> None:
+    """Require that the nodes of each side ascend, and reach from before the joint to beyond the arm's end."""
+    require(sum(len(e) for e in edges) <= MOST_NODES, f"more than {MOST_NODES} nodes")
+    for i, e in enumerate(edges):
+        require(len(e) >= 2 and bool((np.diff(e) > 0).all()), f"side {i}: the nodes do not ascend")
+        whole = bool(arb(float(e[0])) <= scene.sides[i].a) and Fraction(float(e[-1])) >= scene.arm[0]
+        require(whole and float(np.abs(e).max()) < MOST_PLACE / 2, f"side {i}: the nodes do not span the arm")
+
+
+def read_quantile(value: object, names: list[Any]) -> tuple[str, Fraction, int, int]:
+    """Read one quantile: name, share, and between which numbers of throws."""
+    name, share, lo, hi = rows(value, "a quantile", 4, 4)
+    part, _ = number_and_unit(share if isinstance(share, str) else "", "share", "a quantile")
+    counts = type(lo) is int and type(hi) is int and 0 <= lo <= hi
+    require(name in names and 0 < part < 1 and counts, "a quantile is none")
+    return name, part, lo, hi
+
+
+def read_mean(value: object) -> tuple[float, float]:
+    """Read the bounds of a mean; null where there is no upper one."""
+    lo, hi = rows(value, "mean", 2, 2)
+    low, high = hex_float(lo, "mean"), math.inf if hi is None else hex_float(hi, "mean")
+    require(0 <= low <= high, "the bounds of the mean are none")
+    return low, high
+
+
+def chances_in_words(c: Chances) -> list[str]:
+    """Put the claim in words, from the numbers that were checked."""
+    last = len(next(iter(c.within.values()))) - 1
+    unit = c.scene.unit
+    lines = [
+        "probabilities: T is the throw with which a part first comes to rest at a place named below, or leaves the arm",
+        "    all deviations are independent of each other",
+        f"    starts, equally likely per length: {places_in_words(c.starts, unit)}",
+    ]
+    for name, places in c.absorbing.items():
+        lines.append(f"    {name}: {places_in_words(places, unit)}")
+    for name, said in c.within.items():
+        lo, hi = (float(end) for end in said[-1])
+        what = "P(T <= n)" if name == ANY else f'P(ended "{name}" within n throws)'
+        lines.append(
+            f"    {what} for n = 0 to {last}; for n = {last} between {rounded(lo, up=False)} and"
+            f" {rounded(hi, up=True)}"
+        )
+    for name, share, lo, hi in c.quantiles:
+        what = "have ended" if name == ANY else f'have ended "{name}"'
+        count = f"exactly {lo}" if lo == hi else f"between {lo} and {hi}"
+        lines.append(
+            f"    the least number of throws within which {float(100 * share):.6g} % {what}: {count}"
+        )
+    if c.mean is not None:
+        most = f", at most {rounded(c.mean[1], up=True)}" if math.isfinite(c.mean[1]) else ""
+        lines.append(f"    the mean of T: at least {rounded(c.mean[0], up=False)}{most}")
+    return lines
+
+
+def places_in_words(places: list[Place], unit: str) -> str:
+    """Name places."""
+    return ", ".join(f"side {side} from {float(lo)!r} to {float(hi)!r} {unit}" for side, lo, hi in places)
+
+
+# ----------------------------------------------------------------
+
 
 MOST_MEAN = 5_000  # steps in which a mean is bounded
 # A mean is bounded from above once no state's bound grows by more than this share of a throw.

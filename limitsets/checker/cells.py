@@ -20,7 +20,7 @@ import numpy as np
 from flint import arb
 
 from .balls import HALF, PRECISION, ZERO, Arb, Array, Pair
-from .file import Cells
+from .file import Cells, rounded
 from .model import (
     FULL_TURN,
     Angle,
@@ -33,7 +33,6 @@ from .model import (
     slope_over,
 )
 from .scene import DEPTH, Scene, Side, over_halves, read_scene
-from .texts import rounded
 
 MOST_BOXES = 20_000  # pieces of one cell: a certificate that needs more is refused
 CHUNK = 2_000  # cells handed to a worker at once

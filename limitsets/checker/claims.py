@@ -11,13 +11,18 @@ import numpy as np
 from .cells import Crew, check_components, check_ranks, check_structure, tasks_of
 from .end_points import check_ends, ends_statement, read_ends
 from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
-from .file import Cells
+from .file import Cells, hex_float, plain, require, rounded, rows, table
 from .goals import GOALS, check_goal, is_laid, read_goal_claim, statement_of_goal
 from .near_hinge import check_below_cells, fixed_points_in_words, read_near_hinge
-from .orbits import check_orbits, orbits_statement, read_orbits
-from .refutations import check_refuted, read_refutation, statement_of_refutation
+from .refutations import (
+    check_orbits,
+    check_refuted,
+    orbits_statement,
+    read_orbits,
+    read_refutation,
+    statement_of_refutation,
+)
 from .scene import Scene, over_halves
-from .texts import hex_float, plain, require, rounded, rows, table
 
 SECTIONS = {  # the known claims, and the keys of their sections
     "attracts-all": "near_joint max_rank",

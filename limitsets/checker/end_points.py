@@ -11,11 +11,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb
 
-from .balls import HALF, ONE, ZERO, Arb, Pair, UnprovedError, float_above, float_below, prove
-from .file import Cells
+from .balls import (
+    HALF,
+    ONE,
+    ZERO,
+    Arb,
+    Pair,
+    UnprovedError,
+    float_above,
+    float_below,
+    prove,
+)
+from .file import Cells, hex_float, read_side, require, rows, table
 from .model import FULL_TURN, Angle, at_angle, flight, guess_root, over_angles, slope_over
 from .scene import Scene, Side
-from .texts import hex_float, read_side, require, rows, table
 
 MOST_ENDS, MOST_PIECES, MOST_IMAGES = 400, 4_000, 20_000
 MOST_THROWN = 100_000  # boxes that `Throws` throws for one claim: a section that needs more is refused

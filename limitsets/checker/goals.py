@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from .cells import first_bad, range_max
-from .file import Cells
-from .near_hinge import check_everywhere, near_landing
+from .file import LENGTHS, Cells, quantity, require, rows, table
+from .near_hinge import check_everywhere, check_thinning, near_landing, not_arriving
 from .scene import Scene
 from .starts import (
     MOST_COUNTED,
@@ -22,8 +22,6 @@ from .starts import (
     read_starts,
     starts_in_words,
 )
-from .texts import LENGTHS, quantity, require, rows, table
-from .thinning import check_thinning, not_arriving
 from .two_throws import check_two_throws
 
 GOAL_KEYS = "x side every_orbit throws order jogs from_anywhere"

@@ -11,12 +11,22 @@ from fractions import Fraction
 import numpy as np
 from flint import arb
 
-from .averages import INFLATE, Mesh, Spread, Table, mean_rows
+from .averages import (
+    INFLATE,
+    Hit,
+    Mesh,
+    Slopes,
+    Spread,
+    Table,
+    advance_over,
+    guess_angles,
+    kappa_at,
+    mean_rows,
+    slopes_over,
+)
 from .balls import Arb, Array, exact
-from .chain import Bent, Chain, Parts, Reach
-from .landings import MOST_PLACE, Border, Landings, Noisy, both_ends, upper
+from .landings import MOST_PLACE, Bent, Border, Chain, Landings, Noisy, Parts, Reach, both_ends, upper
 from .model import over_angles
-from .speeds import Hit, Slopes, advance_over, guess_angles, kappa_at, slopes_over
 
 ABSORBED, LIVE, HARD = 0, 1, 2  # what a cell is: all of it absorbs, none of it does, or anything else
 

@@ -6,8 +6,8 @@ import sys
 import time
 from dataclasses import asdict
 
+from .file import model_in_words, plain
 from .report import EXITS, WORDS, Report, recheck
-from .texts import model_in_words, plain
 
 
 def show(report: Report, file: str) -> None:

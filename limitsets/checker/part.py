@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 from .balls import ONE, ZERO, Arb, Rising, exact, span
-from .texts import quantity, require, rows, table
+from .file import quantity, require, rows, table
 
 
 def ends_of(value: object, where: str, unit: Fraction) -> tuple[Fraction, Fraction]:

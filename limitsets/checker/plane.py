@@ -17,10 +17,15 @@ import numpy as np
 
 from .balls import Array
 from .cells import SMALL, deaf_children
-from .file import read_array
-from .region import GOAL_PROVED, GOAL_REFUTED, Claimed, check_region_cell, start_region_worker
+from .file import KINDS, Quantity, plain, quantity, read_array, require, rows, table
+from .region import (
+    GOAL_PROVED,
+    GOAL_REFUTED,
+    Claimed,
+    check_region_cell,
+    start_region_worker,
+)
 from .scene import quantities, read_scene
-from .texts import KINDS, Quantity, plain, quantity, require, rows, table
 
 STARTS_WORDS = ("every", "almost-every", "from", "cells")  # the codes of the array `starts`
 MOST_BORDERS = 4_097

@@ -13,13 +13,12 @@ from flint import arb
 from .balls import PRECISION, Array, Pair, UnprovedError, prove
 from .cells import check_cell, check_components, check_structure, tasks_of
 from .end_points import Throws, halved_box
-from .file import Cells
+from .file import BadFileError, Cells
 from .goals import check_goal, goal_of_scene
+from .near_hinge import not_arriving
 from .refutations import State, breaks
 from .scene import Scene, read_scene
 from .starts import Starts, check_starts, require_fitting, shares
-from .texts import BadFileError
-from .thinning import not_arriving
 
 UNDECIDED, GOAL_PROVED, GOAL_REFUTED = 0, 1, 2
 LARGEST_OPEN = (

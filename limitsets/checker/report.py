@@ -15,13 +15,23 @@ from typing import Any
 import flint
 
 from .balls import PRECISION
-from .beliefs import check_policy
-from .brackets import check_chances
+from .brackets import Chances, chances_in_words, check_chances, holds_chances, read_chances
 from .cells import Crew, extents
-from .chances import Chances, chances_in_words, holds_chances, read_chances
 from .claims import check_box_claims, read_claims, statement_of
 from .feeding import verdict_of_feeds
-from .file import Cells, open_certificate, read_cells
+from .file import (
+    KINDS,
+    BadFileError,
+    Cells,
+    model_in_words,
+    open_certificate,
+    plain,
+    quantity,
+    read_cells,
+    require,
+    rows,
+    table,
+)
 from .goals import content_of_goal, goal_of_scene
 from .model import FORMULAS
 from .plane import (
@@ -36,10 +46,17 @@ from .plane import (
     raster_of,
     read_plane,
 )
-from .policy import Policy, holds_policy, policy_in_words, read_policy
-from .scene import Scene, check_parameters, check_tolerance, left_out, over_halves, quantities, read_scene
+from .policy import Policy, check_policy, holds_policy, policy_in_words, read_policy
+from .scene import (
+    Scene,
+    check_parameters,
+    check_tolerance,
+    left_out,
+    over_halves,
+    quantities,
+    read_scene,
+)
 from .starts import shares
-from .texts import KINDS, BadFileError, model_in_words, plain, quantity, require, rows, table
 
 MOST_OPEN = 0.01  # the share of the arm that may be open where a goal is proved from some x on
 WORDS = {  # the verdicts, in JSON and for people

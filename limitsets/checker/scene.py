@@ -14,8 +14,18 @@ from typing import Any
 from flint import arb
 
 from .balls import HALF, ONE, ZERO, Arb, exact, span
+from .file import (
+    KINDS,
+    LENGTHS,
+    Quantity,
+    hex_float,
+    plain,
+    quantity,
+    require,
+    rows,
+    table,
+)
 from .part import narrow_part
-from .texts import KINDS, LENGTHS, Quantity, hex_float, plain, quantity, require, rows, table
 
 DEPTH = 12  # a cell is halved at most so often in x, so often in kappa, and so often in all else that is an interval
 MOST_HALVES = 1_000  # pieces of a tolerance, for one check that is not of a cell

@@ -12,14 +12,29 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb
 
-from .balls import HALF, ZERO, Arb, Array, Pair, exact, float_above, float_below, sine_cosine
+from .balls import (
+    HALF,
+    ZERO,
+    Arb,
+    Array,
+    Pair,
+    exact,
+    float_above,
+    float_below,
+    sine_cosine,
+)
 from .cells import first_bad, range_max
-from .file import Cells
+from .file import Cells, Quantity, by_side, hex_float, require, rows, table
 from .model import at_angle, landing_at, over_angles, ratios, rise_of_jog, root_above
-from .near_hinge import check_below_cells, near_angle, near_landing, read_near_hinge
+from .near_hinge import (
+    check_below_cells,
+    check_null,
+    check_thinning,
+    near_angle,
+    near_landing,
+    read_near_hinge,
+)
 from .scene import MOST_HALVES, Scene, Side, over_halves, quantities
-from .texts import Quantity, by_side, hex_float, require, rows, table
-from .thinning import check_null, check_thinning
 
 MOST_COUNTED = 100_000  # throws, or rounds, that a goal may count
 # A stated kappa keeps this share of itself from the ends of its noise, which are known to 100 bits.

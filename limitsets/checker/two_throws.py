@@ -17,13 +17,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb
 
-from .balls import HALF, ONE, ZERO, Arb, Array, Pair, Rising, float_above, float_below, span
+from .balls import (
+    HALF,
+    ONE,
+    ZERO,
+    Arb,
+    Array,
+    Pair,
+    Rising,
+    float_above,
+    float_below,
+    span,
+)
 from .cells import range_max
-from .file import Cells
+from .file import LENGTHS, Cells, quantity
 from .model import barrier
 from .part import ends_of, read_lengths, read_part
 from .scene import Scene
-from .texts import LENGTHS, quantity
 
 # The variables of two throws: two impact angles, the landing between them, kappa, h, and the lengths of the part.
 AT_FIRST, AT_SECOND, AT_LANDING, AT_KAPPA, AT_HEIGHT, AT_LENGTHS = range(6)

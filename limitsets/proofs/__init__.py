@@ -1,6 +1,1 @@
-"""Proofs about a scene's map, certificates of them, and their recheck."""
-
-from limitsets.proofs.certify import CLAIMS, certify
-from limitsets.proofs.proof import Claim, Proof
-
-__all__ = ["CLAIMS", "Claim", "Proof", "certify"]
+"""Proofs by interval arithmetic: of claims about a map or a scene, of chances, of policies, and of the assumptions."""

@@ -14,8 +14,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import limitsets as ls
-from limitsets.maps import OUTSIDE_MODEL, images
-from limitsets.plot import style
+from limitsets.face.plot import style
+from limitsets.systems.maps import OUTSIDE_MODEL, images
 
 HERE = Path(__file__).resolve().parent
 THROWS = 2000

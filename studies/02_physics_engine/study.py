@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import limitsets as ls
-from limitsets.plot import style
+from limitsets.face.plot import style
 
 HERE = Path(__file__).resolve().parent
 SCENES = ("paper-initial", "paper-designed")

@@ -15,11 +15,11 @@ from accuracy_throw import Facts, facts_of, in_digits, jog, margin
 from mpmath import mp, mpf
 
 import limitsets as ls
-from limitsets.cells import CellSet, Grid
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.cover import cover
-from limitsets.proofs.end_points import proved_ends
-from limitsets.proofs.parameters import parameter_box
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.end_points import proved_ends
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.cells import CellSet, Grid
 
 __all__ = ["BORDERS", "CRITICAL", "ORBIT", "PROVED", "distance", "reference", "set_errors"]
 

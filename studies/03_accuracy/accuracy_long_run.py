@@ -16,9 +16,9 @@ import numpy as np
 from accuracy_points import Point, timed
 
 import limitsets as ls
-from limitsets.maps.lyapunov import lyapunov
-from limitsets.sets import invariant_measures
-from limitsets.sets.markov_chain import sample_points
+from limitsets.systems.maps.drivers import lyapunov
+from limitsets.systems.sets import invariant_measures
+from limitsets.systems.sets.measure import sample_points
 
 __all__ = [
     "CELLS",

@@ -12,8 +12,8 @@ from accuracy_points import Point, timed
 from mpmath import mp, mpf
 
 import limitsets as ls
-from limitsets.graph.images.enclosed import enclosures
-from limitsets.thrower import Energy, SmallAngle, SmallAngle2
+from limitsets.feeder.thrower import Energy, SmallAngle, SmallAngle2
+from limitsets.systems.graph.images.enclosed import enclosures
 
 __all__ = ["SIDE", "critical_errors", "libm_map", "random_ratios", "throw_errors"]
 

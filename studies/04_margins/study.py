@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import limitsets as ls
-from limitsets.goals import OrientedBeyond
-from limitsets.robust.margins.beyond import margins_beyond
-from limitsets.robust.margins.joint import joint_margin
-from limitsets.robust.margins.margin_texts import bound
+from limitsets.feeder.goals import OrientedBeyond
+from limitsets.parameters.margins.joint import joint_margin
+from limitsets.parameters.margins.margin_result import bound
+from limitsets.parameters.margins.single import margins_beyond
 
 HERE = Path(__file__).resolve().parent
 

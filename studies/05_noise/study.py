@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import limitsets as ls
-from limitsets.robust import Gaussian, Scattering, noise_levels
-from limitsets.robust.noise.chain_solution import starts_from
-from limitsets.robust.noise.sampling import throw_many
+from limitsets.feeder.scattering import Gaussian, Scattering, starts_from
+from limitsets.parameters.noise.sampling import throw_many
+from limitsets.parameters.noise.statistics import noise_levels
 
 HERE = Path(__file__).resolve().parent
 SCENE, GOAL = "paper-designed", (20.5, 2)

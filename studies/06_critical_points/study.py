@@ -16,7 +16,7 @@ import numpy as np
 from critical_printed import CASES, found_constants, outside
 
 import limitsets as ls
-from limitsets.inverse import critical_jacobian
+from limitsets.parameters.design import critical_jacobian
 
 HERE = Path(__file__).resolve().parent
 ALONG, ABOVE, SPEED, KAPPA = (

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
-from limitsets.sweep.classes import legend, named_class
+from limitsets.parameters.atlas.classes import legend, named_class
 
 HERE = Path(__file__).resolve().parent
 SPEED, HEIGHT = "throw.speed=120:180", "arm.surface_height=-1:0.2"

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import limitsets as ls
-from limitsets.feeding import Feeding
-from limitsets.feeding.falling import arm_end_of
-from limitsets.feeding.proving import proved_feeding
-from limitsets.feeding.trials import SERIES
-from limitsets.robust import Gaussian, Scattering, Uniform
-from limitsets.robust.noise.proportions import binomial_interval
+from limitsets.cell.feeding import Feeding
+from limitsets.cell.feeding.falling import arm_end_of
+from limitsets.cell.feeding.proving import proved_feeding
+from limitsets.cell.feeding.trials import SERIES
+from limitsets.feeder.scattering import Gaussian, Scattering, Uniform
+from limitsets.parameters.noise.sampling import binomial_interval
 
 HERE = Path(__file__).resolve().parent
 CAVITY = tomllib.loads((HERE.parent / "sizes.toml").read_text(encoding="utf-8"))["cavity"]

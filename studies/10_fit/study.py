@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
-from limitsets.files import as_plain
-from limitsets.fitting import bootstrap, enough, fit, simulated_throws
+from limitsets.base.files import as_plain
+from limitsets.parameters.fitting import bootstrap, enough, fit, simulated_throws
 
 HERE = Path(__file__).resolve().parent
 NAMES = (

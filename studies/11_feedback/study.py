@@ -14,11 +14,10 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 import limitsets as ls
-from limitsets.plot import style
-from limitsets.policies import places
-from limitsets.policies.enclosed_starts import not_within
-from limitsets.policies.simulation import simulate
-from limitsets.scene.sensing import BeyondSensor, SideSensor
+from limitsets.face.plot import style
+from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
+from limitsets.proofs.policies import places
+from limitsets.proofs.policies.simulation import not_within, simulate
 
 HERE = Path(__file__).resolve().parent
 # fixed before the first search: the part's own throw, and one at 110 % of its speed (kappa / 1.21)

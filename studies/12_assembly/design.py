@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.feeding.falling import arm_end_of
-from limitsets.feeding.trials import run_trials
-from limitsets.maps import images
-from limitsets.robust import Scattering
+from limitsets.base.errors import LimitsetsError
+from limitsets.cell.feeding.falling import arm_end_of
+from limitsets.cell.feeding.trials import run_trials
+from limitsets.feeder.scattering import Scattering
+from limitsets.systems.maps import images
 
 KAPPA = 22.5
 START = (3.98, 0.23, 1.75)  # centre of mass along and above side 1, radius of gyration [in]

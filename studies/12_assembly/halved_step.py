@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from limitsets.assembly.counting import rate_of
-from limitsets.assembly.pairing import pair_of
-from limitsets.assembly.pushing import Question, push
-from limitsets.robust import Scattering
+from limitsets.cell.assembly.assembly_run import rate_of
+from limitsets.cell.assembly.pairing import pair_of
+from limitsets.cell.assembly.trials import Question, push
+from limitsets.feeder.scattering import Scattering
 
 STEPS = (4e-3, 2e-3)
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
-from limitsets.assembly.counting import rate_of
-from limitsets.robust import Scattering
+from limitsets.cell.assembly.assembly_run import rate_of
+from limitsets.feeder.scattering import Scattering
 
 # Between these: where the arm ends, as a multiple of where it does now, and the speed likewise.
 PLACES, SPEEDS = (0.85, 1.3), (0.88, 1.08)

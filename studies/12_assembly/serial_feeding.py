@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.assembly.counting import rate_of
-from limitsets.assembly.drawing import Draws
-from limitsets.assembly.pairing import angle_on, pair_of
-from limitsets.assembly.pushing import FRICTION, MOST_THROWS
-from limitsets.engine.crowd import Crowd
-from limitsets.engine.seats import SEATED, off_seat, seat_of
-from limitsets.robust import Scattering
+from limitsets.cell.assembly.assembly_run import rate_of
+from limitsets.cell.assembly.pairing import Draws, angle_on, pair_of
+from limitsets.cell.assembly.trials import FRICTION, MOST_THROWS
+from limitsets.feeder.engine.crowd import Crowd
+from limitsets.feeder.engine.depression import SEATED, off_seat, seat_of
+from limitsets.feeder.scattering import Scattering
 
 
 def one_by_one(parts: list[Any], noise: Scattering, contact: str, trials: int, seed: int) -> dict[str, Any]:

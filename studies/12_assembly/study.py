@@ -16,10 +16,10 @@ from rate_search import confirmed
 from serial_feeding import one_by_one
 
 import limitsets as ls
-from limitsets.assembly import Assembly
-from limitsets.assembly.counting import Rate, rate_of
-from limitsets.files import as_plain, as_table, picked
-from limitsets.robust import Gaussian, Scattering
+from limitsets.base.files import as_plain, as_table, picked
+from limitsets.cell.assembly import Assembly
+from limitsets.cell.assembly.assembly_run import Rate, rate_of
+from limitsets.feeder.scattering import Gaussian, Scattering
 
 HERE = Path(__file__).resolve().parent
 PAPER, SURVIVED, OF = (

@@ -16,12 +16,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import limitsets as ls
-from limitsets.engine import Crowd
-from limitsets.feeding.crowd import CrowdTrials, run_crowd
-from limitsets.feeding.falling import FATES, arm_end_of
-from limitsets.feeding.trials import run_trials
-from limitsets.plot import style
-from limitsets.robust import Gaussian, Scattering
+from limitsets.cell.feeding.crowd import CrowdTrials, run_crowd
+from limitsets.cell.feeding.falling import FATES, arm_end_of
+from limitsets.cell.feeding.trials import run_trials
+from limitsets.face.plot import style
+from limitsets.feeder.engine import Crowd
+from limitsets.feeder.scattering import Gaussian, Scattering
 
 HERE = Path(__file__).resolve().parent
 CAVITY = tomllib.loads((HERE.parent / "sizes.toml").read_text(encoding="utf-8"))["cavity"]

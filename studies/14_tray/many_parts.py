@@ -15,13 +15,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import limitsets as ls
-from limitsets.engine.recording import Recording
-from limitsets.plot import style
-from limitsets.trays import Pouring, TrayCrowd
-from limitsets.trays.chain import filled
-from limitsets.trays.crowd import crowds_of
-from limitsets.trays.filling import INTERVALS
-from limitsets.trays.passing import random_of
+from limitsets.cell.trays import Pouring, TrayCrowd
+from limitsets.cell.trays.filling import INTERVALS, filled
+from limitsets.cell.trays.passing import random_of
+from limitsets.cell.trays.pouring import crowds_of
+from limitsets.face.plot import style
+from limitsets.feeder.engine.member import Recording
 
 HERE = Path(__file__).resolve().parent
 PASSES, DEPRESSIONS, DROPS = 30, 20, 4000

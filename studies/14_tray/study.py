@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
-from limitsets.engine.depression import UNFINISHED
-from limitsets.robust.noise.proportions import binomial_interval
-from limitsets.trays import TrayFill
-from limitsets.trays.histories import Histories
-from limitsets.trays.histories import histories as follow
-from limitsets.trays.passing import passes_of, random_of
+from limitsets.cell.trays import TrayFill
+from limitsets.cell.trays.passing import Histories, passes_of, random_of
+from limitsets.cell.trays.passing import histories as follow
+from limitsets.feeder.engine.depression import UNFINISHED
+from limitsets.parameters.noise.sampling import binomial_interval
 
 HERE = Path(__file__).resolve().parent
 PASSES, SHORT = 200, 3

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.analysis import plan_for
-from limitsets.analysis.accuracy import _distance
-from limitsets.analysis.verifying import _Visited
-from limitsets.errors import AnswerError
+from limitsets.base.errors import AnswerError
+from limitsets.parameters.analysis import plan_for
+from limitsets.parameters.analysis.accuracy import _distance, _Visited
 
 HERE = Path(__file__).parent
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.analysis import in_limit_sets, other_vertex_first
-from limitsets.errors import AnswerError, GridError, SceneError
-from limitsets.thrower import impact_angles
+from limitsets.base.errors import AnswerError, GridError, SceneError
+from limitsets.feeder.thrower import impact_angles
+from limitsets.parameters.analysis import in_limit_sets, other_vertex_first
 from tests.scene.four_gon import FOUR_GON
 
 HERE = Path(__file__).parent
@@ -83,7 +83,7 @@ def test_other_vertex_first(name, borders):
 
 
 def test_other_vertex_first_agrees_with_single_throws():
-    from limitsets.thrower import trace
+    from limitsets.feeder.thrower import trace
 
     scene = ls.load(HERE / "five-sides.toml")
     found = other_vertex_first(scene)

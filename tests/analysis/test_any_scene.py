@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.maps import codes
+from limitsets.base.errors import LimitsetsError
+from limitsets.systems.maps import codes
 
 UNITS = st.sampled_from(["m", "cm", "mm", "in", "ft"])
 

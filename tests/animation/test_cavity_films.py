@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.animation import film_of
-from limitsets.animation.cutting import Asked
-from limitsets.animation.picture import Picture
-from limitsets.animation.recorded import film_of_recording
-from limitsets.engine import Crowd
-from limitsets.engine.ground import ground_of
-from limitsets.engine.overlaps import depth_of_overlap
-from limitsets.errors import AnswerError, LimitsetsError
-from limitsets.feeding.falling import arm_end_of
-from limitsets.feeding.tipping import tipping_times
+from limitsets.base.errors import AnswerError, LimitsetsError
+from limitsets.cell.feeding.falling import arm_end_of, tipping_times
+from limitsets.face.animation import film_of
+from limitsets.face.animation.fed import film_of_recording
+from limitsets.face.animation.film import Asked
+from limitsets.face.animation.picture import Picture
+from limitsets.feeder.engine import Crowd
+from limitsets.feeder.engine.crowd import depth_of_overlap
+from limitsets.feeder.engine.member import ground_of
 from tests.cli.command import run
 from tests.feeding.scenes import with_cavity
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.animation import film_of
-from limitsets.engine.recording import Recording
-from limitsets.errors import AnswerError
-from limitsets.feeding import time_to_tip
-from limitsets.feeding.falling import arm_end_of
+from limitsets.base.errors import AnswerError
+from limitsets.cell.feeding import time_to_tip
+from limitsets.cell.feeding.falling import arm_end_of
+from limitsets.face.animation import film_of
+from limitsets.feeder.engine.member import Recording
 from tests.assembly.pairs import pair as pair_of_tests
 from tests.feeding.scenes import with_cavity
 from tests.trays.scenes import with_tray

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.animation import film_of
-from limitsets.plot.poses import about_centre, turned
-from limitsets.plot.throwing import motion, throws_of
-from limitsets.thrower import trace
+from limitsets.face.animation import film_of
+from limitsets.face.plot.throwing import about_centre, motion, throws_of, turned
+from limitsets.feeder.thrower import trace
 
 ROLLING = {"effects": {"landing": True, "roll": True}}
 SCATTERED = {

@@ -1,7 +1,7 @@
 """The parts of the assembly, with and without contact, and the noise of study 05."""
 
 import limitsets as ls
-from limitsets.robust import Gaussian, Scattering
+from limitsets.feeder.scattering import Gaussian, Scattering
 
 NOISE = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
 NAMES = ("paper-triangle", "paper-quadrilateral")

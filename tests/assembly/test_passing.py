@@ -8,17 +8,15 @@ import pytest
 from scipy.stats import binomtest
 
 import limitsets as ls
-from limitsets.assembly.counting import joint_of
-from limitsets.assembly.drawing import Draws
-from limitsets.assembly.outlines import TOLERANCE, meet, way_of
-from limitsets.assembly.pairing import at_rest, outline_at, pair_of
-from limitsets.assembly.passing import pass_through
-from limitsets.engine.overlaps import depth_of_overlap
-from limitsets.feeding.falling import arm_end_of
-from limitsets.feeding.trials import run_trials
-from limitsets.maps import images
-from limitsets.robust import Gaussian, Scattering, Uniform
-from limitsets.thrower import trace
+from limitsets.cell.assembly.assembly_run import joint_of
+from limitsets.cell.assembly.pairing import TOLERANCE, Draws, at_rest, meet, outline_at, pair_of, way_of
+from limitsets.cell.assembly.trials import pass_through
+from limitsets.cell.feeding.falling import arm_end_of
+from limitsets.cell.feeding.trials import run_trials
+from limitsets.feeder.engine.crowd import depth_of_overlap
+from limitsets.feeder.scattering import Gaussian, Scattering, Uniform
+from limitsets.feeder.thrower import trace
+from limitsets.systems.maps import images
 from tests.assembly.pairs import NAMES, NOISE
 
 TRIALS = 600

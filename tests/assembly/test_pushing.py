@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.assembly.assembly_run import OUTCOMES
-from limitsets.assembly.pairing import are_apart, pair_of
-from limitsets.assembly.pushing import Question, _Watched, crowd_of, push
-from limitsets.engine.overlaps import depth_of_overlap
-from limitsets.engine.rests import Rest
-from limitsets.engine.seats import seat_of
+from limitsets.cell.assembly.assembly_run import OUTCOMES
+from limitsets.cell.assembly.pairing import are_apart, pair_of
+from limitsets.cell.assembly.trials import Question, _Watched, crowd_of, push
+from limitsets.feeder.engine.crowd import depth_of_overlap
+from limitsets.feeder.engine.depression import seat_of
+from limitsets.feeder.engine.member import Rest
 from tests.assembly.pairs import NOISE, pair
 from tests.feeding.scenes import with_cavity
 
@@ -137,7 +137,7 @@ def test_trials_end_in_words_and_start_apart(found, joined):
     assert set(found.counts) == set(OUTCOMES)
     assert found.joint is None
     assert found.overlaps is None
-    from limitsets.assembly.drawing import Draws
+    from limitsets.cell.assembly.pairing import Draws
 
     for number in range(200):
         assert are_apart(joined, Draws(joined, 1, number).starts(apart=True))

@@ -12,7 +12,7 @@ from dataclasses import replace
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
+from limitsets.base.errors import AnswerError
 from tests.assembly.pairs import NAMES, NOISE, pair
 from tests.cli.command import run
 from tests.sweep.stores import Shuffled

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.cli import main
+from limitsets.face.cli import main
 from tests.attack.generate import Case
 from tests.attack.goals import Verdict, ranges
 from tests.attack.proved import attraction, proved_goal

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.auditing import ASSUMPTIONS, choose_effects, where
-from limitsets.jit import entry_of
-from limitsets.proofs.parameters import parameter_box
-from limitsets.thrower.assumed_box import Assumed, assumed, corner_bounds
-from limitsets.thrower.effects import EFFECTS
-from limitsets.thrower.effects.bounce import struck
-from limitsets.thrower.effects.landing import Landing, first_arrival
-from limitsets.thrower.effects.slip import Slip
-from limitsets.thrower.full import gather_full
-from limitsets.thrower.motion import above, right_of
+from limitsets.feeder.thrower.assumed_box import Assumed, assumed, corner_bounds
+from limitsets.feeder.thrower.effects import EFFECTS
+from limitsets.feeder.thrower.effects.bounce import struck
+from limitsets.feeder.thrower.effects.landing import Landing, first_arrival
+from limitsets.feeder.thrower.effects.slip import Slip
+from limitsets.feeder.thrower.full import gather_full
+from limitsets.feeder.thrower.motion import above, right_of
+from limitsets.numbers.jit import entry_of
+from limitsets.proofs.auditing import ASSUMPTIONS, choose_effects, where
+from limitsets.proofs.prover.parameters import parameter_box
 from tests.thrower.reference import paper
 
 SCENES = ["paper-initial", "paper-designed", "paper-initial-small-angle", "paper-designed-small-angle"]

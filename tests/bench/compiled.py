@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.thrower.params import Side
+from limitsets.feeder.thrower.params import Side
 
 __all__ = ["compiler", "throws_in_c"]
 

@@ -1,6 +1,6 @@
 /* Feeding without the package: the equations of docs/model.md, "exact" flight and "signed" flips, for many parts, each
    thrown until it has met its fate.  Arrays and loops that the compiler vectorises; random numbers are hashed counters.
-   Fates in the order of limitsets.feeding.falling.FATES. */
+   Fates in the order of limitsets.cell.feeding.falling.FATES. */
 #include <math.h>
 #include <stdint.h>
 

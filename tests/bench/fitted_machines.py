@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
+from limitsets.base.errors import LimitsetsError
 from tests.fitting.machines import film, machine
 from tests.fitting.test_fit import LANDING, PLACES, SPEED, aimed_at, held_by
 from tests.fitting.test_misfit import lacking, spoiled_film

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from limitsets.maps.codes import OUTSIDE, UNDECIDED
+from limitsets.systems.maps.codes import OUTSIDE, UNDECIDED
 
 __all__ = ["HI", "LO", "Answer", "by_cmgdb", "by_scipy"]
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.analysis.accuracy import _distance
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.cover import cover
-from limitsets.proofs.end_points import proved_ends
-from limitsets.proofs.parameters import parameter_box
-from limitsets.sets import invariant_measures
+from limitsets.parameters.analysis.accuracy import _distance
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.end_points import proved_ends
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.sets import invariant_measures
 from tests.bench.measure import limit, take_turns, versus
 
 pytestmark = pytest.mark.bench
@@ -37,7 +37,7 @@ def attracting(scene, cells, method=None):
     graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=cells), method)
     sets = zip(graph.recurrent_components(), graph.condensation().attracting, strict=True)
     ((cells_of_it, _),) = [(part, ends) for part, ends in sets if ends]
-    from limitsets.cells import CellSet
+    from limitsets.systems.cells import CellSet
 
     return graph, CellSet.of(graph.grid, cells_of_it)
 
@@ -88,7 +88,7 @@ def test_an_error_asked_for(benchmark, table):
 def test_one_throw(benchmark, table):
     scene = ls.load("paper-designed")
     x = np.random.default_rng(2).uniform(*EXACT[2][0], 4096)
-    from limitsets.thrower import Energy, SmallAngle
+    from limitsets.feeder.thrower import Energy, SmallAngle
 
     small = scene.map._replace(flight=SmallAngle(), flip=Energy())
     turns = take_turns(

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.graph.components import strong_components
-from limitsets.graph.ranges import Ranges
-from limitsets.maps import INWARD, images
-from limitsets.maps.stacks import point_of
-from limitsets.scene.arrays import throw_stack
-from limitsets.topology import topologies
+from limitsets.feeder.scene.arrays import throw_stack
+from limitsets.systems.graph.components import strong_components
+from limitsets.systems.graph.ranges import Ranges
+from limitsets.systems.maps import INWARD, images
+from limitsets.systems.maps.pieces import point_of
+from limitsets.systems.topology import topologies
 from tests.bench.measure import Turns, limit, take_turns, versus
 
 pytestmark = pytest.mark.bench

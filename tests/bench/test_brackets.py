@@ -9,9 +9,10 @@ import pytest
 from scipy import stats
 
 import limitsets as ls
-from limitsets.robust import Gaussian, Scattering, Uniform, absorption_brackets, noise_statistics
-from limitsets.robust.noise.chain_solution import starts_from
-from limitsets.robust.noise.sampling import ManyParts, scattering_map, uniform_starts
+from limitsets.feeder.scattering import Gaussian, Scattering, Uniform, starts_from
+from limitsets.parameters.noise.sampling import ManyParts, scattering_map, uniform_starts
+from limitsets.parameters.noise.statistics import noise_statistics
+from limitsets.proofs.chances.absorption import absorption_brackets
 from tests.bench.measure import limit
 
 pytestmark = pytest.mark.bench

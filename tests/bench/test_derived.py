@@ -14,11 +14,11 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.graph.images.enclosed import enclosures
-from limitsets.interval import Interval
-from limitsets.maps.kernels import forced, image
-from limitsets.maps.textbook.slots import Plane, Point, plane, rectangle
-from limitsets.thrower import SmallAngle
+from limitsets.feeder.thrower import SmallAngle
+from limitsets.numbers.interval import Interval
+from limitsets.systems.graph.images.enclosed import enclosures
+from limitsets.systems.maps.kernels import forced, image
+from limitsets.systems.maps.textbook.shared import Plane, Point, plane, rectangle
 from tests.bench.measure import limit, take_turns, versus
 
 pytestmark = pytest.mark.bench

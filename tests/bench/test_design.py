@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import minimize, root
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
+from limitsets.base.errors import LimitsetsError
 from tests.bench.measure import limit, take_turns, versus
 
 pytestmark = pytest.mark.bench

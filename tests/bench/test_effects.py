@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.maps import drivers
+from limitsets.systems.maps import drivers
 from tests.bench.measure import Turns, take_turns, versus
 from tests.thrower.effects.copies import environment_of_copy
 

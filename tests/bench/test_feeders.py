@@ -17,9 +17,9 @@ import pytest
 from scipy.stats import binom
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.feeding.falling import FATES, arm_end_of
-from limitsets.robust import Gaussian, Scattering, Uniform
+from limitsets.base.errors import LimitsetsError
+from limitsets.cell.feeding.falling import FATES, arm_end_of
+from limitsets.feeder.scattering import Gaussian, Scattering, Uniform
 from tests.bench.compiled import compiler
 from tests.bench.measure import limit
 

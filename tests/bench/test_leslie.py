@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.graph.components import reach
+from limitsets.systems.graph.components import reach
 from tests.bench.leslie_rivals import HI, LO, Answer, by_cmgdb, by_scipy
 from tests.bench.measure import Turns, limit, take_turns, versus
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 import limitsets as ls
-from limitsets.goals import OrientedBeyond
-from limitsets.proofs.goals import oriented_beyond
-from limitsets.robust.margins.joint import joint_margin
+from limitsets.feeder.goals import OrientedBeyond
+from limitsets.parameters.margins.joint import joint_margin
+from limitsets.proofs.prover.goals import oriented_beyond
 from tests.bench.measure import limit, take_turns, versus
 
 pytestmark = pytest.mark.bench

@@ -9,10 +9,10 @@ import pytest
 from scipy.sparse import coo_array
 
 import limitsets as ls
-from limitsets.robust import Gaussian, Scattering, noise_statistics, transfer
-from limitsets.robust.noise.chain_solution import starts_from
-from limitsets.robust.noise.sampling import scattering_map, throw_many
-from limitsets.robust.noise.scattering import kappa_strata, still_map, thrown
+from limitsets.feeder.scattering import Gaussian, Scattering, kappa_strata, starts_from, still_map, thrown
+from limitsets.parameters.noise.sampling import scattering_map, throw_many
+from limitsets.parameters.noise.statistics import noise_statistics
+from limitsets.parameters.noise.ulam import transfer
 from tests.bench.measure import limit, take_turns, versus
 
 pytestmark = pytest.mark.bench

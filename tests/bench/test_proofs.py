@@ -16,14 +16,14 @@ import pytest
 
 import limitsets as ls
 from limitsets.checker import recheck
-from limitsets.maps import images
+from limitsets.systems.maps import images
 from tests.bench.measure import limit, take_turns, versus
 from tests.bench.python_proofs import cells, with_arb
 from tests.proofs import forge, test_recheck
 
 pytestmark = pytest.mark.bench
 
-enclosed = importlib.import_module("limitsets.graph.images.enclosed")
+enclosed = importlib.import_module("limitsets.systems.graph.images.enclosed")
 
 CELLS = 200_000
 

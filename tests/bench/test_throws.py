@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.maps import drivers
-from limitsets.thrower.params import gather
+from limitsets.feeder.thrower.params import gather
+from limitsets.systems.maps import drivers
 from tests.bench.compiled import compiler, throws_in_c
 from tests.bench.measure import take_turns, versus
 

@@ -1,6 +1,6 @@
-/* The throw of limitsets/thrower in C: the same arithmetic, the same check and codes, one state after the other in a
+/* The throw of limitsets/feeder/thrower in C: the same arithmetic, the same check and codes, one state after the other in a
    loop the compiler vectorises (`images`), and what one would write without either (`images_libm`): sin and cos of
-   libm, Newton until it stands still.  Keep it in step with limitsets/thrower; test_throws.py compares the answers.
+   libm, Newton until it stands still.  Keep it in step with limitsets/feeder/thrower; test_throws.py compares the answers.
    Flight exact, flip signed. */
 #include <math.h>
 #include <stdint.h>

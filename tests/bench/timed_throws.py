@@ -6,10 +6,10 @@ from time import perf_counter
 import numpy as np
 
 import limitsets as ls
-from limitsets.maps import drivers
+from limitsets.systems.maps import drivers
 
 if sys.argv[1] == "with":
-    import limitsets.thrower.effects
+    import limitsets.feeder.thrower.effects
 
 COUNT, REPEATS = 4096, 50
 params = ls.load("paper-designed").map

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import limitsets as ls
-from limitsets.cells import CellSet, Domain
-from limitsets.errors import GridError
+from limitsets.base.errors import GridError
+from limitsets.systems.cells import CellSet, Domain
 
 COVER = ls.grid(Domain([[0.0], [10.0]], [[1.0], [12.0]]), cells=8)
 subsets = st.lists(st.booleans(), min_size=16, max_size=16).map(lambda bits: CellSet(COVER, np.array(bits)))

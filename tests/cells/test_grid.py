@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import limitsets as ls
-from limitsets.cells import Domain, Grid, as_domain
-from limitsets.errors import GridError
+from limitsets.base.errors import GridError
+from limitsets.systems.cells import Domain, Grid, as_domain
 
 ANCHORED = Domain([[1.001], [2.0005]], [[28.0], [20.0]], [1.0, 2.0])
 

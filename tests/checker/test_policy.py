@@ -13,12 +13,12 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.policies import Policy, broken, places
-from limitsets.policies.enclosed_starts import not_within
-from limitsets.policies.writing import write
-from limitsets.proofs.confirm import DeniedError
-from limitsets.scene.sensing import BeyondSensor, SideSensor
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
+from limitsets.proofs.policies import Policy, broken, places
+from limitsets.proofs.policies.simulation import not_within
+from limitsets.proofs.policies.synthesis import write
+from limitsets.proofs.prover.certificate import DeniedError
 from tests.proofs.forge import Forged
 
 BUILD = Path(__file__).resolve().parents[2] / "limitsets" / "checker" / "build.py"
@@ -577,7 +577,7 @@ def test_nothing_is_written_without_a_policy_or_of_effects(tmp_path):
 
 
 def test_a_policy_that_is_denied_is_not_decided(tmp_path, monkeypatch):
-    from limitsets.policies import writing
+    from limitsets.proofs.policies import synthesis as writing
 
     right = writing.brackets
     monkeypatch.setattr(writing, "brackets", lambda cover: right(cover) * [0.999, 0.9995])

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from limitsets.cli import main
+from limitsets.face.cli import main
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 

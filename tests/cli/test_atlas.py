@@ -9,7 +9,7 @@ import pytest
 
 from tests.cli.command import run
 
-TASK = "limitsets.sweep.examples:critical_points"
+TASK = "limitsets.parameters.atlas.examples:critical_points"
 KAPPA = ["--x", "throw.kappa=25.3778518:27:2"]
 
 

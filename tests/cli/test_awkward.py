@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.cli.output import table
-from limitsets.errors import SceneError
-from limitsets.report.robust_pages import robustness_page
+from limitsets.base.errors import SceneError
+from limitsets.face.cli.output import table
+from limitsets.face.report.robust_pages import robustness_page
 from tests.cli.command import run
 from tests.lead_quad import LEAD_QUAD
 from tests.lead_triangle import left_by_some
@@ -286,7 +286,7 @@ def test_a_design_that_is_not_proved_names_a_command_to_paste(capfd, monkeypatch
     """It said: limitsets certify on the scene found."""
     from dataclasses import replace
 
-    from limitsets.inverse.margin import for_goal
+    from limitsets.parameters.design import for_goal
 
     found = for_goal.design_for_goal(ls.load("paper-designed"), vary=["throw.kappa"], evaluations=10)
     monkeypatch.setattr(for_goal, "design_for_goal", lambda *_, **__: replace(found, verdict="undecided"))
@@ -300,7 +300,7 @@ def test_a_design_that_is_not_proved_names_a_command_to_paste(capfd, monkeypatch
 
 @pytest.mark.sweep
 def test_a_robust_design_that_was_ended_is_on_disk(capfd, monkeypatch):
-    from limitsets.inverse.margin import for_margin
+    from limitsets.parameters.design import for_margin
 
     monkeypatch.setattr(for_margin, "polished", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     words = (

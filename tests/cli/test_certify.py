@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.proofs import confirm
+from limitsets.proofs.prover import certificate as confirm
 from tests.cli.command import PROGRESS, run
 from tests.lead_triangle import left_by_some
 

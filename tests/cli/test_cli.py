@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.cli import output
+from limitsets.face.cli import output
 from tests.cli.command import PROGRESS, run
 
 SCENES = Path(__file__).parents[1] / "analysis"
@@ -84,7 +84,7 @@ def test_bad_input_is_one_line_and_exit_2(capfd, words):
 
 
 def test_a_bug_is_one_line_too(capfd, monkeypatch):
-    import limitsets.scene
+    import limitsets.feeder.scene
 
     monkeypatch.setattr(limitsets.scene, "scenes", lambda: 1 / 0)
     code, out, err = run(capfd, "scenes")
@@ -96,7 +96,7 @@ def test_a_bug_is_one_line_too(capfd, monkeypatch):
     "fault", [MemoryError, PermissionError(13, "Permission denied", "x.png"), OSError("odd")]
 )
 def test_faults_of_the_machine(capfd, monkeypatch, fault):
-    import limitsets.scene
+    import limitsets.feeder.scene
 
     def fails():
         raise fault
@@ -333,7 +333,9 @@ def test_a_full_disk():
     assert done.stderr == "limitsets: No space left on device\n"
 
 
-@pytest.mark.parametrize("module", ["limitsets.cli", "limitsets.cli.run", "typer", "limitsets.cli.app"])
+@pytest.mark.parametrize(
+    "module", ["limitsets.cli", "limitsets.face.cli.app", "typer", "limitsets.face.cli.output"]
+)
 def test_ctrl_c_while_the_package_is_imported(module):
     """A finder sends the signal where the module is asked for."""
     code = (

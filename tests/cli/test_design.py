@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.cli.arguments import bounds_of
-from limitsets.errors import LimitsetsError
+from limitsets.base.errors import LimitsetsError
+from limitsets.face.cli.arguments import bounds_of
 from tests.cli.command import run
 
 VARY = "part.mass.center.along,part.mass.center.above,throw.speed"

@@ -64,7 +64,7 @@ def test_the_certificate_is_written_and_rechecked(capfd):
 
 def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
     """It is kept, and the command says so."""
-    from limitsets.feeding import writing
+    from limitsets.cell.feeding import proving as writing
 
     file, right = written("paper-designed"), writing.section_of
 

@@ -127,7 +127,7 @@ def test_a_certificate_is_written_and_confirmed(capfd):
 
 def test_what_the_checker_denies_is_not_solved(capfd, monkeypatch):
     pytest.importorskip("flint", reason="the checker needs python-flint")
-    from limitsets.policies import writing
+    from limitsets.proofs.policies import synthesis as writing
 
     right = writing.brackets
     monkeypatch.setattr(writing, "brackets", lambda cover: right(cover) * [0.999, 0.9995])

@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.errors import SceneError
-from limitsets.scene.checking import examined
-from limitsets.scene.schema import Table, scene_table
-from limitsets.scene.starting import starting_text
-from limitsets.scene.validation import refusals
+from limitsets.base.errors import SceneError
+from limitsets.feeder.scene.checking import examined, starting_text
+from limitsets.feeder.scene.schema import Table, scene_table
+from limitsets.feeder.scene.validation import refusals
 from tests.cli.command import documented, run
 
 LEAD = """
@@ -195,7 +194,7 @@ def test_the_doctor_says_what_is_there(capfd, monkeypatch, tmp_path):
 def test_the_doctor_names_the_line_that_installs_an_extra(capfd, monkeypatch):
     import importlib.metadata
 
-    from limitsets.cli import doctor
+    from limitsets.face.cli import scenes as doctor
 
     def version(name):
         if name == "pymunk":
@@ -209,9 +208,9 @@ def test_the_doctor_names_the_line_that_installs_an_extra(capfd, monkeypatch):
 
 
 def test_the_doctor_works_where_packages_are_lost(capfd, monkeypatch):
-    monkeypatch.setitem(sys.modules, "limitsets.jit.cache", None)
+    monkeypatch.setitem(sys.modules, "limitsets.numbers.jit.cache", None)
     monkeypatch.setattr(
-        "limitsets.cli.doctor.requires", lambda name: ["numba>=0.68", "no-such-package-of-ours>=1"]
+        "limitsets.face.cli.scenes.requires", lambda name: ["numba>=0.68", "no-such-package-of-ours>=1"]
     )
     code, out, _ = run(capfd, "doctor")
     assert code == 1
@@ -223,7 +222,7 @@ def test_the_doctor_clears_the_compiled_code(capfd, monkeypatch, tmp_path):
     folder = tmp_path / "cache" / "one version"
     folder.mkdir(parents=True)
     (folder / "code").write_bytes(b"x" * 1000)
-    monkeypatch.setattr("limitsets.jit.cache.FOLDER", folder)
+    monkeypatch.setattr("limitsets.numbers.jit.cache.FOLDER", folder)
     assert json.loads(run(capfd, "doctor", "--json")[1])["cache"]["bytes"] == 1000
     assert folder.is_dir()
     record = json.loads(run(capfd, "doctor", "--json", "--clear")[1])["cache"]

@@ -9,7 +9,7 @@ import pytest
 from typer.main import get_command
 
 import limitsets as ls
-from limitsets.cli.app import app
+from limitsets.face.cli.app import app
 from tests.cli.command import run
 
 COMMANDS = get_command(app).commands

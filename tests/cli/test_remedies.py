@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
+from limitsets.base.errors import LimitsetsError
 from tests.cli.command import run
 from tests.feeding.scenes import with_cavity
 

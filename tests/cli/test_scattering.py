@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
+from limitsets.base.errors import AnswerError
 from tests.cli.command import run
 from tests.feeding.scenes import with_cavity
 
@@ -125,7 +125,7 @@ def test_a_deviation_without_its_unit_is_told_of_percent(capfd):
 
 def test_the_explorer_says_of_which_model_its_proofs_are():
     """The starts of the last claim stood in place of the model's sentence."""
-    from limitsets.explorer.answers import proof_words
+    from limitsets.face.explorer.answers import proof_words
 
     model = "of the minimal model: friction of [world] is not in it"
     claim = {"claim": "goal", "verdict": "proved", "reason": "", "starts": "every", "share": 1.0, "note": ""}

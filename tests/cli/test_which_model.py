@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from limitsets.scene.left_out import Model
+from limitsets.feeder.scene.left_out import Model
 from tests.cli.command import run
 from tests.feeding.scenes import with_cavity
 
@@ -83,7 +83,7 @@ def test_every_command_names_what_is_left_out(capfd, words):
 
 
 def test_the_answer_is_there_before_the_audit(capfd, monkeypatch):
-    import limitsets.auditing
+    import limitsets.proofs.auditing
 
     def late(model, scene):
         assert "attracts-all: PROVED" in capfd.readouterr().out
@@ -97,7 +97,7 @@ def test_the_answer_is_there_before_the_audit(capfd, monkeypatch):
 
 @pytest.mark.parametrize("name", ["paper-initial", "paper-designed"])
 def test_the_count_is_that_of_the_audit_and_quick(name):
-    from limitsets.auditing import audited
+    from limitsets.proofs.auditing import audited
 
     for world in ({}, RUBBED, {"friction": 0.01, "restitution": 0.9, "bounce_threshold": "0.01 in"}):
         found = ls.load(ls.load(name).as_dict() | {"world": world})
@@ -234,7 +234,7 @@ def test_a_feeder_that_feeds_nothing_says_so_first(capfd):
 
 def test_the_explorer_names_it():
     pytest.importorskip("panel")
-    from limitsets.explorer.page import ScenePage
+    from limitsets.face.explorer.page import ScenePage
 
     page = ScenePage(scene(world=RUBBED))
     assert f"{LEFT_OUT}; not audited" in page._proved.object

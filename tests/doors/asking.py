@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import limitsets as ls
-from limitsets.cli import main
-from limitsets.errors import LimitsetsError
-from limitsets.explorer.work import answers
-from limitsets.robust.margins.margin_texts import bound
-from limitsets.scene.left_out import WITHOUT_SCATTER
+from limitsets.base.errors import LimitsetsError
+from limitsets.face.cli import main
+from limitsets.face.explorer.work import answers
+from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
+from limitsets.parameters.margins.margin_result import bound
 
 # How much narrower than what is proved, and wider than what is refuted, a tolerance is asked of `certify`.
 INSIDE, OUTSIDE = 1.0 - 1e-3, 1.0 + 1e-3

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.engine import Crowd, Rest, off_seat, seat_of
-from limitsets.engine.filming import Film
-from limitsets.engine.overlaps import depth_of_overlap
-from limitsets.engine.stage import OVERLAP
-from limitsets.errors import AnswerError
-from limitsets.feeding import time_to_tip
-from limitsets.maps import images
+from limitsets.base.errors import AnswerError
+from limitsets.cell.feeding import time_to_tip
+from limitsets.feeder.engine import Crowd, Rest, off_seat, seat_of
+from limitsets.feeder.engine.crowd import depth_of_overlap
+from limitsets.feeder.engine.member import Film
+from limitsets.feeder.engine.stage import OVERLAP
+from limitsets.systems.maps import images
 from tests.studies.test_studies import STUDIES
 
 pytest.importorskip("pymunk")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.engine.depression import EMPTY, UNFINISHED, Motion, Plate, fall_speed
+from limitsets.feeder.engine.depression import EMPTY, UNFINISHED, Motion, Plate, fall_speed
 
 pytest.importorskip("pymunk")
 

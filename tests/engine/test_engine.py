@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.engine import compare, throw
-from limitsets.engine.settling import IDLE, settle
-from limitsets.engine.stage import set_up
-from limitsets.errors import AnswerError, MapError
+from limitsets.base.errors import AnswerError, MapError
+from limitsets.feeder.engine import compare, throw
+from limitsets.feeder.engine.stage import IDLE, set_up, settle
 
 pytest.importorskip("pymunk")
 

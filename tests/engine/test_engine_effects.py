@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.engine import throw
+from limitsets.feeder.engine import throw
 
 pytest.importorskip("pymunk")
 
-from limitsets.engine.hinged import _bounce, _stick
-from limitsets.engine.settling import slides_back
-from limitsets.engine.stage import set_up
-from limitsets.engine.stroke import accelerate
+from limitsets.feeder.engine.stage import _bounce, _stick, set_up, slides_back
+from limitsets.feeder.engine.throwing import accelerate
 
 DESIGNED, INITIAL = ls.load("paper-designed"), ls.load("paper-initial")
 
@@ -102,7 +100,7 @@ def test_when_an_impact_slides_back(friction, back):
     mu A < |B| up to mu = 0.563; the impulse that stops it lies outside the cone of 0.5, and in that of 0.54.
     """
     stage = set_up(DESIGNED, 14.1501654661399, 2)
-    from limitsets.engine.flying import fly
+    from limitsets.feeder.engine.stage import fly
 
     fly(stage, 60.0)
     assert slides_back(stage, stage.body.velocity, stage.body.angular_velocity, friction) == back

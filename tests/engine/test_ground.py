@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.engine.ground import ground_of
-from limitsets.engine.overlaps import depth_of_overlap
-from limitsets.errors import AnswerError
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.engine.crowd import depth_of_overlap
+from limitsets.feeder.engine.member import ground_of
 from tests.feeding.scenes import with_cavity
 
 

@@ -20,12 +20,11 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
-from limitsets.cli import main
-from limitsets.graph.images.enclosed import enclosures
-from limitsets.graph.ranges import RUN
-from limitsets.maps import images
-from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.tolerance import whole
+from limitsets.face.cli import main
+from limitsets.proofs.prover.parameters import parameter_box, whole
+from limitsets.systems.graph.images.enclosed import enclosures
+from limitsets.systems.graph.ranges import RUN
+from limitsets.systems.maps import images
 from tests.attack.generate import Case, case
 from tests.thrower.effects import throws as effect_throws
 

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from limitsets.explorer.canvas import Canvas, Layer
+from limitsets.face.explorer.canvas import Canvas, Layer
 
 
 def test_points_beyond_the_picture_are_left_out():

@@ -7,13 +7,20 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.cells import as_domain
-from limitsets.errors import LimitsetsError, SceneError
-from limitsets.explorer.answers import estimate_words, proof_words
-from limitsets.explorer.estimates import estimate, estimate_of_map, points_of_map
-from limitsets.explorer.knobs import centre_at, knobs_of, knobs_of_map, map_with, scene_with
-from limitsets.explorer.outside import MOST_BYTES, MOST_SIDES, scene_from, with_outline
-from limitsets.explorer.work import answers
+from limitsets.base.errors import LimitsetsError, SceneError
+from limitsets.face.explorer.answers import estimate_words, proof_words
+from limitsets.face.explorer.estimates import (
+    centre_at,
+    estimate,
+    estimate_of_map,
+    knobs_of,
+    knobs_of_map,
+    map_with,
+    points_of_map,
+    scene_with,
+)
+from limitsets.face.explorer.work import MOST_BYTES, MOST_SIDES, answers, scene_from, with_outline
+from limitsets.systems.cells import as_domain
 from tests.lead_triangle import left_by_some
 
 PAPER = ls.load("paper-designed")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError, LimitsetsError, SceneError
+from limitsets.base.errors import AnswerError, LimitsetsError, SceneError
 from tests.maps_of_tests import TwoState
 
 LEAD = """
@@ -252,8 +252,8 @@ def test_a_proof_that_has_said_nothing_yet_ends_when_a_slider_moves(page):
 
 def test_a_goal_that_is_proved_of_nothing_says_so():
     """The limit set of paper-designed ends at 23.383 in."""
-    from limitsets.explorer.answers import proof_words
-    from limitsets.explorer.work import answers
+    from limitsets.face.explorer.answers import proof_words
+    from limitsets.face.explorer.work import answers
 
     goal = {"oriented_beyond": {"x": "25 in", "side": 2}}
     scene = ls.load({**ls.load("paper-designed").as_dict(), "goal": goal})
@@ -283,8 +283,8 @@ def test_a_picture_is_sent_when_anything_of_it_has_changed_and_not_otherwise(pag
 
 def test_a_cycle_within_joined_cells_is_its_points():
     """At r = 3.843 cells of 1/2048 join the six points of the logistic map's cycle to three intervals."""
-    from limitsets.explorer.answers import estimate_words
-    from limitsets.explorer.estimates import estimate_of_map
+    from limitsets.face.explorer.answers import estimate_words
+    from limitsets.face.explorer.estimates import estimate_of_map
 
     x = 0.5
     for _ in range(100_000):
@@ -302,8 +302,8 @@ def test_a_cycle_within_joined_cells_is_its_points():
 
 def test_bands_that_cells_join_are_told():
     """The logistic map has two bands up to r = 3.6785735: between them a gap narrower than a cell is left at 3.6785."""
-    from limitsets.explorer.answers import estimate_words
-    from limitsets.explorer.estimates import estimate_of_map
+    from limitsets.face.explorer.answers import estimate_words
+    from limitsets.face.explorer.estimates import estimate_of_map
 
     found = estimate_of_map(ls.maps.Logistic(3.678), ls.grid([(0.0, 1.0)]).domain)
     assert found.bands == (2,)
@@ -425,7 +425,7 @@ def test_a_stored_atlas_is_shown_and_a_point_of_it_opened(tmp_path):
 
 def test_the_address_is_printed(monkeypatch, capsys):
     monkeypatch.setattr(
-        "limitsets.explorer.visits.serve", lambda page, title, ready, **_: ready("http://127.0.0.1:7")
+        "limitsets.face.explorer.visits.serve", lambda page, title, ready, **_: ready("http://127.0.0.1:7")
     )
     ls.explore(ls.maps.Henon()).show(show=False)
     assert capsys.readouterr().out == "explorer: http://127.0.0.1:7 (Ctrl-C ends it)\n"
@@ -448,6 +448,6 @@ def test_without_the_extra_one_line_names_it():
 
 
 def test_neither_the_package_nor_analyse_loads_panel():
-    script = "import sys, json, limitsets, limitsets.cli.app; print(json.dumps(sorted(sys.modules)))"
+    script = "import sys, json, limitsets, limitsets.face.cli.app; print(json.dumps(sorted(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert not {"panel", "bokeh"} & set(json.loads(done.stdout))

@@ -15,18 +15,18 @@ import typer
 from matplotlib.figure import Figure
 
 import limitsets as ls
-from limitsets.cells import Grid
-from limitsets.goals import Found, Goal, Place, Verdict
-from limitsets.graph.images.samples import SamplePoints
-from limitsets.plot import style
-from limitsets.proofs.goals import Answer, Kind
-from limitsets.proofs.goals.kind import against, below, common, place_text, undecided
-from limitsets.proofs.goals.recurrent_orbits import recurrent_violation
-from limitsets.scene import Scene
-from limitsets.scene.facts import Fact
-from limitsets.thrower.effects import Effect
-from limitsets.thrower.motion import Contact, Face, FullSide, at_kappa, impacted, moved, thrown
-from limitsets.thrower.params import Throw
+from limitsets.face.plot import style
+from limitsets.feeder.goals import Found, Goal, Place, Verdict
+from limitsets.feeder.scene import Scene
+from limitsets.feeder.scene.facts import Fact
+from limitsets.feeder.thrower.effects import Effect
+from limitsets.feeder.thrower.motion import Contact, Face, FullSide, at_kappa, impacted, moved, thrown
+from limitsets.feeder.thrower.params import Throw
+from limitsets.proofs.prover.goals import Answer, Kind
+from limitsets.proofs.prover.goals.kind import against, below, common, place_text, undecided
+from limitsets.proofs.prover.goals.recurrent_orbits import recurrent_violation
+from limitsets.systems.cells import Grid
+from limitsets.systems.graph.images.undecided import SamplePoints
 
 # ---------------------------------------------------------------- an effect, with two facts of its own
 

@@ -9,22 +9,21 @@ import pytest
 from typer.testing import CliRunner
 
 import limitsets as ls
-from limitsets.analysis import GoalOutcome
-from limitsets.cli.app import app
-from limitsets.errors import AnswerError, MapError, SceneError
-from limitsets.goals import GOALS, OrientedBeyond, declare, evaluate
-from limitsets.graph.images import METHODS
-from limitsets.graph.images.sampled import sampled
-from limitsets.maps import contract, images
-from limitsets.proofs.goals import KINDS, sentence
-from limitsets.proofs.query import Query
-from limitsets.report.audit_pages import summary
-from limitsets.report.goals import goal_sentence, verdict_of
-from limitsets.report.pages import page
-from limitsets.scene.facts import FACTS
-from limitsets.thrower import effects, impact_angles
-from limitsets.thrower.effects import EFFECTS
-from limitsets.thrower.motion_box import all_enclosed
+from limitsets.base.errors import AnswerError, MapError, SceneError
+from limitsets.face.cli.app import app
+from limitsets.face.report.pages import goal_sentence, page, verdict_of
+from limitsets.face.report.writing import summary
+from limitsets.feeder.goals import GOALS, OrientedBeyond, declare, evaluate
+from limitsets.feeder.scene.facts import FACTS
+from limitsets.feeder.thrower import effects, impact_angles
+from limitsets.feeder.thrower.effects import EFFECTS
+from limitsets.feeder.thrower.motion import all_enclosed
+from limitsets.parameters.analysis import GoalOutcome
+from limitsets.proofs.prover.goals import KINDS, sentence
+from limitsets.proofs.prover.query import Query
+from limitsets.systems.graph.images import METHODS
+from limitsets.systems.graph.images.sampled import sampled
+from limitsets.systems.maps import contract, images
 from tests.extending import outside
 
 DESIGNED = ls.load("paper-designed")

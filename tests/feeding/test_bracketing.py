@@ -6,9 +6,9 @@ import re
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.feeding.falling import arm_end_of
-from limitsets.robust import Scattering, Uniform
+from limitsets.base.errors import AnswerError
+from limitsets.cell.feeding.falling import arm_end_of
+from limitsets.feeder.scattering import Scattering, Uniform
 from tests.cli.command import run
 from tests.feeding.own_throws import shares
 from tests.feeding.scenes import with_cavity

@@ -10,13 +10,13 @@ import pytest
 from scipy.stats import binomtest, norm
 
 import limitsets as ls
-from limitsets.engine import Crowd
-from limitsets.errors import AnswerError
-from limitsets.feeding.crowd import _Batch, run_crowd
-from limitsets.feeding.falling import FATES, arm_end_of
-from limitsets.feeding.trials import run_trials
-from limitsets.files import as_json
-from limitsets.robust import Gaussian, Given, Scattering
+from limitsets.base.errors import AnswerError
+from limitsets.base.files import as_json
+from limitsets.cell.feeding.crowd import _Batch, run_crowd
+from limitsets.cell.feeding.falling import FATES, arm_end_of
+from limitsets.cell.feeding.trials import run_trials
+from limitsets.feeder.engine import Crowd
+from limitsets.feeder.scattering import Gaussian, Given, Scattering
 from tests.feeding.scenes import with_cavity
 
 pytest.importorskip("pymunk")

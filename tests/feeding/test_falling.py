@@ -8,9 +8,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.feeding import clear_beyond, time_to_tip
-from limitsets.feeding.falling import arm_end_of, farthest_clear
+from limitsets.base.errors import AnswerError
+from limitsets.cell.feeding import clear_beyond, time_to_tip
+from limitsets.cell.feeding.falling import arm_end_of, farthest_clear
 from tests.feeding.scenes import with_cavity
 
 G, D, RHO, ANGLE = 193.045, 0.708249, 1.25, math.radians(32.23)

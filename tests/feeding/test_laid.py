@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.feeding.falling import arm_end_of
-from limitsets.feeding.proving import proved_feeding
-from limitsets.feeding.writing import write_proof
-from limitsets.maps import advance
+from limitsets.cell.feeding.falling import arm_end_of
+from limitsets.cell.feeding.proving import proved_feeding, write_proof
+from limitsets.systems.maps import advance
 from tests.feeding.scenes import with_cavity
 
 LAID = {0: [(6, 14)], 2: [(9, 19)]}

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.feeding.falling import arm_end_of
-from limitsets.feeding.paths import Paths
-from limitsets.feeding.proving import proved_feeding
-from limitsets.feeding.writing import verdict_of, write_proof
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.cover import cover
-from limitsets.proofs.parameters import parameter_box
+from limitsets.base.errors import AnswerError
+from limitsets.cell.feeding.falling import arm_end_of
+from limitsets.cell.feeding.paths import Paths
+from limitsets.cell.feeding.proving import proved_feeding, verdict_of, write_proof
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.parameters import parameter_box
 from tests.feeding.scenes import with_cavity
 
 

@@ -8,15 +8,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.stats import beta
 
 import limitsets as ls
-from limitsets.cli.feed import _text
-from limitsets.errors import LimitsetsError
-from limitsets.feeding import Feeding
-from limitsets.feeding.falling import FATES, arm_end_of
-from limitsets.feeding.fed_shares import FedShares, success_curve
-from limitsets.feeding.trials import Trials, run_trials
-from limitsets.files import as_json
-from limitsets.robust import Gaussian, Scattering, Uniform
-from limitsets.robust.noise.proportions import binomial_interval
+from limitsets.base.errors import LimitsetsError
+from limitsets.base.files import as_json
+from limitsets.cell.feeding import Feeding
+from limitsets.cell.feeding.falling import FATES, arm_end_of
+from limitsets.cell.feeding.trials import FedShares, Trials, run_trials, success_curve
+from limitsets.face.cli.feed import _text
+from limitsets.feeder.scattering import Gaussian, Scattering, Uniform
+from limitsets.parameters.noise.sampling import binomial_interval
 from tests.feeding.own_throws import shares
 from tests.feeding.scenes import with_cavity
 

@@ -9,13 +9,12 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import limitsets as ls
-from limitsets.engine import Crowd
-from limitsets.errors import SceneError
-from limitsets.feeding import clear_beyond, time_to_tip
-from limitsets.feeding.falling import arm_end_of
-from limitsets.feeding.tipping import rate_about_end, tipping_times
-from limitsets.feeding.trials import run_trials
-from limitsets.robust import Scattering
+from limitsets.base.errors import SceneError
+from limitsets.cell.feeding import clear_beyond, time_to_tip
+from limitsets.cell.feeding.falling import arm_end_of, rate_about_end, tipping_times
+from limitsets.cell.feeding.trials import run_trials
+from limitsets.feeder.engine import Crowd
+from limitsets.feeder.scattering import Scattering
 from tests.feeding.scenes import with_cavity
 
 # Half a square plate: side 2, rho^2 = 4/6 about its middle, a = d = 1.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from limitsets.fitting import Throws
+from limitsets.parameters.fitting import Throws
 from tests.proofs.forge import Plain, scene
 
 ALONG, ABOVE = "part.mass.center.along", "part.mass.center.above"

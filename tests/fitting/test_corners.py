@@ -8,9 +8,9 @@ import pytest
 from scipy.stats import binom
 
 import limitsets as ls
-from limitsets.errors import DataError
-from limitsets.fitting import bootstrap, read_throws, simulated_throws
-from limitsets.report.fits import lines_of
+from limitsets.base.errors import DataError
+from limitsets.face.report.pages import lines_of
+from limitsets.parameters.fitting import bootstrap, read_throws, simulated_throws
 from tests.fitting.machines import ABOVE, ALONG, HEIGHT, KAPPA, RADIUS, film, machine
 from tests.fitting.test_fit import LANDING, PLACES, SPEED, aimed_at, repeated
 

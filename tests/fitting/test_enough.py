@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.fitting import enough
+from limitsets.base.errors import AnswerError
+from limitsets.parameters.fitting import enough
 from tests.fitting.machines import ABOVE, ALONG, HEIGHT, KAPPA, RADIUS, farthest, film
 from tests.proofs.forge import scene
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import DataError
-from limitsets.fitting.explaining import explained
-from limitsets.fitting.rows import as_recorded
-from limitsets.fitting.starting import robust_start
-from limitsets.report.fits import lines_of
+from limitsets.base.errors import DataError
+from limitsets.face.report.pages import lines_of
+from limitsets.parameters.fitting.likelihood import as_recorded
+from limitsets.parameters.fitting.misfit import explained
+from limitsets.parameters.fitting.searching import robust_start
 from tests.fitting.machines import film, machine
 from tests.fitting.test_fit import aimed_at
 from tests.fitting.test_misfit import spoiled_film

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import binom
 
 import limitsets as ls
-from limitsets.fitting.searching import largest_radius, threshold_of
-from limitsets.report.fits import lines_of
+from limitsets.face.report.pages import lines_of
+from limitsets.parameters.fitting.searching import largest_radius, threshold_of
 from tests.fitting.machines import ABOVE, ALONG, HEIGHT, KAPPA, RADIUS, described, film, machine, run_film
 from tests.proofs.forge import scene
 
@@ -222,7 +222,7 @@ def test_further_throws_sharpen_as_they_say():
 
 
 def film_from(draw, truth, x, side):
-    from limitsets.fitting import Throws
+    from limitsets.parameters.fitting import Throws
     from tests.fitting.machines import thrown
     from tests.proofs.forge import Plain
 

@@ -7,11 +7,11 @@ import pytest
 from scipy.stats import binom
 
 import limitsets as ls
-from limitsets.fitting import Throws
-from limitsets.fitting.misfit import misfit_of
-from limitsets.fitting.rows import as_recorded
-from limitsets.fitting.starting import robust_start
-from limitsets.maps import advance
+from limitsets.parameters.fitting import Throws
+from limitsets.parameters.fitting.likelihood import as_recorded
+from limitsets.parameters.fitting.misfit import misfit_of
+from limitsets.parameters.fitting.searching import robust_start
+from limitsets.systems.maps import advance
 from tests.fitting.machines import film, machine
 from tests.proofs.forge import scene
 

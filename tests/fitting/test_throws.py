@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import DataError
-from limitsets.fitting import read_throws
+from limitsets.base.errors import DataError
+from limitsets.parameters.fitting import read_throws
 
 HEAD = "x_before [mm],side_before,x_after [mm],side_after"
 ROW = "254,2,256.54,2"

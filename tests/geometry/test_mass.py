@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from limitsets.errors import GeometryError
-from limitsets.geometry import OnSide, mass_of, plate_with_points, triangle
+from limitsets.base.errors import GeometryError
+from limitsets.feeder.geometry import OnSide, mass_of, plate_with_points, triangle
 
 
 def test_rectangle() -> None:

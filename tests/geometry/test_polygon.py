@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from limitsets.errors import GeometryError
-from limitsets.geometry import convex_polygon, require_inside, side_ends, triangle, triangle_of
+from limitsets.base.errors import GeometryError
+from limitsets.feeder.geometry import convex_polygon, require_inside, side_ends, triangle, triangle_of
 
 PENTAGON = [(math.cos(2 * math.pi * k / 5), math.sin(2 * math.pi * k / 5)) for k in range(5)]
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from limitsets.errors import GeometryError
-from limitsets.geometry import (
+from limitsets.base.errors import GeometryError
+from limitsets.feeder.geometry import (
     OnSide,
     convex_polygon,
     require_rest,

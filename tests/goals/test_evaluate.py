@@ -3,8 +3,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from limitsets.errors import AnswerError
-from limitsets.goals import (
+from limitsets.base.errors import AnswerError
+from limitsets.face.report.pages import goal_sentence
+from limitsets.feeder.goals import (
     GOALS,
     AttractsAll,
     FlipOrder,
@@ -17,9 +18,8 @@ from limitsets.goals import (
     evaluate,
     words_of,
 )
-from limitsets.report.goals import goal_sentence
-from limitsets.robust.margins.finding import goals_of
-from limitsets.scene import load
+from limitsets.feeder.scene import load
+from limitsets.parameters.margins.single import goals_of
 
 # the limit sets of two paper scenes (docs/model.md)
 DESIGNED = {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
+from limitsets.base.errors import AnswerError
 
 
 @pytest.fixture(scope="module")

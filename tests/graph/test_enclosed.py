@@ -9,13 +9,13 @@ import pytest
 
 import limitsets as ls
 from limitsets import interval as iv
-from limitsets.cells import CellSet, Domain
-from limitsets.errors import AnswerError
-from limitsets.graph.target import Target, place
+from limitsets.base.errors import AnswerError
+from limitsets.systems.cells import CellSet, Domain
+from limitsets.systems.graph.target import Target, place
 from tests.maps_of_tests import Baker, Product, TwoState
 
 # The name of the module is hidden by that of its function.
-enclosed = importlib.import_module("limitsets.graph.images.enclosed")
+enclosed = importlib.import_module("limitsets.systems.graph.images.enclosed")
 
 
 # ---------------------------------------------------------------- maps of one's own

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.cells import CellSet
+from limitsets.systems.cells import CellSet
 from tests.maps_of_tests import Linear2, Product, ThreeState, TwoState
 
 # Leslie's map on dyadic cells, corners + one cell: cells, edges, recurrent components (cells) from the top of the
@@ -122,7 +122,7 @@ def test_the_cubic_map_has_two_attractors_and_an_edge_state():
 
 def test_spurious_recurrent_cells_are_told_from_dynamics():
     """Logistic r = 1.4: orbits run from 0 to 2/7; whatever else recurs is an artefact of the padding."""
-    from limitsets.sets import spurious
+    from limitsets.systems.sets import spurious
 
     graph = ls.transitions(ls.maps.Logistic(1.4), ls.grid([(0, 1)], depth=10), method="corners-padded")
     false = spurious(graph)

@@ -11,11 +11,11 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 import limitsets as ls
-from limitsets.cells import Grid
-from limitsets.graph.components import descend, reach, strong_components
-from limitsets.graph.graph import TransitionGraph
-from limitsets.graph.ranges import build, count_edges, expand
-from limitsets.maps import UNDECIDED
+from limitsets.systems.cells import Grid
+from limitsets.systems.graph.components import descend, reach, strong_components
+from limitsets.systems.graph.graph import TransitionGraph
+from limitsets.systems.graph.ranges import build, count_edges, expand
+from limitsets.systems.maps import UNDECIDED
 
 
 @st.composite

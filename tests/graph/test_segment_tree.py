@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import limitsets as ls
-from limitsets.graph import components as walk
-from limitsets.graph import condensation as surveys
-from limitsets.graph import segment_tree
-from limitsets.graph.ranges import RUN, START, build
+from limitsets.systems.graph import components as surveys
+from limitsets.systems.graph import components as walk
+from limitsets.systems.graph import segment_tree
+from limitsets.systems.graph.ranges import RUN, START, build
 
 
 @st.composite

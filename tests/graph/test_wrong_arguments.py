@@ -8,11 +8,11 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.errors import AnswerError, GridError, LimitsetsError, MapError, SceneError
-from limitsets.graph import memory
-from limitsets.proofs.certify import certify_scene
-from limitsets.proofs.of_map import certify_map
-from limitsets.regions import evenly
+from limitsets.base.errors import AnswerError, GridError, LimitsetsError, MapError, SceneError
+from limitsets.parameters.regions import evenly
+from limitsets.proofs.prover.certifying import certify_scene
+from limitsets.proofs.prover.of_map import certify_map
+from limitsets.systems.graph import building as memory
 from tests.maps_of_tests import Contraction
 from tests.sweep.tasks_of_tests import of_map
 

@@ -16,8 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from limitsets import interval
-from limitsets.interval import logarithm
-from limitsets.jit import proof_kernel, take_mark
+from limitsets.numbers.interval import exponential as logarithm
+from limitsets.numbers.jit import proof_kernel, take_mark
 from tests.interval.exact import root_bounds
 
 INF, NAN = math.inf, math.nan

@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from limitsets import interval
-from limitsets.interval import exponential as e
-from limitsets.jit import proof_kernel
+from limitsets.numbers.interval import exponential as e
+from limitsets.numbers.jit import proof_kernel
 from tests.interval.exact import arb
 
 U = Fraction(1, 2**52)

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from limitsets import interval
-from limitsets.interval import elementary
+from limitsets.numbers.interval import elementary
 
 FILE = Path(__file__).resolve().parents[3] / "shared" / "data" / "itf1788.json"
 OURS = {

@@ -6,9 +6,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-import limitsets.interval as iv
-from limitsets.interval import Interval
-from limitsets.interval.number import (
+import limitsets.numbers.interval as iv
+from limitsets.numbers.interval import Interval
+from limitsets.numbers.interval.number import (
     larger,
     signed_square,
     smaller,
@@ -16,7 +16,7 @@ from limitsets.interval.number import (
     where_positive,
     with_sign_of,
 )
-from limitsets.jit import formula, proof_kernel
+from limitsets.numbers.jit import formula, proof_kernel
 
 ENDS = (-3.0, -1.1, -(2.0**-30), 0.0, 0.3, 1.0, 2.7)
 SOME = [Interval(lo, hi) for lo in ENDS for hi in ENDS if lo <= hi]

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from limitsets import interval
-from limitsets.jit import proof_kernel
+from limitsets.numbers.jit import proof_kernel
 from tests.interval.exact import arb, root_bounds
 
 SMALL = 2.0**-1074

@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import flint
 
-from limitsets.interval import elementary as e
+from limitsets.numbers.interval import elementary as e
 
 U = Fraction(1, 2**53)
 

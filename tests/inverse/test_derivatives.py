@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError, SceneError
-from limitsets.inverse import critical_jacobian
-from limitsets.thrower import impact_angles
+from limitsets.base.errors import AnswerError, SceneError
+from limitsets.feeder.thrower import impact_angles
+from limitsets.parameters.design import critical_jacobian
 
 
 def load_exact():

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError, LimitsetsError, SceneError
-from limitsets.inverse import critical_jacobian, limit_sets_along
-from limitsets.inverse.critical import trials
+from limitsets.base.errors import AnswerError, LimitsetsError, SceneError
+from limitsets.parameters.design import critical_jacobian, limit_sets_along
+from limitsets.parameters.design import solving as trials
 
 PLACE = Path(__file__).with_name("exact.py")
 spec = importlib.util.spec_from_file_location("exact_critical_points_of_designs", PLACE)

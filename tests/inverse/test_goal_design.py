@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.inverse import robust_design
-from limitsets.inverse.margin.bounds import bounds_of
-from limitsets.inverse.margin.for_goal import design_for_goal
-from limitsets.inverse.margin.for_margin import orders_of, tolerance_of
-from limitsets.maps import advance
-from limitsets.robust.margins.vector import Tolerance
-from limitsets.scene.spelling import unit_of
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.scene.scene import unit_of
+from limitsets.parameters.design import robust_design
+from limitsets.parameters.design.for_goal import design_for_goal
+from limitsets.parameters.design.for_margin import orders_of, tolerance_of
+from limitsets.parameters.design.search import bounds_of
+from limitsets.parameters.margins.deviations import Tolerance
+from limitsets.systems.maps import advance
 from tests.lead_quad import LEAD_QUAD
 from tests.lead_triangle import LEAD_TRIANGLE, left_by_some
 

@@ -8,18 +8,20 @@ import pytest
 from mpmath import mp
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.inverse import robust_design
-from limitsets.inverse.margin.bounds import bounds_of
-from limitsets.inverse.margin.counterweight import counterweight_for, counterweight_of
-from limitsets.inverse.margin.front import unbeaten
-from limitsets.inverse.margin.model_validity import validity_slack
-from limitsets.inverse.margin.polishing import polished
-from limitsets.inverse.margin.search import DesignSearch
-from limitsets.maps import advance
-from limitsets.robust.margins.estimate import estimated, failing
-from limitsets.robust.margins.invariant_set import invariant_intervals
-from limitsets.robust.margins.vector import Tolerance
+from limitsets.base.errors import LimitsetsError
+from limitsets.parameters.design import robust_design
+from limitsets.parameters.design.design_result import unbeaten
+from limitsets.parameters.design.for_margin import polished
+from limitsets.parameters.design.search import (
+    DesignSearch,
+    bounds_of,
+    counterweight_for,
+    counterweight_of,
+    validity_slack,
+)
+from limitsets.parameters.margins.deviations import Tolerance
+from limitsets.parameters.margins.estimate import estimated, failing, invariant_intervals
+from limitsets.systems.maps import advance
 from tests.studies.test_studies import load_study
 from tests.thrower import reference
 

@@ -10,10 +10,10 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.graph.images.hulls import BoxImages
-from limitsets.jit import proof_kernel
-from limitsets.maps.kernels import image_box, pick
-from limitsets.maps.textbook.domains import DOMAINS as PUBLIC
+from limitsets.numbers.jit import proof_kernel
+from limitsets.systems.graph.images.enclosed import BoxImages
+from limitsets.systems.maps.kernels import image_box, pick
+from limitsets.systems.maps.textbook.shared import DOMAINS as PUBLIC
 from tests.interval.exact import arb
 from tests.maps_of_tests import DOMAINS as OWN
 from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState

@@ -9,8 +9,8 @@ import pytest
 
 import limitsets as ls
 from limitsets import interval as iv
-from limitsets.errors import AnswerError, LimitsetsError, MapError
-from limitsets.graph import memory
+from limitsets.base.errors import AnswerError, LimitsetsError, MapError
+from limitsets.systems.graph import building as memory
 
 
 class Base(NamedTuple):

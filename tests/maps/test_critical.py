@@ -9,11 +9,11 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.cells import Domain, as_domain
-from limitsets.errors import AnswerError
-from limitsets.maps import along, critical_points, monotone_pieces, turning_points
-from limitsets.maps.critical import margins
-from limitsets.thrower import Energy, Exact, Signed, SmallAngle, throw_map
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.thrower import Energy, Exact, Signed, SmallAngle, throw_map
+from limitsets.systems.cells import Domain, as_domain
+from limitsets.systems.maps import along, critical_points, monotone_pieces, turning_points
+from limitsets.systems.maps.critical import margins
 from tests.maps_of_tests import ThreeState
 
 CRITERIA = [(SmallAngle, Energy), (SmallAngle, Signed), (Exact, Energy), (Exact, Signed)]

@@ -9,10 +9,9 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.errors import MapError
-from limitsets.graph.images.enclosed import enclosures
-from limitsets.graph.images.hulls import BoxImages
-from limitsets.maps.derived import MAYBE, NEVER, SURE, branch_boxes
+from limitsets.base.errors import MapError
+from limitsets.systems.graph.images.enclosed import BoxImages, enclosures
+from limitsets.systems.maps.derived import MAYBE, NEVER, SURE, branch_boxes
 from tests.maps_of_tests import Tent
 
 

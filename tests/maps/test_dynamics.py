@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from limitsets import maps
-from limitsets.errors import MapError
-from limitsets.maps.lyapunov import CHUNK, orbit_with_exponent
+from limitsets.base.errors import MapError
+from limitsets.systems.maps.drivers import CHUNK, orbit_with_exponent
 from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError, MapError
+from limitsets.base.errors import AnswerError, MapError
 
 
 class Arrayed(NamedTuple):

@@ -7,9 +7,9 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.cells import Domain
-from limitsets.errors import AnswerError, MapError
-from limitsets.maps.critical import margins
+from limitsets.base.errors import AnswerError, MapError
+from limitsets.systems.cells import Domain
+from limitsets.systems.maps.critical import margins
 
 
 @pytest.mark.parametrize("side", [-1, 3, 7, 2**31])

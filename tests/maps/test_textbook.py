@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from limitsets import maps
-from limitsets.errors import LimitsetsError
-from limitsets.jit import kernel
-from limitsets.maps import kernels
-from limitsets.maps.textbook.domains import DOMAINS as PUBLIC
-from limitsets.maps.textbook.exponential import exponential
+from limitsets.base.errors import LimitsetsError
+from limitsets.numbers.jit import kernel
+from limitsets.systems.maps import kernels
+from limitsets.systems.maps.textbook.shared import DOMAINS as PUBLIC
+from limitsets.systems.maps.textbook.shared import exponential
 from tests.maps_of_tests import DOMAINS, Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0

@@ -14,8 +14,8 @@ from zipfile import ZipFile
 import numpy as np
 
 import limitsets as ls
-from limitsets.files import as_json
-from limitsets.maps import advance
+from limitsets.base.files import as_json
+from limitsets.systems.maps import advance
 from tests.doors.asking import command
 from tests.doors.scenes import scenes
 from tests.lead_quad import LEAD_QUAD
@@ -130,7 +130,7 @@ def of_scenes(folder: Path) -> Iterator[tuple[str, Any]]:
 def of_others(folder: Path) -> Iterator[tuple[str, Any]]:
     """Ask what takes a film, a cavity or two parts."""
     folder.mkdir(parents=True)
-    from limitsets.fitting import simulated_throws
+    from limitsets.parameters.fitting import simulated_throws
 
     truth = ls.load("paper-designed")
     film = simulated_throws(truth, np.linspace(8, 23, 48), [0, 1, 2] * 16, error=0.02, speed=0.002)

@@ -11,7 +11,7 @@ import pytest
 import typer.main
 
 import limitsets as ls
-from limitsets.cli.app import app
+from limitsets.face.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -7,7 +7,7 @@ from pkgutil import iter_modules
 import typer.main
 
 import limitsets
-from limitsets.cli.app import app
+from limitsets.face.cli.app import app
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 INNER = {"arguments", "__main__", "cli", "files", "progress", "proposals", "tables"}  # no public names

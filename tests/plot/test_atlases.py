@@ -9,10 +9,9 @@ from matplotlib.colors import to_rgb
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.errors import AnswerError
-from limitsets.plot.atlas_frame import UNREACHED
-from limitsets.plot.atlas_maps import COLLAPSE_HATCH, DOUBT_HATCH, LEAVE_HATCH, look_of
-from limitsets.sweep.classes import UNDECIDED, legend
+from limitsets.base.errors import AnswerError
+from limitsets.face.plot.atlas_maps import COLLAPSE_HATCH, DOUBT_HATCH, LEAVE_HATCH, UNREACHED, look_of
+from limitsets.parameters.atlas.classes import UNDECIDED, legend
 
 X, Y = "throw.speed=130:180:24", "arm.surface_height=-1:0.2:16"
 
@@ -262,7 +261,9 @@ def test_what_is_no_surface(feeders, variable, side, words):
 
 def test_an_atlas_without_classes():
     found = ls.atlas(
-        "paper-designed", "throw.kappa=25.3778518:26:2", task="limitsets.sweep.examples:critical_points"
+        "paper-designed",
+        "throw.kappa=25.3778518:26:2",
+        task="limitsets.parameters.atlas.examples:critical_points",
     )
     with pytest.raises(AnswerError, match=r"one with the variable class, .* with ls\.plot\.atlas_surface"):
         ls.plot.atlas(found)

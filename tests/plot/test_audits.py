@@ -6,7 +6,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import limitsets as ls
-from limitsets.report.writing import FIGURES, figure
+from limitsets.face.report.writing import FIGURES, figure
 
 
 @lru_cache(maxsize=2)

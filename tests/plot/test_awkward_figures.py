@@ -9,8 +9,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.report.writing import figure
+from limitsets.base.errors import AnswerError
+from limitsets.face.report.writing import figure
 from tests.maps_of_tests import TwoState
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.goals import FlipOrder, OrientedBeyond, Reaches
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.goals import FlipOrder, OrientedBeyond, Reaches
 
 ORBIT = [{"x": 15.0, "side": 2}, {"x": 18.0, "side": 2}, {"x": 23.5, "side": 2}, {"x": 20.25, "side": 0}]
 

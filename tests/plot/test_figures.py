@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 
 import limitsets as ls
 from limitsets import plot
-from limitsets.errors import AnswerError, MapError
-from limitsets.plot.style import SETS, extents_of, keep_apart, stretch
-from limitsets.thrower import fly
+from limitsets.base.errors import AnswerError, MapError
+from limitsets.face.plot.style import SETS, extents_of, keep_apart, stretch
+from limitsets.feeder.thrower import fly
 from tests.maps_of_tests import TwoState, with_middles
 
 SCENES = Path(__file__).parents[1] / "analysis"
@@ -197,7 +197,7 @@ def test_basins_in_the_plane():
 
 
 def test_basins_in_space_are_refused():
-    from limitsets.sets import Basins
+    from limitsets.systems.sets import Basins
 
     grid = ls.grid([(0, 1)] * 3, cells=2)
     with pytest.raises(AnswerError):
@@ -205,7 +205,7 @@ def test_basins_in_space_are_refused():
 
 
 def test_sets_differ_in_grey():
-    from limitsets.plot.basin import ATTRACTORS, HATCHES
+    from limitsets.face.plot.basin import ATTRACTORS, HATCHES
 
     grey = [luminance(colour) for colour in ATTRACTORS]
     assert min(abs(a - b) for a, b in itertools.combinations(grey, 2)) > 0.05

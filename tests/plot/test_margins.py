@@ -5,10 +5,10 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.goals import OrientedBeyond
-from limitsets.robust.margins.beyond import margins_beyond
-from limitsets.robust.margins.joint import joint_margin
+from limitsets.base.errors import LimitsetsError
+from limitsets.feeder.goals import OrientedBeyond
+from limitsets.parameters.margins.joint import joint_margin
+from limitsets.parameters.margins.single import margins_beyond
 
 
 def named(axes, gid):

@@ -5,10 +5,9 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import limitsets as ls
-from limitsets.robust import Gaussian, Scattering, noise_statistics
-from limitsets.robust.noise.chain_solution import starts_from
-from limitsets.robust.noise.sampling import throw_many
-from limitsets.robust.noise.statistics import Levels
+from limitsets.feeder.scattering import Gaussian, Scattering, starts_from
+from limitsets.parameters.noise.sampling import throw_many
+from limitsets.parameters.noise.statistics import Levels, noise_statistics
 
 NOISE = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
 GOAL = (20.5, 2)

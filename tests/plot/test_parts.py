@@ -9,10 +9,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 import limitsets as ls
-from limitsets.plot.parts import refused_part
-from limitsets.report.audit_pages import write_audit
-from limitsets.report.writing import write
-from limitsets.scene.sketch import sketch
+from limitsets.face.plot.parts import refused_part
+from limitsets.face.report.writing import write, write_audit
+from limitsets.feeder.scene.reading import sketch
 from tests.cli.command import run
 from tests.lead_quad import LEAD_QUAD
 

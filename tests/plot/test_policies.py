@@ -6,7 +6,7 @@ import pytest
 from matplotlib.patches import Rectangle
 
 import limitsets as ls
-from limitsets.errors import AnswerError
+from limitsets.base.errors import AnswerError
 from tests.policies.test_feedback import with_throws
 
 

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.policies import broken, places
-from limitsets.policies.beliefs import cells_of
-from limitsets.policies.enclosed_starts import not_within
-from limitsets.policies.simulation import simulate
-from limitsets.scene.sensing import BeyondSensor, SideSensor
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
+from limitsets.proofs.policies import broken, places
+from limitsets.proofs.policies.game import cells_of
+from limitsets.proofs.policies.simulation import not_within, simulate
 from tests.policies.recursion import as_number, least
 
 

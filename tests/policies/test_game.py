@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.cells import Grid
-from limitsets.errors import AnswerError
-from limitsets.policies import beliefs, broken, game_of, image_of, search
+from limitsets.base.errors import AnswerError
+from limitsets.proofs.policies import broken, game_of, image_of, search
+from limitsets.proofs.policies import game as beliefs
+from limitsets.systems.cells import Grid
 from tests.maps_of_tests import Contraction
 from tests.policies.recursion import as_number, least
 

@@ -14,15 +14,21 @@ import pytest
 from mpmath import mp, mpf
 
 import limitsets as ls
-from limitsets.maps import images, images_on
-from limitsets.proofs import two_throws
-from limitsets.proofs.by_angle import FLIP, JOG, Formulas, OneSide, ThrowNumbers, angle, variable
-from limitsets.proofs.intervals import Intervals
-from limitsets.proofs.mean_value import root
-from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.rational import RationalInterval
-from limitsets.proofs.two_throws import TwoThrows
-from limitsets.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2, fly, impact_angles
+from limitsets.feeder.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2, fly, impact_angles
+from limitsets.proofs.prover import two_throws
+from limitsets.proofs.prover.numbers import Intervals, RationalInterval, root
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.proofs.prover.two_throws import (
+    FLIP,
+    JOG,
+    Formulas,
+    OneSide,
+    ThrowNumbers,
+    TwoThrows,
+    angle,
+    variable,
+)
+from limitsets.systems.maps import images, images_on
 from tests.thrower import reference
 
 # ------------------------------------------------------------------------------------------------- the intervals

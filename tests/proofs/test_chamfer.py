@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.maps.drivers import advance
-from limitsets.proofs.parameters import parameter_box
+from limitsets.base.errors import AnswerError
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.maps.drivers import advance
 from tests.scene.test_chamfer import BOTH, CHAMFER, chamfered
 
 

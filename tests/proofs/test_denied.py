@@ -9,9 +9,9 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
-from limitsets.proofs import certificate
-from limitsets.proofs.confirm import DeniedError
-from limitsets.robust.margins.margin_result import settled
+from limitsets.parameters.margins.margin_result import settled
+from limitsets.proofs.prover import certificate
+from limitsets.proofs.prover.certificate import DeniedError
 from tests.cli.command import run
 
 

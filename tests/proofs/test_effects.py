@@ -14,12 +14,12 @@ from mpmath import mp
 from typer.testing import CliRunner
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.maps import images
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.cover import cover
-from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.rational import RationalInterval, angle
+from limitsets.base.errors import AnswerError
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.numbers import RationalInterval, angle
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.maps import images
 
 BOTH = {"landing": True, "roll": True}
 SCATTER = {"speed": "0.3 %", "landing": "0.02 in"}
@@ -180,7 +180,7 @@ def test_the_angle_of_a_box_of_vectors_holds_that_of_every_vector():
 
 
 def test_the_command_tells_the_proof_and_writes_no_certificate(tmp_path):
-    from limitsets.cli.app import app
+    from limitsets.face.cli.app import app
 
     file, out = tmp_path / "rolls.toml", tmp_path / "rolls.proof.zip"
     ls.scene.dump(scene("paper-designed", BOTH), file)

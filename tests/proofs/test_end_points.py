@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.certify import certify
-from limitsets.proofs.cover import cover
-from limitsets.proofs.end_points import proved_ends
-from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.proved_pieces import UnionImages, proved_pieces_of
-from limitsets.proofs.trapping import trapping
+from limitsets.base.errors import AnswerError
+from limitsets.proofs.prover.attraction import attraction, trapping
+from limitsets.proofs.prover.certifying import certify
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.end_points import UnionImages, proved_ends, proved_pieces_of
+from limitsets.proofs.prover.parameters import parameter_box
 from tests.sets.part import Part
 from tests.test_paper import LIMIT_SETS
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.maps import images
-from limitsets.proofs.fixed_point import fixed_points, leaves
-from limitsets.proofs.parameters import parameter_box
+from limitsets.base.errors import LimitsetsError
+from limitsets.proofs.prover.cover import fixed_points, leaves
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.maps import images
 
 mpmath = pytest.importorskip("mpmath")
 mp, mpf = mpmath.mp, mpmath.mpf

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.proofs.goals import sentence
+from limitsets.proofs.prover.goals import sentence
 from tests.proofs import forge
 from tests.test_paper import LIMIT_SETS
 from tests.thrower import reference

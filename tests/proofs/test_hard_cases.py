@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import GeometryError
-from limitsets.graph.images.enclosed import enclosures
-from limitsets.proofs.parameters import parameter_box
+from limitsets.base.errors import GeometryError
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.graph.images.enclosed import enclosures
 from tests.sets.part import Part, mp
 
 # ---------------------------------------------------------------- an end of the limit set on a critical point

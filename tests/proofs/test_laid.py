@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.goals import OrientedBeyond, Reaches, StaysOnArm
-from limitsets.maps import advance
-from limitsets.proofs.query import Query
-from limitsets.scene.laid import laid_goal, read_laid
+from limitsets.base.errors import LimitsetsError
+from limitsets.feeder.goals import OrientedBeyond, Reaches, StaysOnArm
+from limitsets.feeder.scene.laid import laid_goal, read_laid
+from limitsets.proofs.prover.query import Query
+from limitsets.systems.maps import advance
 
 GOOD = {0: [(11, 14)], 2: [(5.0, 17.0)]}
 PARTLY = {0: [(6, 12)]}

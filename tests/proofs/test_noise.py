@@ -13,13 +13,13 @@ import pytest
 from mpmath import mp, mpf
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.maps import images
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.certificate import arrays_of
-from limitsets.proofs.cover import cover
-from limitsets.proofs.parameters import parameter_box
-from limitsets.scene.units import parse
+from limitsets.base.errors import LimitsetsError
+from limitsets.feeder.scene.units import parse
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.certificate import arrays_of
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.maps import images
 from tests.proofs import forge
 from tests.thrower import reference
 

@@ -10,9 +10,9 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.errors import AnswerError
-from limitsets.proofs.of_map import MOST_WORDS, _prove
-from limitsets.sets import Cycle, cycles
+from limitsets.base.errors import AnswerError
+from limitsets.proofs.prover.of_map import MOST_WORDS, _prove
+from limitsets.systems.sets import Cycle, cycles
 from tests.maps_of_tests import Tent
 
 CLAIMS = ["invariant", "trapping", "attracts-all", "expanding", "cycles"]

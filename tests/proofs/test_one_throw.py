@@ -8,9 +8,8 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
-from limitsets.maps import advance
-from limitsets.robust import Scattering, Uniform
-from limitsets.robust.noise.scattering import thrown
+from limitsets.feeder.scattering import Scattering, Uniform, thrown
+from limitsets.systems.maps import advance
 from tests.one_throw import mean_after
 from tests.proofs.test_probabilities import certificate, mesh
 from tests.proofs.test_recheck import checker

@@ -10,13 +10,13 @@ import pytest
 from scipy.optimize import brentq
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.certify import certify
-from limitsets.proofs.cover import cover
-from limitsets.proofs.orbits import follow, proved_cycle, proved_cycles
-from limitsets.proofs.parameters import parameter_box
-from limitsets.sets import cycles_of
+from limitsets.base.errors import AnswerError
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.certifying import certify
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.orbits import follow, proved_cycle, proved_cycles
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.sets import cycles_of
 from tests.proofs.test_end_points import CONTRACTING, NAMES, cells_of
 from tests.sets.part import Part
 

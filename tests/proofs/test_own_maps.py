@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError, MapError
-from limitsets.files import as_json, as_plain
-from limitsets.interval import mul
+from limitsets.base.errors import AnswerError, MapError
+from limitsets.base.files import as_json, as_plain
+from limitsets.numbers.interval import mul
 from tests.maps_of_tests import Tent
 
 

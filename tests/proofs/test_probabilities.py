@@ -14,9 +14,10 @@ import flint
 from scipy import stats
 
 import limitsets as ls
-from limitsets.proofs.confirm import DeniedError
-from limitsets.robust import Gaussian, Scattering, Uniform, absorption_brackets
-from limitsets.robust.noise.sampling import ManyParts, scattering_map
+from limitsets.feeder.scattering import Gaussian, Scattering, Uniform
+from limitsets.parameters.noise.sampling import ManyParts, scattering_map
+from limitsets.proofs.chances.absorption import absorption_brackets
+from limitsets.proofs.prover.certificate import DeniedError
 from tests.closed_forms import ladder
 from tests.proofs import forge
 from tests.proofs.test_recheck import checker, verdict

@@ -21,8 +21,8 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from flint import arb
 
-from limitsets.scene.quantities import base_unit
-from limitsets.scene.units import UNITS, convert, parse, spelled_plainly
+from limitsets.feeder.scene.quantities import base_unit
+from limitsets.feeder.scene.units import UNITS, convert, parse, spelled_plainly
 from tests.proofs import forge
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,7 +17,7 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 from flint import arb
 
 import limitsets as ls
-from limitsets.proofs.certify import certify
+from limitsets.proofs.prover.certifying import certify
 from tests.proofs import forge
 from tests.proofs.random_scenes import case
 from tests.proofs.test_end_points import CONTRACTING

@@ -19,8 +19,8 @@ from flint import arb
 from mpmath import mp, mpf
 
 import limitsets as ls
-from limitsets.maps import images
-from limitsets.thrower import impact_angles
+from limitsets.feeder.thrower import impact_angles
+from limitsets.systems.maps import images
 from tests.proofs import forge
 from tests.proofs.test_by_angle import DESIGNED, MODELS, WIDTHS, an_open_box, boxed, by_hand, feet, written
 from tests.proofs.test_recheck import checker, verdict

@@ -15,11 +15,11 @@ import pytest
 from mpmath import mp, mpf
 
 import limitsets as ls
-from limitsets.maps import images
-from limitsets.proofs.goals.recurrent_orbits import closed
-from limitsets.proofs.goals.violating_orbits import Path, ThrowChoice
-from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.refutation import write_refutation
+from limitsets.proofs.prover.goals.recurrent_orbits import closed
+from limitsets.proofs.prover.goals.violating_orbits import Path, ThrowChoice
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.proofs.prover.proof import write_refutation
+from limitsets.systems.maps import images
 from tests.attack import facts
 from tests.attack.throws import Orbits
 from tests.thrower import reference

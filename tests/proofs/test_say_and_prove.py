@@ -14,12 +14,12 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
-from limitsets.proofs.attraction import attraction, near_section
-from limitsets.proofs.certificate import write
-from limitsets.proofs.cover import cover
-from limitsets.proofs.goals.kind import throws_to_reach
-from limitsets.proofs.goals.reaches import _wanted
-from limitsets.proofs.parameters import parameter_box
+from limitsets.proofs.prover.attraction import attraction, near_section
+from limitsets.proofs.prover.certificate import write
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.goals.kind import throws_to_reach
+from limitsets.proofs.prover.goals.reaches import _wanted
+from limitsets.proofs.prover.parameters import parameter_box
 from tests.proofs import forge
 from tests.proofs.test_recheck import COARSE, checker, parts, verdict, whole
 from tests.scene.four_gon import FOUR_GON

@@ -11,16 +11,16 @@ import pytest
 from scipy.optimize import brentq
 
 import limitsets as ls
-from limitsets.cells import Domain, grid
-from limitsets.graph.images.enclosed import enclosures
-from limitsets.proofs import cover as covers
-from limitsets.proofs import goals
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.cover import Cover, cover
-from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.perron_frobenius import perron_frobenius_bound
-from limitsets.proofs.proof import Claim
-from limitsets.proofs.weakest_claim import weakest_of
+from limitsets.proofs.prover import cover as covers
+from limitsets.proofs.prover import goals
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.cover import Cover, cover
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.proofs.prover.proof import Claim
+from limitsets.proofs.prover.query import weakest_of
+from limitsets.proofs.prover.thinning import perron_frobenius_bound
+from limitsets.systems.cells import Domain, grid
+from limitsets.systems.graph.images.enclosed import enclosures
 from tests.scene.four_gon import FOUR_GON
 
 

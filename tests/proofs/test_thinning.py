@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.cells import CellSet
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.cover import cover, targets
-from limitsets.proofs.expansion import slopes
-from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.perron_frobenius import _Largest, _stretches, perron_frobenius_bound
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.cover import cover, targets
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.proofs.prover.thinning import _Largest, _stretches, perron_frobenius_bound, slopes
+from limitsets.systems.cells import CellSet
 
 
 def by_definition(found, left, of, values):

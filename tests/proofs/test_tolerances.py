@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.proofs.parameters import parameter_box
+from limitsets.proofs.prover.parameters import parameter_box
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 

@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.maps import images
-from limitsets.proofs import two_throws
-from limitsets.proofs.attraction import attraction
-from limitsets.proofs.by_angle import FLIP, JOG
-from limitsets.proofs.cover import cover
-from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.two_throws import TwoThrows, kinds_of_two_throws, stays_below
-from limitsets.thrower import impact_angles
+from limitsets.feeder.thrower import impact_angles
+from limitsets.proofs.prover import two_throws
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.proofs.prover.two_throws import FLIP, JOG, TwoThrows, kinds_of_two_throws, stays_below
+from limitsets.systems.maps import images
 from tests.proofs.test_by_angle import DESIGNED, boxed, written
 
 SMALL = {

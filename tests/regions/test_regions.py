@@ -11,12 +11,11 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
+from limitsets.base.errors import AnswerError
 from limitsets.checker.end_points import Throws
 from limitsets.checker.region import decided_on
 from limitsets.checker.scene import read_scene
-from limitsets.errors import AnswerError
-from limitsets.maps import images, orbit
-from limitsets.regions import (
+from limitsets.parameters.regions import (
     Block,
     CellAxis,
     Record,
@@ -27,8 +26,9 @@ from limitsets.regions import (
     largest_square,
     roomiest,
 )
-from limitsets.regions.gluing import regions
-from limitsets.regions.visits import Visit, visit
+from limitsets.parameters.regions.plane import regions
+from limitsets.parameters.regions.record import Visit, visit
+from limitsets.systems.maps import images, orbit
 from tests.proofs.forge import Forged
 
 X = 20.0

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from limitsets.files import as_json, as_table, replaced
+from limitsets.base.files import as_json, as_table, replaced
 
 
 @dataclass

@@ -7,8 +7,8 @@ from html.parser import HTMLParser
 import pytest
 
 import limitsets as ls
-from limitsets.report.html_pages import as_html
-from limitsets.report.writing import FIGURES, write
+from limitsets.face.report.pages import as_html
+from limitsets.face.report.writing import FIGURES, write
 from tests.browsers import browser
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}

@@ -6,8 +6,8 @@ import re
 import pytest
 
 import limitsets as ls
-from limitsets.files import as_json
-from limitsets.robust import Gaussian, Scattering
+from limitsets.base.files import as_json
+from limitsets.feeder.scattering import Gaussian, Scattering
 from tests.assembly.pairs import both_own
 from tests.cli.command import run
 from tests.feeding.scenes import with_cavity

@@ -10,15 +10,12 @@ import pytest
 from jinja2 import UndefinedError
 
 import limitsets as ls
-from limitsets.analysis import GoalOutcome
-from limitsets.errors import AnswerError, LimitsetsError
-from limitsets.goals import OrientedBeyond
-from limitsets.report.audit_pages import audit_page
-from limitsets.report.goals import starts_words, verdict_of, void_of
-from limitsets.report.pages import page, words
-from limitsets.report.tables import bands
-from limitsets.report.writing import write
-from limitsets.report.writing import write as write_report
+from limitsets.base.errors import AnswerError, LimitsetsError
+from limitsets.face.report.pages import bands, page, starts_words, verdict_of, void_of, words
+from limitsets.face.report.writing import audit_page, write
+from limitsets.face.report.writing import write as write_report
+from limitsets.feeder.goals import OrientedBeyond
+from limitsets.parameters.analysis import GoalOutcome
 from tests.lead_triangle import left_by_some
 
 SCENES = Path(__file__).parents[1] / "analysis"
@@ -265,7 +262,7 @@ def test_a_fault_while_drawing_leaves_the_old_files_whole(tmp_path, monkeypatch,
     def fails(*_, **__):
         raise fault
 
-    monkeypatch.setattr("limitsets.report.writing.basins", fails)
+    monkeypatch.setattr("limitsets.face.report.writing.basins", fails)
     with pytest.raises(fault):
         write(analysed("paper-designed"), tmp_path)
     assert bytes_of(tmp_path) == before

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.resilience import uncertainty
+from limitsets.systems.resilience import uncertainty
 from tests.maps_of_tests import Contraction, ThreeState, TwoState
 from tests.resilience.maps_with_basins import Gaps, Sheet, Turnstile, Wall
 from tests.resilience.test_shares import CUBIC, TWO_SIDES, setting

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
+from limitsets.base.errors import AnswerError
 from tests.resilience.maps_with_basins import Excursion, Gaps, Grebogi, Ikeda, Waves
 from tests.resilience.test_shares import CUBIC, LN2, setting
 

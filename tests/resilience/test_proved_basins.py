@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.cells import CellSet
-from limitsets.maps import images
-from limitsets.sets.passing import longest_stays, passing
+from limitsets.systems.cells import CellSet
+from limitsets.systems.maps import images
+from limitsets.systems.sets.basin import longest_stays, passing
 from tests.maps_of_tests import Contraction, Product, TwoState
 from tests.resilience.test_shares import setting
 

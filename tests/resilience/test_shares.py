@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.cells import Domain
-from limitsets.errors import AnswerError
-from limitsets.resilience import boxes
+from limitsets.base.errors import AnswerError
+from limitsets.systems.cells import Domain
+from limitsets.systems.resilience import mixing as boxes
 from tests.maps_of_tests import Tent, ThreeState
 from tests.resilience.maps_with_basins import Gaps, Stripes, Turnstile, Wall
 

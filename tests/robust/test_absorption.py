@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import GridError
-from limitsets.robust import Samples, absorption, classes, transfer
-from limitsets.robust.noise.arrivals import feeding, random_starts, with_border
+from limitsets.base.errors import GridError
+from limitsets.feeder.scattering import Samples
+from limitsets.parameters.noise.absorbing import absorption, classes, feeding, random_starts, with_border
+from limitsets.parameters.noise.ulam import transfer
 
 
 class Still(NamedTuple):

@@ -9,18 +9,16 @@ import pytest
 from scipy import stats
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.maps import advance
-from limitsets.proofs.parameters import parameter_box
-from limitsets.robust import Gaussian, Given, Scattering, Uniform, absorption_brackets
-from limitsets.robust.brackets.averages import mean_matrix, rounding_of
-from limitsets.robust.brackets.chain import chain_of
-from limitsets.robust.brackets.densities import staircase
-from limitsets.robust.brackets.moments import ERROR, moments
-from limitsets.robust.brackets.nodes import Nodes
-from limitsets.robust.brackets.spans import running
-from limitsets.robust.noise.chain_solution import starts_from
-from limitsets.robust.noise.sampling import throw_many
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.scattering import Gaussian, Given, Scattering, Uniform, starts_from
+from limitsets.parameters.noise.sampling import throw_many
+from limitsets.proofs.chances.absorption import absorption_brackets
+from limitsets.proofs.chances.averages import Nodes, mean_matrix, rounding_of, running
+from limitsets.proofs.chances.chain import chain_of
+from limitsets.proofs.chances.deficits import staircase
+from limitsets.proofs.chances.landings import ERROR, moments
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.maps import advance
 from tests.closed_forms import ladder
 from tests.one_throw import mean_after
 

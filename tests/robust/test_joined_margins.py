@@ -9,16 +9,16 @@ from fractions import Fraction
 import pytest
 
 import limitsets as ls
-from limitsets.cli.run import main
-from limitsets.proofs.certify import certify
-from limitsets.proofs.query import Query
-from limitsets.report.robust_pages import robustness_page
-from limitsets.robust.margins import brackets, finding
-from limitsets.robust.margins.deviations import deviation_scale
-from limitsets.robust.margins.sensitivity import sensitivity_of
-from limitsets.robust.margins.vector import Tolerance
-from limitsets.robust.sheet import sheet_run
-from limitsets.robust.sheet.entries import Entry
+from limitsets.face.cli.app import main
+from limitsets.face.report.robust_pages import robustness_page
+from limitsets.parameters.margins import brackets
+from limitsets.parameters.margins import single as finding
+from limitsets.parameters.margins.deviations import Tolerance, deviation_scale
+from limitsets.parameters.margins.joint import sensitivity_of
+from limitsets.parameters.sheet import sheet_run
+from limitsets.parameters.sheet.entries import Entry
+from limitsets.proofs.prover.certifying import certify
+from limitsets.proofs.prover.query import Query
 from tests.plates import plate
 
 ALL_BUT_MARGINS = ["joint", "curve", "noise", "audit"]

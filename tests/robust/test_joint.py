@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.goals import OrientedBeyond, Reaches
-from limitsets.robust.margins.joint import joint_margin
+from limitsets.base.errors import LimitsetsError
+from limitsets.feeder.goals import OrientedBeyond, Reaches
+from limitsets.parameters.margins.joint import joint_margin
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 

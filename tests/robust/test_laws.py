@@ -6,11 +6,20 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from limitsets.errors import MapError, SceneError
-from limitsets.robust import Gaussian, Given, Samples, Scattering, Uniform
-from limitsets.robust.noise.laws import Law, regrouped, transformed
-from limitsets.robust.noise.scattering import kappa_strata, scattering_of
-from limitsets.scene import load
+from limitsets.base.errors import MapError, SceneError
+from limitsets.feeder.scattering import (
+    Gaussian,
+    Given,
+    Law,
+    Samples,
+    Scattering,
+    Uniform,
+    kappa_strata,
+    regrouped,
+    scattering_of,
+    transformed,
+)
+from limitsets.feeder.scene import load
 
 
 def moments(strata):

@@ -14,12 +14,12 @@ import pytest
 from mpmath import mp, mpf
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.goals import AttractsAll, OrientedBeyond, Predicate, Reaches
-from limitsets.proofs import Proof
-from limitsets.proofs.goals import reaches
-from limitsets.proofs.query import Query
-from limitsets.robust.margins.deviations import deviation_scale, deviation_scales, given
+from limitsets.base.errors import LimitsetsError
+from limitsets.feeder.goals import AttractsAll, OrientedBeyond, Predicate, Reaches
+from limitsets.parameters.margins.deviations import deviation_scale, deviation_scales, given
+from limitsets.proofs.prover import Proof
+from limitsets.proofs.prover.goals import reaches
+from limitsets.proofs.prover.query import Query
 from tests.lead_triangle import left_by_some
 from tests.plates import plate
 from tests.thrower import reference

@@ -17,16 +17,16 @@ import pytest
 from mpmath import mpf
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.goals import OrientedBeyond
-from limitsets.plot import tolerance_box
-from limitsets.report.robust_pages import answer, robustness_page, tightest
-from limitsets.robust.margins.beyond import MarginsBeyond
-from limitsets.robust.margins.margin_texts import bound
-from limitsets.robust.sheet import margin_curve, sheet_run
-from limitsets.robust.sheet.checkpoint import Checkpoint
-from limitsets.robust.sheet.entries import Entry, in_unit_of, percent_of
-from limitsets.robust.sheet.noise_input import noise_of, scattering_from, still
+from limitsets.base.errors import LimitsetsError
+from limitsets.face.plot import tolerance_box
+from limitsets.face.report.robust_pages import answer, robustness_page, tightest
+from limitsets.feeder.goals import OrientedBeyond
+from limitsets.parameters.margins.margin_result import bound
+from limitsets.parameters.margins.single import MarginsBeyond
+from limitsets.parameters.sheet import sheet_run
+from limitsets.parameters.sheet import summary as margin_curve
+from limitsets.parameters.sheet.entries import Checkpoint, Entry, in_unit_of, percent_of
+from limitsets.parameters.sheet.summary import noise_of, scattering_from, still
 from tests.thrower import reference
 
 SHARP = 0.733

@@ -7,20 +7,13 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError, SceneError
-from limitsets.goals import OrientedBeyond
-from limitsets.robust import (
-    Gaussian,
-    Samples,
-    Scattering,
-    Uniform,
-    classes,
-    noise_levels,
-    noise_statistics,
-    transfer,
-)
-from limitsets.robust.noise.chain_solution import starts_from
-from limitsets.robust.noise.sampling import scattering_map, throw_many
+from limitsets.base.errors import AnswerError, SceneError
+from limitsets.feeder.goals import OrientedBeyond
+from limitsets.feeder.scattering import Gaussian, Samples, Scattering, Uniform, starts_from
+from limitsets.parameters.noise.absorbing import classes
+from limitsets.parameters.noise.sampling import scattering_map, throw_many
+from limitsets.parameters.noise.statistics import noise_levels, noise_statistics
+from limitsets.parameters.noise.ulam import transfer
 
 GOAL = (20.5, 2)
 
@@ -176,7 +169,7 @@ def test_scene_with_scatter_and_a_goal_needs_no_more():
 
 def test_maps_without_forced_branches_go_by_points():
     """The same throw as a map with (no) effects: points of cells instead of pieces."""
-    from limitsets.thrower.full import with_effects
+    from limitsets.feeder.thrower.full import with_effects
 
     scene = ls.load("paper-designed")
     cover = ls.grid(scene.domain, cells=400, grading="uniform")

@@ -7,11 +7,20 @@ import pytest
 from scipy import stats
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.robust import Gaussian, Samples, Scattering, Uniform, classes, transfer
-from limitsets.robust.noise.boxcars import BoxcarOperator, Boxcars, laid
-from limitsets.robust.noise.scattering import kappa_strata, still_map, thrown
-from limitsets.sets import invariant_measures
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.scattering import (
+    Gaussian,
+    Samples,
+    Scattering,
+    Uniform,
+    kappa_strata,
+    still_map,
+    thrown,
+)
+from limitsets.parameters.noise.absorbing import classes
+from limitsets.parameters.noise.cell_images import BoxcarOperator, Boxcars, laid
+from limitsets.parameters.noise.ulam import transfer
+from limitsets.systems.sets import invariant_measures
 from tests.maps_of_tests import Baker
 
 LINE = [(0.0, 1.0)]
@@ -222,7 +231,7 @@ def test_what_lands_beyond_may_be_brought_back():
 def test_implicit_and_written_out_give_the_same_classes(monkeypatch):
     cover = ls.grid(LINE, cells=200)
     written = classes(transfer(ls.maps.Logistic(3.6), cover, landing=Gaussian(0.01)))
-    monkeypatch.setattr("limitsets.robust.noise.ulam.WRITTEN_OUT", 0)
+    monkeypatch.setattr("limitsets.parameters.noise.ulam.WRITTEN_OUT", 0)
     chain = transfer(ls.maps.Logistic(3.6), cover, landing=Gaussian(0.01))
     assert not chain.written_out
     implicit = classes(chain)

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError
-from limitsets.inverse import robust_design
-from limitsets.robust.margins.deviations import deviation_scale
-from limitsets.robust.margins.vector import Tolerance, corners, worst_corner
+from limitsets.base.errors import LimitsetsError
+from limitsets.parameters.design import robust_design
+from limitsets.parameters.margins.deviations import Tolerance, corners, deviation_scale, worst_corner
 
 TEXTS = {
     "throw.speed": "1 %",

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from limitsets.scene import load
+from limitsets.feeder.scene import load
 
 _WHOLE = {
     "name": "whole",

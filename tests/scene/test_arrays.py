@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import SceneError
-from limitsets.scene import Scene
-from limitsets.scene.arrays import throw_stack
+from limitsets.base.errors import SceneError
+from limitsets.feeder.scene import Scene
+from limitsets.feeder.scene.arrays import throw_stack
 from tests.scene.four_gon import FOUR_GON
 
 FIELDS = ("kappa", "surface_height", "arm_length", "radius_of_gyration", "a", "d", "length", "corner")

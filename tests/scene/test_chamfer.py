@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import GridError, MapError, SceneError, TipsError
-from limitsets.scene import load_to_analyse
-from limitsets.thrower import trace
+from limitsets.base.errors import GridError, MapError, SceneError, TipsError
+from limitsets.feeder.scene import load_to_analyse
+from limitsets.feeder.thrower import trace
 
 BOTH = {"landing": True, "roll": True}
 CHAMFER = 3
@@ -105,7 +105,7 @@ def test_no_throw_begins_on_a_chamfer() -> None:
 
 
 def test_a_domain_has_states_somewhere_and_no_box_that_is_empty_in_part() -> None:
-    from limitsets.cells import Domain
+    from limitsets.systems.cells import Domain
 
     assert Domain([[0.0], [1.0]], [[1.0], [1.0]]).inhabited.tolist() == [True, False]
     for lo, hi in (([[1.0]], [[1.0]]), ([[0.0, 1.0]], [[1.0, 1.0]]), ([[2.0], [0.0]], [[1.0], [1.0]])):

@@ -5,9 +5,9 @@ import tomllib
 from pathlib import Path
 
 import limitsets as ls
-from limitsets.scene.quantities import NAMES
-from limitsets.scene.schema import scene_table
-from limitsets.thrower.effects import EFFECTS
+from limitsets.feeder.scene.quantities import NAMES
+from limitsets.feeder.scene.schema import scene_table
+from limitsets.feeder.thrower.effects import EFFECTS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
 

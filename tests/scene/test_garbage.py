@@ -6,8 +6,8 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from limitsets.errors import SceneError
-from limitsets.scene import dump, load
+from limitsets.base.errors import SceneError
+from limitsets.feeder.scene import dump, load
 
 DESIGNED = load("paper-designed").as_dict()
 UNITS = st.sampled_from(["in", "cm", "m", "deg", "rad", "deg/s", "%", "kg", "1/s", ""])

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from limitsets.goals import AttractsAll, FlipOrder, OrientedBeyond, Reaches, StaysOnArm
-from limitsets.scene import Deviation, Effects, Scatter, Scene, World, dump, load, scenes
-from limitsets.scene.sensing import BeyondSensor, ChosenThrow, Feedback
+from limitsets.feeder.goals import AttractsAll, FlipOrder, OrientedBeyond, Reaches, StaysOnArm
+from limitsets.feeder.scene import Deviation, Effects, Scatter, Scene, World, dump, load, scenes
+from limitsets.feeder.scene.surroundings import BeyondSensor, ChosenThrow, Feedback
 
 # kappa, speed for information [deg/s], arm's length, height, flight, flip (docs/model.md, the four paper scenes)
 PAPER = {

@@ -7,11 +7,11 @@ import pytest
 from mpmath import mp, mpf
 
 import limitsets as ls
-from limitsets.inverse.critical.seeded import numbers_of
-from limitsets.proofs.parameters import parameter_box
-from limitsets.scene.numbers import Numbers
-from limitsets.scene.quantities import base_unit, find, text_at
-from limitsets.scene.units import exact_factor, parse, share_of_pi
+from limitsets.feeder.scene.numbers import Numbers
+from limitsets.feeder.scene.quantities import base_unit, find, text_at
+from limitsets.feeder.scene.units import exact_factor, parse, share_of_pi
+from limitsets.parameters.design.derivatives import numbers_of
+from limitsets.proofs.prover.parameters import parameter_box
 
 PLATE = {
     "vertices": [["0 in", "0 in"], ["10 cm", "0 in"], ["0.3 ft", "3 in"], ["0 in", "2.5 in"]],

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from limitsets.errors import SceneError
-from limitsets.scene import NAMES, Deviation, deviation, load
+from limitsets.base.errors import SceneError
+from limitsets.feeder.scene import NAMES, Deviation, deviation, load
 
 DESIGNED = load("paper-designed")
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from limitsets.errors import GeometryError, SceneError
-from limitsets.scene import dump, load
-from limitsets.thrower.effects import EFFECTS
+from limitsets.base.errors import GeometryError, SceneError
+from limitsets.feeder.scene import dump, load
+from limitsets.feeder.thrower.effects import EFFECTS
 
 GONE = object()
 TRAY = {

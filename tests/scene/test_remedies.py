@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import LimitsetsError, SceneError
-from limitsets.inverse import robust_design
-from limitsets.inverse.margin.for_goal import design_for_goal
-from limitsets.scene.checking import examined
+from limitsets.base.errors import LimitsetsError, SceneError
+from limitsets.feeder.scene.checking import examined
+from limitsets.parameters.design import robust_design
+from limitsets.parameters.design.for_goal import design_for_goal
 from tests import plates
 from tests.scene.test_chamfer import BOTH, chamfered
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from limitsets.errors import SceneError
-from limitsets.scene.quantities import base_unit
-from limitsets.scene.units import UNITS, convert, exact_factor, parse, spelled_plainly, written
+from limitsets.base.errors import SceneError
+from limitsets.feeder.scene.quantities import base_unit
+from limitsets.feeder.scene.units import UNITS, convert, exact_factor, parse, spelled_plainly, written
 
 
 def test_factors_are_those_of_pints_own_registry() -> None:

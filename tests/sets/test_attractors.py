@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.cells import Domain
-from limitsets.errors import AnswerError
-from limitsets.maps import INWARD, UNDECIDED
-from limitsets.sets.attractors import _visits
+from limitsets.base.errors import AnswerError
+from limitsets.systems.cells import Domain
+from limitsets.systems.maps import INWARD, UNDECIDED
+from limitsets.systems.sets.attracting import _visits
 from tests.maps_of_tests import with_middles
 
 

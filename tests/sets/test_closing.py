@@ -9,8 +9,8 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.cells import as_domain
-from limitsets.sets import cycles_from, cycles_of
+from limitsets.systems.cells import as_domain
+from limitsets.systems.sets import cycles_from, cycles_of
 
 UNIT, ALL = as_domain([(0.0, 1.0)]), {0: [(0.0, 1.0)]}
 

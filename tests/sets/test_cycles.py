@@ -8,9 +8,9 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.cells import CellSet, as_domain
-from limitsets.errors import AnswerError
-from limitsets.sets import cycles_from, cycles_of
+from limitsets.base.errors import AnswerError
+from limitsets.systems.cells import CellSet, as_domain
+from limitsets.systems.sets import cycles_from, cycles_of
 from tests.test_paper import LIMIT_SETS
 
 UNIT = as_domain([(0.0, 1.0)])

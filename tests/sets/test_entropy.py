@@ -6,9 +6,9 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.cells import as_domain
-from limitsets.sets import limit_set_of
-from limitsets.sets.entropy import topological_entropy
+from limitsets.systems.cells import as_domain
+from limitsets.systems.sets import limit_set_of
+from limitsets.systems.sets.measure import topological_entropy
 
 UNIT = as_domain([(0, 1)])
 

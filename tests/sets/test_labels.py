@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.maps import OUTSIDE, UNDECIDED, UNDEFINED, images
+from limitsets.systems.maps import OUTSIDE, UNDECIDED, UNDEFINED, images
 from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState, with_middles
 
 # ---------------------------------------------------------------- maps with holes: roots, logarithms, quotients

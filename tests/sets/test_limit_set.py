@@ -5,9 +5,9 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.cells import as_domain
-from limitsets.errors import AnswerError
-from limitsets.sets import limit_set_of
+from limitsets.base.errors import AnswerError
+from limitsets.systems.cells import as_domain
+from limitsets.systems.sets import limit_set_of
 from tests.sets.part import Part
 from tests.test_paper import LIMIT_SETS
 

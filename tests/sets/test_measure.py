@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.sets import invariant_measures
+from limitsets.systems.sets import invariant_measures
 from tests.maps_of_tests import Baker, Linear2
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.cells import Domain
+from limitsets.systems.cells import Domain
 
 LENGTHS = ("kappa", "surface_height", "arm_length", "radius_of_gyration", "a", "d", "length")
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.inverse import critical_jacobian
+from limitsets.parameters.design import critical_jacobian
 
 FOLDER = Path(__file__).resolve().parents[2] / "studies" / "06_critical_points"
 EXPECTED = json.loads((FOLDER / "expected.json").read_text(encoding="utf-8"))

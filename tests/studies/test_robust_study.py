@@ -6,8 +6,8 @@ import math
 import pytest
 
 import limitsets as ls
-from limitsets.robust.margins.estimate import estimated, failing
-from limitsets.robust.margins.vector import Tolerance
+from limitsets.parameters.margins.deviations import Tolerance
+from limitsets.parameters.margins.estimate import estimated, failing
 from tests.studies.test_studies import STUDIES, load_study
 
 

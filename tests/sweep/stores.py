@@ -5,7 +5,7 @@ import threading
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
-from limitsets.sweep import atlas
+from limitsets.parameters.atlas import atlas
 from tests.sweep.tasks_of_tests import TASK, X, Y
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from limitsets.errors import AnswerError
-from limitsets.sweep import Variable, atlas, block_task
+from limitsets.base.errors import AnswerError
+from limitsets.parameters.atlas import Variable, atlas, block_task
 
 X, Y = "throw.speed=-20:180:21", "arm.surface_height=-1:0.1:9"
 TASK = "tests.sweep.tasks_of_tests:numbers"

@@ -13,11 +13,10 @@ import xarray as xr
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.errors import LimitsetsError, SceneError
-from limitsets.sweep import Axis, atlas
-from limitsets.sweep.axes import axis_of
-from limitsets.sweep.plan import chunk_shape
-from limitsets.sweep.subjects import SceneSubject
+from limitsets.base.errors import LimitsetsError, SceneError
+from limitsets.parameters.atlas import Axis, atlas
+from limitsets.parameters.atlas.plan import chunk_shape
+from limitsets.parameters.atlas.subjects import SceneSubject, axis_of
 from tests.sweep.stores import Shuffled, bytes_of, run
 from tests.sweep.tasks_of_tests import TASK, X, Y
 
@@ -164,7 +163,10 @@ def test_any_registered_map(tmp_path):
     assert found.dataset.fixed_point.values == pytest.approx([1.0, 1.2, 4 / 3, 10 / 7, 1.5])
     assert found.dataset.attrs["plan"]["parameters"] == {"r": 4.0}
     record = found.to_json()
-    assert (record["map"], record["parameters"]) == ("limitsets.maps.textbook.logistic:Logistic", {"r": 4.0})
+    assert (record["map"], record["parameters"]) == (
+        "limitsets.systems.maps.textbook.logistic:Logistic",
+        {"r": 4.0},
+    )
     with pytest.raises(LimitsetsError, match=r"the parameter is 's'.*field"):
         atlas(maps.Logistic(4), "s=2:4:5", task=task)
     with pytest.raises(LimitsetsError, match="parameters of a map have none"):
@@ -274,13 +276,13 @@ def test_a_store_of_another_plan_is_refused_with_what_differs(name, tmp_path, wh
 def test_a_store_of_another_version_or_of_an_edited_task_is_refused(tmp_path, monkeypatch):
     run(tmp_path / "s.zarr")
     with monkeypatch.context() as patch:
-        patch.setattr("limitsets.sweep.plan.version", lambda package: f"{package} of tomorrow")
+        patch.setattr("limitsets.parameters.atlas.plan.version", lambda package: f"{package} of tomorrow")
         with pytest.raises(
             LimitsetsError, match=r"versions\.limitsets is '.*' there, 'limitsets of tomorrow' here"
         ):
             run(tmp_path / "s.zarr")
     with monkeypatch.context() as patch:
-        patch.setattr("limitsets.sweep.plan.source_of", lambda module: {module: "edited"})
+        patch.setattr("limitsets.parameters.atlas.plan.source_of", lambda module: {module: "edited"})
         with pytest.raises(
             LimitsetsError, match=r"the code of tests\.sweep\.tasks_of_tests is not the code that began it"
         ):
@@ -288,11 +290,11 @@ def test_a_store_of_another_version_or_of_an_edited_task_is_refused(tmp_path, mo
 
 
 def test_a_worker_with_other_code_refuses_to_work(monkeypatch):
-    from limitsets.sweep.parameter_atlas import plan_of
-    from limitsets.sweep.work import answer
+    from limitsets.parameters.atlas.parameter_atlas import plan_of
+    from limitsets.parameters.atlas.work import answer
 
     plan = plan_of("paper-designed", X, task=TASK)
-    monkeypatch.setattr("limitsets.sweep.plan.version", lambda package: "0.0")
+    monkeypatch.setattr("limitsets.parameters.atlas.plan.version", lambda package: "0.0")
     with pytest.raises(LimitsetsError, match=r"versions\.limitsets of a worker is '0\.0'"):
         answer(plan, 0)
 
@@ -417,7 +419,7 @@ def test_a_table_has_columns_for_no_more_attractors_than_a_point_has():
 def test_json_has_everything_and_no_nan():
     import json
 
-    from limitsets.files import as_json
+    from limitsets.base.files import as_json
 
     record = json.loads(as_json(run(None)))
     assert list(record) == ["scene", "unit", "axes", "variables", "model", "task", "plan_hash", "versions"]

@@ -9,10 +9,10 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.maps import advance
-from limitsets.sweep.of_topology import topology
-from limitsets.sweep.subjects import SceneSubject
-from limitsets.sweep.tasks import registered
+from limitsets.parameters.atlas.of_topology import topology
+from limitsets.parameters.atlas.plan import registered
+from limitsets.parameters.atlas.subjects import SceneSubject
+from limitsets.systems.maps import advance
 
 UNIT = [(0, 1)]
 

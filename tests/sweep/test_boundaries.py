@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from limitsets import maps
-from limitsets.errors import LimitsetsError
-from limitsets.sweep import atlas
-from limitsets.sweep.boundaries import refined
+from limitsets.base.errors import LimitsetsError
+from limitsets.parameters.atlas import atlas
+from limitsets.parameters.atlas.work import refined
 from tests.sweep.stores import Shuffled, bytes_of
 
 SHAPE = (97, 130)

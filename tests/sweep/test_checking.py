@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.sweep import checking
-from limitsets.sweep.subjects import SceneSubject
-from limitsets.sweep.tasks import Block
-from limitsets.topology import topologies
+from limitsets.parameters.atlas import of_topology as checking
+from limitsets.parameters.atlas.plan import Block
+from limitsets.parameters.atlas.subjects import SceneSubject
+from limitsets.systems.topology import topologies
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.errors import AnswerError
-from limitsets.sweep import atlas
-from limitsets.sweep.classes import FIELDS, classes, legend, named_class
+from limitsets.base.errors import AnswerError
+from limitsets.parameters.atlas import atlas
+from limitsets.parameters.atlas.classes import FIELDS, classes, legend, named_class
 from tests.sweep.stores import Shuffled, bytes_of
 
 NONE = (0, 0, 0)

@@ -10,11 +10,11 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.errors import AnswerError, MapError, SceneError
-from limitsets.files import as_json
-from limitsets.maps import advance
-from limitsets.sets import limit_set_of
-from limitsets.sweep.continuation.path import Place, between
+from limitsets.base.errors import AnswerError, MapError, SceneError
+from limitsets.base.files import as_json
+from limitsets.parameters.continuation.path import Place, between
+from limitsets.systems.maps import advance
+from limitsets.systems.sets import limit_set_of
 from tests.maps_of_tests import TwoState
 from tests.sets.part import Part, mp
 

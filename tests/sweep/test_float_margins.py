@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import AnswerError
-from limitsets.scene.arrays import throw_stack
-from limitsets.sweep.float_margins import float_margins
-from limitsets.topology import topologies
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.scene.arrays import throw_stack
+from limitsets.parameters.atlas.float_margins import float_margins
+from limitsets.systems.topology import topologies
 
 
 def margins(scene, values, quantity, reading="fixed"):

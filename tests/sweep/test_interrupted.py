@@ -16,10 +16,9 @@ import psutil
 import pytest
 from zarr.storage import _local
 
-from limitsets.errors import LimitsetsError
-from limitsets.sweep import atlas
-from limitsets.sweep.driving import Work, drive
-from limitsets.sweep.executors import Processes
+from limitsets.base.campaign import Processes, Work, drive
+from limitsets.base.errors import LimitsetsError
+from limitsets.parameters.atlas import atlas
 from tests.sweep.stores import bytes_of, run
 from tests.sweep.tasks_of_tests import TASK, X, Y, long_answer
 
@@ -299,17 +298,17 @@ def test_units_codes_and_attributes_are_compared(name, old, new, tmp_path):
 def test_other_code_of_the_same_version_does_not_continue_a_store(tmp_path, monkeypatch):
     store = tmp_path / "s.zarr"
     run(store)
-    monkeypatch.setattr("limitsets.sweep.plan.code_digest", lambda: "0" * 64)
+    monkeypatch.setattr("limitsets.parameters.atlas.plan.code_digest", lambda: "0" * 64)
     with pytest.raises(LimitsetsError, match="the code of limitsets is not the code that began it"):
         run(store)
 
 
 def test_a_worker_of_other_code_is_refused(tmp_path, monkeypatch):
-    from limitsets.sweep.parameter_atlas import plan_of
-    from limitsets.sweep.work import answer
+    from limitsets.parameters.atlas.parameter_atlas import plan_of
+    from limitsets.parameters.atlas.work import answer
 
     plan = plan_of("paper-designed", X, Y, task=TASK)
-    monkeypatch.setattr("limitsets.sweep.plan.code_digest", lambda: "0" * 64)
+    monkeypatch.setattr("limitsets.parameters.atlas.plan.code_digest", lambda: "0" * 64)
     with pytest.raises(LimitsetsError, match=r"sources\.limitsets of a worker"):
         answer(plan, 0)
 

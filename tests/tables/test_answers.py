@@ -7,8 +7,8 @@ from xml.etree import ElementTree as ET
 import pytest
 
 import limitsets as ls
-from limitsets.robust.margins.finding import Margin
-from limitsets.tables import Tabled
+from limitsets.base.tables import Tabled
+from limitsets.parameters.margins.single import Margin
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +135,9 @@ def test_margins_designs_and_noise():
 
 def test_continuation_and_atlas(tmp_path):
     pytest.importorskip("xarray", reason="the extra atlas")
-    found = ls.atlas("paper-designed", "throw.kappa=25:26:2", task="limitsets.sweep.examples:critical_points")
+    found = ls.atlas(
+        "paper-designed", "throw.kappa=25:26:2", task="limitsets.parameters.atlas.examples:critical_points"
+    )
     assert shown(found)
     assert len(saved(found)) == 3
     assert saved(found)[0][0] == "throw.kappa [in]"
@@ -154,10 +156,10 @@ def test_every_answer_of_a_public_function_is_tabled():
         robust,
         trays,
     )
-    from limitsets.proofs import Proof
-    from limitsets.robust.sheet.summary import Robustness
-    from limitsets.sweep import Atlas
-    from limitsets.sweep.continuation.result import Continuation
+    from limitsets.parameters.atlas import Atlas
+    from limitsets.parameters.continuation.snapshot import Continuation
+    from limitsets.parameters.sheet.summary import Robustness
+    from limitsets.proofs.prover import Proof
 
     answers = [
         analysis.Analysis,

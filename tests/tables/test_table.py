@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from limitsets.tables import Column, Table, Tabled, aligned, facts, joined
+from limitsets.base.tables import Column, Table, Tabled, aligned, facts, joined
 
 THIRD = 1.0 / 3.0
 
@@ -92,7 +92,7 @@ def test_an_answer_is_shown_saved_and_given_to_pandas(tmp_path):
 
 
 def test_without_pandas_one_line_names_the_extra(monkeypatch):
-    from limitsets.errors import AnswerError
+    from limitsets.base.errors import AnswerError
 
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
     with pytest.raises(AnswerError, match=r"pip install 'limitsets\[atlas\]'"):

@@ -9,10 +9,10 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.cells import Domain
-from limitsets.maps import drivers
-from limitsets.maps.critical import margins
-from limitsets.thrower import fly, throw_map, trace
+from limitsets.feeder.thrower import fly, throw_map, trace
+from limitsets.systems.cells import Domain
+from limitsets.systems.maps import drivers
+from limitsets.systems.maps.critical import margins
 
 flint = pytest.importorskip("flint", reason="the balls of python-flint are the reference")
 from tests.thrower import exhaustive  # noqa: E402  # needs flint

@@ -17,9 +17,9 @@ import json, re, sys
 import numba
 import numpy as np
 import limitsets as ls
-from limitsets.graph.images import hulls
-from limitsets.graph.images.sampled import _hulls
-from limitsets.graph.images.enclosed import enclosures
+from limitsets.systems.graph.images import hulls
+from limitsets.systems.graph.images.sampled import _hulls
+from limitsets.systems.graph.images.enclosed import enclosures
 from limitsets.maps import drivers, images
 
 fused = re.compile(r"\bvfn?m(add|sub)|\bvfm(addsub|subadd)")

@@ -9,8 +9,8 @@ import pytest
 from mpmath import mpf
 
 from limitsets import maps
-from limitsets.maps import drivers
-from limitsets.thrower import Throw, fly, throw_map, trace
+from limitsets.feeder.thrower import Throw, fly, throw_map, trace
+from limitsets.systems.maps import drivers
 from tests.thrower import reference
 from tests.thrower.reference import PAPER
 

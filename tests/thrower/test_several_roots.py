@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.graph.images.enclosed import enclosures
-from limitsets.maps import OUTSIDE_MODEL, images
-from limitsets.thrower.trace import impact_angles
+from limitsets.feeder.thrower.trace import impact_angles
+from limitsets.systems.graph.images.enclosed import enclosures
+from limitsets.systems.maps import OUTSIDE_MODEL, images
 
 
 @pytest.mark.parametrize("kappa", [4.0, 2.0, 1.0, 0.3])
@@ -58,7 +58,7 @@ def test_a_cell_on_which_the_impact_grazes_has_a_wide_bracket_and_is_still_enclo
 AT_A = """
 import numpy as np
 import limitsets as ls
-from limitsets.graph.images.enclosed import enclosures
+from limitsets.systems.graph.images.enclosed import enclosures
 
 scene = ls.load("paper-designed").with_values({"throw.kappa": 2.0})
 wide = scene.map._replace(a=scene.map.a + 0.001)

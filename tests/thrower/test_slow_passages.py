@@ -22,9 +22,9 @@ from mpmath import mp, mpf
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.cells import Domain
-from limitsets.sets import limit_set_of
-from limitsets.thrower import Throw, throw_map
+from limitsets.feeder.thrower import Throw, throw_map
+from limitsets.systems.cells import Domain
+from limitsets.systems.sets import limit_set_of
 
 mp.dps = 40
 

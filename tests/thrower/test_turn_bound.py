@@ -6,9 +6,9 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 
-from limitsets.interval import Interval
-from limitsets.thrower import turn_box as boxes
-from limitsets.thrower.turn import V0, V1, V2, V3, V4, V5, V6, V7, W0, W1, W2, W3, W4, W5, W6, W7
+from limitsets.feeder.thrower import flight_box as boxes
+from limitsets.feeder.thrower.flight import V0, V1, V2, V3, V4, V5, V6, V7, W0, W1, W2, W3, W4, W5, W6, W7
+from limitsets.numbers.interval import Interval
 
 U = Fraction(1, 2**53)
 W = [Fraction(c) for c in (W0, W1, W2, W3, W4, W5, W6, W7)]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.topology import Topologies
+from limitsets.systems.topology import Topologies
 from tests.topology.reference import Reference
 
 __all__ = ["class_of", "differences"]

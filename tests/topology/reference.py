@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from limitsets.maps import INWARD, advance, orbit
+from limitsets.systems.maps import INWARD, advance, orbit
 from tests.topology.scan import Floats, Interval, Ints, Scan, merged
 
 # Cells in a row that no orbit visits are a gap; one that is shorter is not told from a band.

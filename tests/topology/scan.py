@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from limitsets.maps import INWARD, images
+from limitsets.systems.maps import INWARD, images
 
 __all__ = ["Floats", "Interval", "Ints", "Scan", "merged"]
 

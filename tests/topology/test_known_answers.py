@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from limitsets import maps
-from limitsets.maps.stacks import stacked
-from limitsets.topology import topologies
-from limitsets.topology.points import LEVELS
+from limitsets.systems.maps.pieces import stacked
+from limitsets.systems.topology import topologies
+from limitsets.systems.topology.points import LEVELS
 from tests.maps_of_tests import Contraction, Tent
 from tests.topology.maps_with_answers import Grazing, Two, rotations, tongue_of
 

@@ -10,10 +10,10 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.maps import advance
-from limitsets.maps.stacks import point_of, stacked
-from limitsets.scene.arrays import throw_stack
-from limitsets.topology import topologies
+from limitsets.feeder.scene.arrays import throw_stack
+from limitsets.systems.maps import advance
+from limitsets.systems.maps.pieces import point_of, stacked
+from limitsets.systems.topology import topologies
 
 
 class TwoSines(NamedTuple):

@@ -5,9 +5,9 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.maps.stacks import point_of, stacked
-from limitsets.scene.arrays import throw_stack
-from limitsets.topology import topologies
+from limitsets.feeder.scene.arrays import throw_stack
+from limitsets.systems.maps.pieces import point_of, stacked
+from limitsets.systems.topology import topologies
 from tests.topology.compare import differences
 from tests.topology.reference import STARTS, reference
 from tests.topology.window import points_of

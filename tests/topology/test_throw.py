@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.maps import INWARD, advance
-from limitsets.maps.stacks import point_of, stacked
-from limitsets.scene.arrays import throw_stack
-from limitsets.topology import topologies
+from limitsets.feeder.scene.arrays import throw_stack
+from limitsets.systems.maps import INWARD, advance
+from limitsets.systems.maps.pieces import point_of, stacked
+from limitsets.systems.topology import topologies
 
 # docs/model.md, reference numbers: limit sets of the decimal scenes at 40 digits, jogs per visit, flips and exponent
 # per throw (where the digits are given).

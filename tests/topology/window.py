@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 import limitsets as ls
-from limitsets.scene.arrays import ThrowStack, throw_stack
-from limitsets.topology import Topologies, topologies
+from limitsets.feeder.scene.arrays import ThrowStack, throw_stack
+from limitsets.systems.topology import Topologies, topologies
 from tests.topology.compare import class_of
 
 __all__ = ["HEIGHT", "SPEED", "Points", "points_of"]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from limitsets.trays.chain import Chain, chain_of, drawn_chains, filled
-from limitsets.trays.counting import Counts
+from limitsets.cell.trays.filling import Chain, chain_of, drawn_chains, filled
+from limitsets.cell.trays.passing import Counts
 
 EMPTY, RIGHT = 0, 1
 

@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.engine.depression import Rest
-from limitsets.engine.recording import MARKS
-from limitsets.errors import AnswerError
-from limitsets.robust.noise.proportions import binomial_interval
-from limitsets.trays import filmed
-from limitsets.trays.counting import count
-from limitsets.trays.histories import Histories, _history, histories
-from limitsets.trays.passing import passes_of, random_of
+from limitsets.base.errors import AnswerError
+from limitsets.cell.trays import filmed
+from limitsets.cell.trays.passing import Histories, _history, count, histories, passes_of, random_of
+from limitsets.feeder.engine.depression import Rest
+from limitsets.feeder.engine.member import MARKS
+from limitsets.parameters.noise.sampling import binomial_interval
 from tests.trays.scenes import with_tray
 
 pytest.importorskip("pymunk")

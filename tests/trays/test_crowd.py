@@ -9,13 +9,12 @@ import pytest
 from scipy.stats import binomtest, ttest_1samp
 
 import limitsets as ls
-from limitsets.engine.depression import EMPTY
-from limitsets.engine.overlaps import depth_of_overlap
-from limitsets.errors import AnswerError
-from limitsets.trays.chain import Chain
-from limitsets.trays.crowd import TrayCrowd, crowds_of
-from limitsets.trays.passing import passes_of, random_of
-from limitsets.trays.pouring import CROWD, Pouring, _Strewn
+from limitsets.base.errors import AnswerError
+from limitsets.cell.trays.filling import Chain
+from limitsets.cell.trays.passing import passes_of, random_of
+from limitsets.cell.trays.pouring import CROWD, Pouring, TrayCrowd, _Strewn, crowds_of
+from limitsets.feeder.engine.crowd import depth_of_overlap
+from limitsets.feeder.engine.depression import EMPTY
 from tests.trays.scenes import with_tray
 
 pytest.importorskip("pymunk")

@@ -15,7 +15,7 @@ import numpy as np
 import limitsets as ls
 from limitsets.maps import drivers, images
 if sys.argv[1] == "with":
-    import limitsets.thrower.effects
+    import limitsets.feeder.thrower.effects
 images(ls.load("paper-designed").map, np.linspace(9.0, 20.0, 8), 2)
 (signature,) = drivers.fill_images.signatures
 code = drivers.fill_images.inspect_asm(signature)

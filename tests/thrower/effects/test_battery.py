@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from limitsets.jit import entry_of, kernel
-from limitsets.maps.drivers import images
-from limitsets.thrower import impact_angles
-from limitsets.thrower.effects import EFFECTS
-from limitsets.thrower.effects.bounce import Bounce, struck
-from limitsets.thrower.effects.landing import Landing, first_arrival
-from limitsets.thrower.effects.pivot import Pivot, turned_down
-from limitsets.thrower.effects.roll import Roll, next_arrival
-from limitsets.thrower.effects.slip import Slip
-from limitsets.thrower.free_flight import fly_on
-from limitsets.thrower.full import gather_full
-from limitsets.thrower.motion import DOWN, LOST, above, right_of
+from limitsets.feeder.thrower import impact_angles
+from limitsets.feeder.thrower.contact import fly_on
+from limitsets.feeder.thrower.effects import EFFECTS
+from limitsets.feeder.thrower.effects.bounce import Bounce, struck
+from limitsets.feeder.thrower.effects.landing import Landing, first_arrival
+from limitsets.feeder.thrower.effects.pivot import Pivot, turned_down
+from limitsets.feeder.thrower.effects.roll import Roll, next_arrival
+from limitsets.feeder.thrower.effects.slip import Slip
+from limitsets.feeder.thrower.full import gather_full
+from limitsets.feeder.thrower.motion import DOWN, LOST, above, right_of
+from limitsets.numbers.jit import entry_of, kernel
+from limitsets.systems.maps.drivers import images
 from tests.kept import kept
 from tests.thrower.effects.simulation import Law, OutsideError, Simulation
 from tests.thrower.effects.throws import Case, cases, same_end

@@ -8,14 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from limitsets.maps.drivers import images
-from limitsets.thrower import throw_map
-from limitsets.thrower.effects.bounce import Bounce, struck
-from limitsets.thrower.effects.slip import Slip
-from limitsets.thrower.free_flight import next_contact
-from limitsets.thrower.full import gather_full, with_effects
-from limitsets.thrower.motion import Arrival, FullSide, above, right_of
-from limitsets.thrower.turn import turn
+from limitsets.feeder.thrower import throw_map
+from limitsets.feeder.thrower.contact import next_contact
+from limitsets.feeder.thrower.effects.bounce import Bounce, struck
+from limitsets.feeder.thrower.effects.slip import Slip
+from limitsets.feeder.thrower.flight import turn
+from limitsets.feeder.thrower.full import gather_full, with_effects
+from limitsets.feeder.thrower.motion import Arrival, FullSide, above, right_of
+from limitsets.systems.maps.drivers import images
 from tests.thrower.effects.throws import agree, cases, same_end
 
 SIDES = 60

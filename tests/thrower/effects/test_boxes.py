@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.errors import SceneError
-from limitsets.graph.images.enclosed import enclosures
-from limitsets.jit import cover_foreign_class
-from limitsets.maps import codes, images
-from limitsets.proofs.parameters import parameter_box
-from limitsets.proofs.replay import replay
-from limitsets.thrower.motion_box import all_enclosed
+from limitsets.base.errors import SceneError
+from limitsets.feeder.thrower.motion import all_enclosed
+from limitsets.numbers.jit import cover_foreign_class
+from limitsets.proofs.prover.orbits import replay
+from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.graph.images.enclosed import enclosures
+from limitsets.systems.maps import codes, images
 
 EFFECTS = {"landing": True, "roll": True}
 

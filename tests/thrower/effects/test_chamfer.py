@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from limitsets.graph.images.enclosed import enclosures
-from limitsets.maps import codes
-from limitsets.maps.drivers import images
-from limitsets.thrower.full import with_effects
+from limitsets.feeder.thrower.full import with_effects
+from limitsets.systems.graph.images.enclosed import enclosures
+from limitsets.systems.maps import codes
+from limitsets.systems.maps.drivers import images
 from tests.thrower.effects.simulation import Body
 from tests.thrower.effects.test_boxes import outside, with_kappa
 from tests.thrower.effects.throws import Case, agree, same_end

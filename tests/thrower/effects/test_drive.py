@@ -8,13 +8,13 @@ import pytest
 from scipy.optimize import brentq
 
 import limitsets as ls
-from limitsets.jit import entry_of, kernel
-from limitsets.maps import codes, images
-from limitsets.scene import Scene
-from limitsets.thrower.effects.drive import all_the_way
-from limitsets.thrower.effects.landing import Landing, first_arrival
-from limitsets.thrower.full import gather_full
-from limitsets.thrower.motion import above, right_of
+from limitsets.feeder.scene import Scene
+from limitsets.feeder.thrower.effects.drive import all_the_way
+from limitsets.feeder.thrower.effects.landing import Landing, first_arrival
+from limitsets.feeder.thrower.full import gather_full
+from limitsets.feeder.thrower.motion import above, right_of
+from limitsets.numbers.jit import entry_of, kernel
+from limitsets.systems.maps import codes, images
 from tests.kept import kept
 
 DESIGNED = ls.load("paper-designed")
@@ -183,7 +183,7 @@ def test_by_hand() -> None:
     case = scene(stroke)
     # the same flight in the minimal model with kappa cos s
     across = DESIGNED.with_values({"throw.kappa": DESIGNED.kappa * math.cos(stroke)})
-    from limitsets.thrower import trace
+    from limitsets.feeder.thrower import trace
 
     plain, leaning = trace(across.map, 12.0, 2), trace(case.map, 12.0, 2)
     assert leaning.phi[0] == pytest.approx(plain.phi[0], rel=1e-13)

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from limitsets.thrower.full import gather_full
-from limitsets.thrower.held import force, gives_way, lets_go
-from limitsets.thrower.motion import OFF, ON, Contact
-from limitsets.thrower.turn import turn
+from limitsets.feeder.thrower.contact import force, gives_way, lets_go
+from limitsets.feeder.thrower.flight import turn
+from limitsets.feeder.thrower.full import gather_full
+from limitsets.feeder.thrower.motion import OFF, ON, Contact
 from tests.thrower.effects.test_slip import square
 from tests.thrower.effects.throws import Case, agree, cases, same_end
 

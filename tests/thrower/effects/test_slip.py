@@ -9,14 +9,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from limitsets.jit import entry_of, kernel
-from limitsets.thrower import throw_map
-from limitsets.thrower.effects.bounce import Bounce, struck
-from limitsets.thrower.effects.slip import Slip
-from limitsets.thrower.full import gather_full, with_effects
-from limitsets.thrower.motion import LOST, Arrival, Contact, Face, FullSide, above, moved, right_of
-from limitsets.thrower.sliding import slide_on
-from limitsets.thrower.turn import Turned, turn
+from limitsets.feeder.thrower import throw_map
+from limitsets.feeder.thrower.contact import slide_on
+from limitsets.feeder.thrower.effects.bounce import Bounce, struck
+from limitsets.feeder.thrower.effects.slip import Slip
+from limitsets.feeder.thrower.flight import Turned, turn
+from limitsets.feeder.thrower.full import gather_full, with_effects
+from limitsets.feeder.thrower.motion import LOST, Arrival, Contact, Face, FullSide, above, moved, right_of
+from limitsets.numbers.jit import entry_of, kernel
 from tests.thrower.effects.routh import routh, smoothed
 from tests.thrower.effects.throws import agree, cases, same_end
 

@@ -5,12 +5,12 @@ import pytest
 from scipy import stats
 
 import limitsets as ls
-from limitsets.jit import entry_of, kernel
-from limitsets.maps import advance, codes, images, orbit
-from limitsets.maps.counting_random import normal_pair, philox, uniform_pair
-from limitsets.scene import Scene
-from limitsets.thrower import trace
-from limitsets.thrower.effects.spread import Spread
+from limitsets.feeder.scene import Scene
+from limitsets.feeder.thrower import trace
+from limitsets.feeder.thrower.effects.spread import Spread
+from limitsets.numbers.jit import entry_of, kernel
+from limitsets.systems.maps import advance, codes, images, orbit
+from limitsets.systems.maps.drivers import normal_pair, philox, uniform_pair
 from tests.kept import kept
 
 DESIGNED = ls.load("paper-designed")

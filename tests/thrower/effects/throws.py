@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.maps.drivers import images
-from limitsets.thrower import Throw, throw_map
-from limitsets.thrower.full import with_effects
-from limitsets.thrower.motion import FullThrow
+from limitsets.feeder.thrower import Throw, throw_map
+from limitsets.feeder.thrower.full import with_effects
+from limitsets.feeder.thrower.motion import FullThrow
+from limitsets.systems.maps.drivers import images
 from tests.thrower.effects.simulation import Body, Law, OutsideError, Simulation, random_body
 
 

@@ -1,0 +1,1 @@
+"""What every room may use: errors, checks of arguments, files, progress, tables, and runs of many trials."""

@@ -1,0 +1,17 @@
+"""A tray: parts wash over a plate's depressions again and again, and stay where they fall in rightly.
+
+`passing` draws a part that comes by and a kick of the plate; `counting` counts what a depression does with both, in the
+engine; `chain` says what follows for n passes; `histories` follows one depression pass by pass, and asks whether it
+forgets; `filling` joins them (`limitsets.tray`).
+`filming` keeps the passes of one depression for a film.  `pouring` lets many parts come by many
+depressions at once, and `crowd` counts them.
+"""
+
+from limitsets.cell.trays.filling import Chain as Chain
+from limitsets.cell.trays.filling import TrayFill as TrayFill
+from limitsets.cell.trays.filling import tray as tray
+from limitsets.cell.trays.passing import Histories as Histories
+from limitsets.cell.trays.passing import Passes as Passes
+from limitsets.cell.trays.passing import filmed as filmed
+from limitsets.cell.trays.pouring import Pouring as Pouring
+from limitsets.cell.trays.pouring import TrayCrowd as TrayCrowd

@@ -1,0 +1,439 @@
+"""A film of feeding: throws until the part tips over the end of the arm, falls onto the ramp and slides down.
+
+The part tips about the end of the arm as limitsets/cell/feeding/falling.py says: M theta'' = g (d sin theta + e cos
+theta). It then slides without friction until it meets the far wall or the floor; that, and a fall of a part that lies
+wholly beyond the end, is drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base.errors import AnswerError
+from limitsets.cell.feeding.falling import rate_about_end
+from limitsets.face.animation.film import Asked, Film, Leg, Mark, Pace, cut, labels_of, require_length
+from limitsets.face.animation.legs import (
+    LOWERS,
+    RESTS,
+    STAYS,
+    drawn_of,
+    known_of,
+    legs_of,
+    lowered,
+    raised,
+    require_start,
+    rest_leg,
+    riding,
+    swing_of,
+)
+from limitsets.face.animation.picture import cavity_pieces
+from limitsets.face.plot.throwing import Throw, angle_on_side, motion, outline, throws_of
+from limitsets.feeder.engine.member import ground_of
+from limitsets.systems.maps import codes
+
+if TYPE_CHECKING:
+    from limitsets.cell.assembly import Assembly
+    from limitsets.cell.feeding import Feeding
+    from limitsets.cell.feeding.falling import ArmEnd
+    from limitsets.cell.trays import TrayFill
+    from limitsets.feeder.engine.member import Recording
+    from limitsets.feeder.scene import Cavity, Scene
+
+
+Array = NDArray[np.float64]
+
+# Starts tried per side for a good one, and angles between which the first contact is searched.
+TRIED, ANGLES = 40, 400
+# Throws shown at most, and of a start that is chosen.
+MOST_THROWS, USUAL = 60, 8
+WORDS = ("fed rightly", "fed on a wrong side", "not clear of the wall")
+AT_EDGE = "the next throw acts beyond the end of the arm, which is not simulated: assumed not fed"
+BEYOND = "the struck corner is beyond the end of the arm: the map throws as if the arm went on"
+# A place of rest nearer to the end than this share of the arm looks as if it were beyond.
+NEAR = 0.005
+
+
+def film_of_feeding(found: Feeding, asked: Asked) -> Film:
+    """Show a part until it is fed."""
+    return film_of_end(found.end, asked)
+
+
+def film_of_end(end: ArmEnd, asked: Asked) -> Film:
+    """Show a part until it is fed."""
+    start, throws = asked.start, asked.throws
+    sides = end.edges.size
+    if start is not None and not start[0] < (end.edges[start[1]] if 0 <= start[1] < sides else end.x):
+        allowed = f"below {end.x:g} {end.scene.unit}, where the arm ends, and where throws act beyond the end"
+        raise AnswerError("x of the start", start[0], allowed, "start on the arm")
+    goes_on = f"where the arm ends: side {end.side} is wanted"
+    found, lanes = known_of(end.scene, asked.progress, lines=((end.x, goes_on),))
+    scene, pace = found.scene, asked.pace(found.scene)
+    most = MOST_THROWS if throws is None else throws
+    x, side = _longest(end, most if throws else USUAL) if start is None else require_start(scene, start)
+    made = _until_fed(end, scene, x, side, most)
+    if not made:
+        raise AnswerError("the start", f"x = {x:g} on side {side}", "one that is thrown", "choose another")
+    last = made[-1]
+    fate = _fate(end, last)
+    legs = [rest_leg(scene, x, side, 1.0, f"Start: x = {x:.2f} {scene.unit} on side {side}")]
+    for number, throw in enumerate(made, start=1):
+        stays = STAYS if number == len(made) and fate < 0 else RESTS
+        note = BEYOND if motion(scene, throw).struck[0] > end.x else ""
+        edge = (AT_EDGE, -1) if end.at_edge(throw.after, throw.side_after) else None
+        legs += legs_of(scene, throw, pace, f"Throw {number}", stays=stays, note=note, after=edge)
+    if fate >= 0:
+        legs += _falls(end, scene, last, fate, pace)
+    pieces = cavity_pieces(scene, 0.5 * float(scene.sides.length.max()))
+    about = "; ".join(words for words in (drawn_of(scene), "the slide down the ramp is drawn") if words)
+    return cut(scene, legs, pace, title=scene.name, about=about, lanes=lanes, ground=pieces, end=end.x)
+
+
+def _fate(end: ArmEnd, throw: Throw) -> int:
+    if throw.code < 0:
+        return -1
+    return int(end.fate(np.array([throw.after]), np.array([throw.side_after]))[0])
+
+
+def _until_fed(end: ArmEnd, scene: Scene, x: float, side: int, throws: int) -> list[Throw]:
+    from limitsets.feeder.thrower import trace
+    from limitsets.systems.maps import orbit
+
+    path = orbit(scene.map, x, side, throws)
+    over = (path.x >= end.x) | end.at_edge(path.x, path.side)
+    beyond = np.flatnonzero(over[1:])
+    count = int(beyond[0]) + 1 if beyond.size else throws
+    return throws_of(scene, trace(scene.map, x, side, count))
+
+
+def _longest(end: ArmEnd, throws: int) -> tuple[float, int]:
+    """Choose the start that is fed rightly after the most throws shown; a wrong one where none is."""
+    best, chosen = (-1, -1), (float(end.starts[0]), 0)
+    for side, begin in enumerate(end.starts.tolist()):
+        for x in np.linspace(begin, end.x, TRIED + 2)[1:-1].tolist():
+            made = _until_fed(end, end.scene, x, side, throws)
+            if made and made[-1].code >= 0:
+                fate = _fate(end, made[-1])
+                flips = sum(throw.turned != 0 for throw in made)
+                plain = all(abs(throw.after - end.x) > NEAR * end.x for throw in made)
+                rank = (2 * (fate == 0) + (fate > 0) + plain, flips)
+                best, chosen = max((best, chosen), (rank, (x, side)))
+    return chosen
+
+
+def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> list[Leg]:
+    """Tip, slide, and stay."""
+    cavity, side = end.scene.cavity, throw.side_after
+    assert cavity is not None  # an ArmEnd has one
+    gravity = scene.kappa if scene.gravity is None else scene.gravity
+    beyond, d = throw.after - end.x, float(scene.sides.d[side])
+    about_end = outline(scene, side) + np.array([beyond, d])  # the corners from the end of the arm
+    hinge = np.array([end.x, scene.surface_height])
+    start = angle_on_side(scene, side)
+    words, where = WORDS[fate], f"from x = {throw.after:.2f} {scene.unit} on side {side}"
+
+    def pose(tipped: Array, along: Array, down: Array) -> Array:
+        cos, sin = np.cos(tipped), np.sin(tipped)
+        x = hinge[0] + beyond * cos + d * sin + along
+        y = hinge[1] - beyond * sin + d * cos - down
+        return np.stack([x, y, start - tipped], axis=-1)
+
+    def leg(seconds: float, pose_of: Callable[[Array], Array], caption: str, begins: bool = False) -> Leg:
+        place = np.array([throw.after, float(side)])
+        return Leg(
+            seconds,
+            pose_of,
+            np.zeros_like,
+            lambda share: np.tile(place, (share.size, 1)),
+            caption,
+            where,
+            trail=True,
+            begins=begins,
+        )
+
+    if beyond >= float(scene.sides.a[side]):  # the whole side is beyond the end: nothing turns it
+        drop = (beyond - float(scene.sides.a[side])) * math.tan(cavity.angle)
+        time = math.sqrt(2.0 * drop / gravity)
+        falls = leg(
+            time * pace.unit,
+            lambda share: pose(0.0 * share, 0.0 * share, drop * share * share),
+            f"It falls: {words}",
+            begins=True,
+        )
+        return [
+            falls,
+            leg(STAYS, lambda share: pose(0.0 * share, 0.0 * share, drop + 0.0 * share), words.capitalize()),
+        ]
+    most = _first_contact(cavity, about_end)
+    inertia = scene.radius_of_gyration**2 + beyond**2 + d**2
+    rate = rate_about_end(scene, throw.x, side, beyond) if throw.code == codes.JOG else 0.0
+    time, angle_at = _tipping((rate, beyond, d), inertia, gravity, most)
+    tips = leg(
+        time * pace.unit,
+        lambda share: pose(angle_at(share * time), 0.0 * share, 0.0 * share),
+        f"It tips over the end: {words}",
+        begins=True,
+    )
+    slide = _slide(cavity, about_end) if most >= cavity.angle else 0.0
+    cos, sin = math.cos(cavity.angle), math.sin(cavity.angle)
+    slides = leg(
+        math.sqrt(2.0 * slide / (gravity * sin)) * pace.unit,
+        lambda share: pose(most + 0.0 * share, slide * cos * share * share, slide * sin * share * share),
+        f"It slides down the ramp: {words}" if slide else f"It meets the wall: {words}",
+    )
+    stays = leg(
+        STAYS,
+        lambda share: pose(most + 0.0 * share, slide * cos + 0.0 * share, slide * sin + 0.0 * share),
+        words.capitalize(),
+    )
+    return [tips, slides, stays._replace(marks=((0.0, "in the cavity", *hinge.tolist()),))]
+
+
+def _corners(about_end: Array, tipped: float) -> Array:
+    cos, sin = math.cos(tipped), math.sin(tipped)
+    found: Array = about_end @ np.array([[cos, -sin], [sin, cos]])
+    return found
+
+
+def _first_contact(cavity: Cavity, about_end: Array) -> float:
+    """Angle at which a corner meets the far wall or the floor, or the side the ramp [rad]."""
+    from scipy.optimize import brentq
+
+    def room(tipped: float) -> float:
+        corners = _corners(about_end, tipped)
+        return float(min((cavity.width - corners[:, 0]).min(), (corners[:, 1] + cavity.depth).min()))
+
+    angles = np.linspace(0.0, cavity.angle, ANGLES)
+    for before, after in zip(angles[:-1].tolist(), angles[1:].tolist(), strict=True):
+        if room(after) < 0.0:
+            return float(brentq(room, before, after)) if room(before) > 0.0 else before
+    return cavity.angle
+
+
+def _tipping(
+    begins: tuple[float, float, float], inertia: float, gravity: float, most: float
+) -> tuple[float, Callable[[Array], Array]]:
+    """Time to tip by an angle from a rate, e and d, and the angle over time."""
+    from scipy.integrate import solve_ivp
+
+    rate, beyond, height = begins
+
+    def rates(_: float, state: Array) -> list[float]:
+        sine, cosine = math.sin(state[0]), math.cos(state[0])
+        return [float(state[1]), gravity * (height * sine + beyond * cosine) / inertia]
+
+    def down(_: float, state: Array) -> float:
+        return float(state[0]) - most
+
+    down.terminal = True  # type: ignore[attr-defined]  # scipy reads it there
+    # an inverted pendulum: from e off the top it takes ln(d/e) of its times, and a few more
+    patience = (40.0 + max(0.0, math.log(height / max(beyond, 1e-300)))) * math.sqrt(
+        inertia / (gravity * height)
+    )
+    found = solve_ivp(
+        rates, (0.0, patience), [0.0, rate], "DOP853", dense_output=True, events=down, rtol=1e-10, atol=1e-14
+    )
+    end, solution = float(found.t[-1]), found.sol
+    return end, lambda at: np.minimum(solution(at)[0], most)
+
+
+def _slide(cavity: Cavity, about_end: Array) -> float:
+    """How far it slides down the ramp until a corner meets the wall or the floor [length]."""
+    corners = _corners(about_end, cavity.angle)
+    wall = (cavity.width - corners[:, 0]) / math.cos(cavity.angle)
+    floor = (cavity.depth + corners[:, 1]) / math.sin(cavity.angle)
+    return max(0.0, float(min(wall.min(), floor.min())))
+
+
+# ----------------------------------------------------------------
+# Films of what the engine recorded: several parts, the ground, and what happened to whom.
+#
+# Where the scenes of the parts are known their sides are named, times are theirs, and the swing of the arm before each
+# throw is drawn, with the parts that it throws lying on it.
+
+
+# More parts than this are counted, not named.
+NAMED = 4
+# Frames for which an impact is shown: there are many.
+BRIEFLY = 8
+# Throws of a pair, and passes of a tray, that are shown unless others are asked for.
+LAST, PASSES = 4, 12
+
+
+class _Frame(NamedTuple):
+    """What one frame shows: when, of the recording, the angle of the arm, and what is said."""
+
+    time: float
+    arm: float
+    said: str
+
+
+def film_of_recording(
+    recording: Recording,
+    asked: Asked,
+    scenes: Sequence[Scene] = (),
+    title: str = "parts in the rigid-body engine",
+    *,
+    carried: bool = True,
+) -> Film:
+    """Show a recording from its beginning, up to so many throws; of a cavity that stands without the arm's swing."""
+    if asked.start is not None:
+        raise AnswerError("the start", asked.start, "none: a recording has its own", "leave it out")
+    if not recording.times.size:
+        raise AnswerError("the recording", "empty", "one with frames", "record a throw")
+    pace = asked.pace(scenes[0]) if scenes else Pace(asked.fps, asked.slow)
+    swing, about = 0.0, "the arm's swing is not shown"
+    if scenes and carried:
+        about = "the swing of the arm, with the cavity, is drawn"
+        swing = swing_of(scenes[0])
+    takes = 2.0 * swing * pace.unit / pace.rate(scenes[0], scenes[0].kappa) if scenes else 0.0
+    shown, thrown = _frames(recording, asked.throws, pace, (swing, takes))
+    at = np.array([each.time for each in shown])
+    kept = np.maximum(np.searchsorted(recording.times, at + 1e-9, side="right") - 1, 0)
+    texts = [_words(recording, thrown, each) for each in shown]
+    captions, notes = (tuple(dict.fromkeys(each)) for each in zip(*texts, strict=True))
+    count, ground, surface = at.size, tuple(recording.ground), None
+    if scenes:
+        pieces = ground_of(scenes[0])
+        surface = (pieces.height, pieces.end)
+        ground = cavity_pieces(scenes[0], 0.5 * float(scenes[0].sides.length.max()))
+    poses = _swung(recording, kept, shown, thrown)
+    return Film(
+        title,
+        scenes[0].unit if scenes else "",
+        pace.clock if scenes else "",
+        pace.fps,
+        f"{pace.words}; {about}",
+        np.arange(count) / (pace.unit * pace.fps),
+        poses,
+        tuple(recording.outlines),
+        tuple(labels_of(each) for each in scenes) or tuple(() for _ in recording.outlines),
+        np.array([each.arm for each in shown]),
+        surface,
+        ground,
+        captions,
+        notes,
+        np.array([captions.index(caption) for caption, _ in texts]),
+        np.array([notes.index(note) for _, note in texts]),
+        np.zeros((count, 2), dtype=np.int64),
+        _marks(recording, at, thrown),
+        (),
+        None,
+        np.full((count, 2), np.nan),
+        np.full(count, -1, dtype=np.int64),
+        () if scenes else _view(ground, poses),
+    )
+
+
+def film_of_assembly(found: Assembly, asked: Asked) -> Film:
+    """Show the first pair that was assembled, or else the first pair: its last throws."""
+    example = found.example("assembled")
+    number = 0 if example is None else example
+    scenes, last = found.pair.scenes, LAST if asked.throws is None else asked.throws
+    title = f"{scenes[0].name} and {scenes[1].name}, trial {number}: {found.rows[number]['outcome']}"
+    recording, carried = found.film(number, last), found.series.carried
+    return film_of_recording(recording, asked._replace(throws=None), scenes, title, carried=carried)
+
+
+def film_of_tray(found: TrayFill, asked: Asked) -> Film:
+    """Show a tray pass by pass: one depression, or many parts at once that push each other, if they were asked for."""
+    from limitsets.cell.trays import Pouring, filmed
+
+    scene, passes = found.scene, PASSES if asked.throws is None else asked.throws
+    if found.crowds:
+        parts, depressions = found.crowds[0].parts, found.crowds[0].depressions
+        pouring = Pouring(found.passes, parts, depressions, passes, found.seed)
+        recording = pouring.film(0, last=passes)
+        title = f"{scene.name}, {parts} parts a pass over {depressions} depressions"
+    else:
+        recording = filmed(scene, passes, seed=found.seed)
+        title = f"{scene.name}, one depression of a tray"
+    film = film_of_recording(recording, asked._replace(throws=None), title=title)
+    pace = asked.pace(scene)
+    return replace(
+        film,
+        unit=scene.unit,
+        clock=pace.clock,
+        about=f"{pace.words}; times between passes are left out",
+        labels=(labels_of(scene),) * len(recording.outlines),
+        captions=tuple(
+            each.replace("Throw", "Kick").replace("the first throw", "the first kick")
+            for each in film.captions
+        ),
+    )
+
+
+def _frames(
+    recording: Recording, throws: int | None, pace: Pace, swing: tuple[float, float]
+) -> tuple[list[_Frame], list[float]]:
+    """Choose the moments that are shown, each throw's swing (angle, seconds) first, and say when parts are thrown."""
+    first, end = float(recording.times[0]), float(recording.times[-1])
+    thrown = sorted({time for time, _, word in recording.marks if word == "thrown"})
+    if throws is not None and len(thrown) > throws:
+        end = thrown[throws]
+        thrown = thrown[:throws]
+    ends = [*(time for time in thrown if time > first), end]
+    require_length(round((end - first) * pace.unit * pace.fps))
+    frames, begin = [_Frame(first, 0.0, "")], first
+    for end_of_leg in ends:
+        if swing[0] and begin in thrown:
+            down, up = (max(1, round(seconds * pace.fps)) for seconds in (LOWERS, swing[1]))
+            for way, count, said in ((lowered, down, "goes down"), (raised, up, "swings up and stops")):
+                angles = way(swing[0], np.arange(1, count + 1) / count).tolist()
+                frames += [_Frame(begin, angle, f": the arm {said}") for angle in angles]
+        count = max(1, round((end_of_leg - begin) * pace.unit * pace.fps))
+        frames += [_Frame(begin + (end_of_leg - begin) * k / count, 0.0, "") for k in range(1, count + 1)]
+        begin = end_of_leg
+    frames += [frames[-1]] * round(STAYS * pace.fps)
+    require_length(len(frames))
+    return frames, thrown
+
+
+def _swung(recording: Recording, kept: NDArray[np.int64], shown: list[_Frame], thrown: list[float]) -> Array:
+    """Let the parts that are thrown lie on the arm while it swings."""
+    poses: Array = recording.poses[kept].copy()
+    for frame, each in enumerate(shown):
+        if each.arm:
+            riders = [part for time, part, word in recording.marks if word == "thrown" and time == each.time]
+            poses[frame, riders] = riding(poses[frame, riders], each.arm)
+    return poses
+
+
+def _marks(recording: Recording, at: Array, thrown: list[float]) -> tuple[Mark, ...]:
+    """Say where things happen: at the lowest corner of the part."""
+    found = []
+    for time, part, word in sorted(recording.marks):
+        if time <= at[-1]:
+            frame = int(np.searchsorted(at, time))
+            until = next((int(np.searchsorted(at, each)) for each in thrown if each > time), at.size)
+            until = min(until, frame + BRIEFLY)
+            number = min(int(np.searchsorted(recording.times, time)), recording.times.size - 1)
+            corners = recording.corners(number, part)
+            x, y = corners[int(np.argmin(corners[:, 1]))].tolist()
+            if math.isfinite(x):
+                found.append(Mark(frame, until, part, word, x, y))
+    return tuple(found)
+
+
+def _words(recording: Recording, thrown: list[float], frame: _Frame) -> tuple[str, str]:
+    count = sum(each <= frame.time for each in thrown)
+    latest = {number: word for at, number, word in sorted(recording.marks) if at <= frame.time}
+    if len(recording.outlines) <= NAMED:
+        note = ", ".join(f"part {number + 1}: {word}" for number, word in sorted(latest.items()))
+    else:
+        note = ", ".join(f"{many} {word}" for word, many in sorted(Counter(latest.values()).items()))
+    return (f"Throw {count}{frame.said}" if count else "Before the first throw"), note
+
+
+def _view(ground: tuple[Array, ...], poses: Array) -> tuple[tuple[float, float], ...]:
+    """Keep the surfaces in sight on which parts come to lie."""
+    least, most = float(np.nanmin(poses[:, :, 0])), float(np.nanmax(poses[:, :, 0]))
+    tops = [(float(each[:, 0].max()), float(each[:, 1].max())) for each in ground]
+    highest = float(np.nanmax(poses[:, :, 1]))
+    return tuple((min(x, most), y) for x, y in tops if x > least and y <= highest)

@@ -1,0 +1,387 @@
+"""A film as data: where everything is in every frame, and what is written under it.  Writers only draw it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base.errors import AnswerError
+from limitsets.face.plot.throwing import about_centre, turned
+
+if TYPE_CHECKING:
+    from limitsets.feeder.scene import Scene
+
+
+Array = NDArray[np.float64]
+Extents = dict[int, list[tuple[float, float]]]
+
+
+class Label(NamedTuple):
+    """A word on a part, about its centre of mass, in the frame of its outline [length]."""
+
+    word: str
+    x: float
+    y: float
+
+
+class Mark(NamedTuple):
+    """Something that happens: in which frame, to which part, where; shown up to another frame [length].
+
+    The words are those of `limitsets.feeder.engine.member.Recording`.
+    """
+
+    frame: int
+    until: int
+    part: int
+    word: str
+    x: float
+    y: float
+
+
+class Rest(NamedTuple):
+    """A part has come to rest: the frame in which its throw begins, and that of the rest; where [length]; in words."""
+
+    begin: int
+    frame: int
+    x: float
+    side: int
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Lanes:
+    """What is known of the places of rest, a lane for each side.
+
+    Attributes
+    ----------
+    begin : tuple of float
+        By side the least x at which the part can rest [length].
+    end : float
+        The largest [length].
+    sets : tuple of dict
+        Limit sets, or attractors: intervals by side.
+    critical : dict of int to tuple of float
+        Critical points by side.
+    goal : tuple of (float, int) or None
+        The goal's x and side.
+    lines : tuple of (float, str)
+        Other places, such as a sensor's, and what they are.
+    known : tuple of dict
+        Where a controller knows the part to be, one for each state it comes to.
+    """
+
+    begin: tuple[float, ...]
+    end: float
+    sets: tuple[Extents, ...] = ()
+    critical: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    goal: tuple[float, int] | None = None
+    lines: tuple[tuple[float, str], ...] = ()
+    known: tuple[Extents, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A film, frame by frame; all frames are shown for the same time.
+
+    Attributes
+    ----------
+    title : str
+        What is shown.
+    unit, clock : str
+        Unit of lengths, and of times: "s", or "1/w" where no gravity is given.
+    fps : float
+        Frames per second when it is shown.
+    about : str
+        How fast it runs, and what of it is drawn rather than computed.
+    times : ndarray, shape (frames,)
+        Since the beginning, in `clock`.
+    poses : ndarray, shape (frames, parts, 3)
+        Centre of mass [length], and the angle by which the outline has turned [rad].
+    outlines : tuple of ndarray, shape (n, 2)
+        Corners of each part about its centre of mass [length].
+    labels : tuple of tuple of Label
+        Words on each part.
+    arm : ndarray, shape (frames,)
+        Angle of the arm, 0 when level [rad].
+    surface : tuple of (float, float) or None
+        Height of the arm's surface over the joint, and where the arm ends [length]; None where the arm is ground.
+    ground : tuple of ndarray, shape (m, 2)
+        What turns with the arm, as it is with the arm level: the cavity; what stands, where the arm is ground [length].
+    captions, notes : tuple of str
+        Texts: the first line, and the second.
+    caption, note : ndarray of int, shape (frames,)
+        Which of them belong to a frame.
+    trail : ndarray of int, shape (frames, 2)
+        The frames between which the path of the first part's centre of mass is shown.
+    marks : tuple of Mark
+        What happens.
+    rests : tuple of Rest
+        Where the first part came to rest.
+    lanes : Lanes or None
+        What is drawn beside it.
+    position : ndarray, shape (frames, 2)
+        Where the first part is in the lanes: x [length], and the side, between two sides while it turns.
+    stage : ndarray of int, shape (frames,)
+        Number in ``lanes.known``, -1 for none.
+    view : tuple of (float, float)
+        Places that have to be in sight, besides what moves [length].
+    """
+
+    title: str
+    unit: str
+    clock: str
+    fps: float
+    about: str
+    times: Array
+    poses: Array
+    outlines: tuple[Array, ...]
+    labels: tuple[tuple[Label, ...], ...]
+    arm: Array
+    surface: tuple[float, float] | None
+    ground: tuple[Array, ...]
+    captions: tuple[str, ...]
+    notes: tuple[str, ...]
+    caption: NDArray[np.int64]
+    note: NDArray[np.int64]
+    trail: NDArray[np.int64]
+    marks: tuple[Mark, ...]
+    rests: tuple[Rest, ...]
+    lanes: Lanes | None
+    position: Array
+    stage: NDArray[np.int64]
+    view: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def frames(self) -> int:
+        """How many."""
+        return int(self.times.size)
+
+    def polygon(self, frame: int, part: int = 0) -> Array:
+        """Corners of a part in a frame, shape (n, 2) [length]."""
+        x, y, angle = self.poses[frame, part].tolist()
+        corners: Array = turned(self.outlines[part], angle) + np.array([x, y])
+        return corners
+
+    def arm_polygon(self, frame: int, thick: float) -> Array:
+        """Corners of the arm in a frame, its surface first, shape (4, 2) [length]."""
+        assert self.surface is not None  # asked where there is one
+        height, end = self.surface
+        corners = np.array([[0.0, height], [end, height], [end, height - thick], [0.0, height - thick]])
+        return turned(corners, float(self.arm[frame]))
+
+    def ground_polygons(self, frame: int) -> list[Array]:
+        """Corners of the ground's pieces in a frame [length]."""
+        return [turned(each, float(self.arm[frame])) for each in self.ground]
+
+
+# ----------------------------------------------------------------
+# Legs of a film, one after the other, cut into frames.
+
+
+MOST_FRAMES = 6000
+"""More frames than this are refused: four minutes."""
+
+UNKNOWN = 0.4
+"""Seconds that stand for 1/w where no gravity is given: a throw of the paper's feeder."""
+
+
+class Leg(NamedTuple):
+    """Something that goes on for a while.
+
+    Attributes
+    ----------
+    seconds : float
+        How long it is shown, at rate 1 of the film [s].
+    pose : callable
+        From shares of it, shape (n,), to poses in the room, shape (n, 3).
+    arm : callable
+        To angles of the arm, shape (n,).
+    lane : callable
+        To x and side in the lanes, shape (n, 2).
+    caption, note : str
+        What is written meanwhile.
+    stage : int
+        Number of what a controller knows.
+    trail : bool
+        Whether the path is drawn: it begins with the first such leg after one without.
+    marks : tuple of (float, str, float, float)
+        Share of the leg, word, and place.
+    rest : tuple of (float, int, str) or None
+        x, side and sentence where the part comes to rest at its end.
+    begins : bool
+        Whether a throw begins: what was drawn of the last one is taken away.
+    """
+
+    seconds: float
+    pose: Callable[[Array], Array]
+    arm: Callable[[Array], Array]
+    lane: Callable[[Array], Array]
+    caption: str
+    note: str = ""
+    stage: int = -1
+    trail: bool = False
+    marks: tuple[tuple[float, str, float, float], ...] = ()
+    rest: tuple[float, int, str] | None = None
+    begins: bool = False
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How fast a film runs.
+
+    Attributes
+    ----------
+    fps : float
+        Frames per second.
+    slow : float
+        How many times slower than the machine.
+    clock : str
+        "s", or "1/w".
+    """
+
+    fps: float
+    slow: float
+    clock: str = "s"
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        if not (1.0 <= self.fps <= 100.0):
+            raise AnswerError("the frames per second", self.fps, "1 to 100", "25 look smooth")
+        if not (0.01 <= self.slow <= 1000.0):
+            raise AnswerError("the slow motion", self.slow, "0.01 to 1000", "1 is as fast as the machine")
+
+    @property
+    def unit(self) -> float:
+        """Seconds of film for one unit of the clock."""
+        return self.slow * (1.0 if self.clock == "s" else UNKNOWN)
+
+    def rate(self, scene: Scene, kappa: float) -> float:
+        """Angular speed of a throw, in units of the clock."""
+        return math.sqrt((scene.kappa if scene.gravity is None else scene.gravity) / kappa)
+
+    @property
+    def words(self) -> str:
+        """How fast it runs, a clause."""
+        if self.clock == "s":
+            return (
+                "as fast as the machine"
+                if self.slow == 1.0
+                else f"{self.slow:g} times slower than the machine"
+            )
+        return f"1/w, the time in which the throw turns by 1 rad, is shown in {self.unit:g} s"
+
+
+class Asked(NamedTuple):
+    """What is asked of a film, as in `limitsets.animate`; without a start or throws each film has its own."""
+
+    start: tuple[float, int] | None
+    throws: int | None
+    fps: float
+    slow: float
+    progress: Any = None
+
+    def pace(self, scene: Scene) -> Pace:
+        """Know the seconds where the scene has gravity."""
+        return Pace(self.fps, self.slow, "1/w" if scene.gravity is None else "s")
+
+
+def require_length(frames: int) -> None:
+    """Refuse a film that nobody would look at, before anything is drawn."""
+    if frames > MOST_FRAMES:
+        remedy = "show fewer throws, fewer frames per second, or less slow motion"
+        raise AnswerError("the frames of the film", frames, f"up to {MOST_FRAMES}", remedy)
+
+
+def labels_of(scene: Scene) -> tuple[Label, ...]:
+    """Name each side of a part, inside it next to the middle of the side."""
+    corners = about_centre(scene)
+    n, found = len(corners), []
+    size = float(np.abs(corners).max())
+    for side in range(n):
+        left, right = corners[-side % n], corners[(1 - side) % n]
+        middle, along = 0.5 * (left + right), right - left
+        inward = np.array([-along[1], along[0]]) / float(np.hypot(*along))
+        x, y = (middle + 0.1 * size * inward).tolist()
+        found.append(Label(str(side), x, y))
+    return tuple(found)
+
+
+def cut(
+    scene: Scene,
+    legs: Sequence[Leg],
+    pace: Pace,
+    *,
+    title: str,
+    about: str = "",
+    lanes: Lanes | None,
+    ground: Sequence[Array] = (),
+    end: float | None = None,
+    view: Sequence[tuple[float, float]] = (),
+) -> Film:
+    """Cut legs of one part's motion into frames: each ends in a frame, and the first begins in one."""
+    counts = [max(1, round(leg.seconds * pace.fps)) for leg in legs]
+    require_length(sum(counts) + 1)
+    columns: dict[str, list[Any]] = {word: [] for word in ("times", "poses", "arm", "position", "trail")}
+    texts: dict[str, list[int]] = {"caption": [], "note": [], "stage": []}
+    captions, notes = (
+        list(dict.fromkeys(leg.caption for leg in legs)),
+        list(dict.fromkeys(leg.note for leg in legs)),
+    )
+    marks: list[tuple[int, str, float, float]] = []
+    rests: list[Rest] = []
+    frame, trail, clock, before, begins = 0, [0, 0], 0.0, False, [0]
+    for number, (leg, count) in enumerate(zip(legs, counts, strict=True)):
+        share = np.arange(0 if number == 0 else 1, count + 1) / count
+        columns["times"].append(clock + share * leg.seconds / pace.unit)
+        columns["poses"].append(leg.pose(share))
+        columns["arm"].append(leg.arm(share))
+        columns["position"].append(leg.lane(share))
+        if leg.begins:
+            begins, trail = [*begins, frame], [frame, frame]
+        if leg.trail and not before:
+            trail = [max(frame - 1, 0), frame]
+        for k in range(share.size):
+            trail = [trail[0], frame + k] if leg.trail else trail
+            columns["trail"].append(trail)
+        texts["caption"] += [captions.index(leg.caption)] * share.size
+        texts["note"] += [notes.index(leg.note)] * share.size
+        texts["stage"] += [leg.stage] * share.size
+        last = frame + share.size - 1
+        marks += [(last - round((1.0 - at) * count), word, x, y) for at, word, x, y in leg.marks]
+        if leg.rest is not None:
+            rests.append(Rest(begins[-1], last, *leg.rest))
+        frame, clock, before = last + 1, clock + leg.seconds / pace.unit, leg.trail
+    shown = []
+    for at, word, x, y in marks:
+        until = next((k for k in begins if k > at), frame)
+        shown.append(Mark(at, until, 0, word, x, y))
+    return Film(
+        title,
+        scene.unit,
+        pace.clock,
+        pace.fps,
+        "; ".join(words for words in (pace.words, about) if words),
+        np.concatenate(columns["times"]),
+        np.concatenate(columns["poses"])[:, None, :],
+        (about_centre(scene),),
+        (labels_of(scene),),
+        np.concatenate(columns["arm"]),
+        (scene.surface_height, scene.arm_length if end is None else end),
+        tuple(ground),
+        tuple(captions),
+        tuple(notes),
+        np.array(texts["caption"]),
+        np.array(texts["note"]),
+        np.array(columns["trail"]),
+        tuple(shown),
+        tuple(rests),
+        lanes,
+        np.concatenate(columns["position"]),
+        np.array(texts["stage"]),
+        tuple(view),
+    )

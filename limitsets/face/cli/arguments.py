@@ -1,0 +1,190 @@
+"""Values of options: numbers, places on the arm, deviations and bounds of quantities."""
+
+from __future__ import annotations
+
+import re
+import time
+from contextlib import suppress
+from json import loads
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+from zipfile import BadZipFile, ZipFile
+
+from limitsets.base.errors import LimitsetsError
+from limitsets.base.proposals import proposed
+from limitsets.face.cli.output import saved, stem_of
+
+if TYPE_CHECKING:
+    from limitsets.feeder.scene import Scene
+
+
+HELP_NO_RECHECK = "Write certificates without checking them first."
+
+HELP_LAID = (
+    "Where parts are laid down, like 0=8:20 or 0='8 in:20 in'; repeatable. The goal's starts are these; "
+    "default: the whole arm."
+)
+
+_BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+
+_Ends: TypeAlias = tuple[float | str | None, float | str | None]
+"""Lowest and highest: a number in the scene's unit, text with a unit, or None for no bound."""
+
+
+def number(word: str) -> float | str:
+    """Read a bare number in the scene's unit; text with a unit is read further on."""
+    return float(word) if _BARE.fullmatch(word.strip()) else word.strip()
+
+
+def place(scene: Scene, text: str, option: str = "--x") -> float:
+    """Read a place: with a unit, or a bare number in the scene's unit."""
+    from limitsets.feeder.scene.units import convert, parse
+
+    word = number(text)
+    return word if isinstance(word, float) else convert(parse(text, "length", key=option), scene.unit)
+
+
+def places_of(scene: Scene, text: str, option: str) -> list[float]:
+    """Read LO:HI:N, N lengths from LO to HI."""
+    words = text.split(":")
+    if len(words) != 3 or not words[2].strip().isdigit() or not 1 <= int(words[2]) <= 1000:
+        raise LimitsetsError("the places", text, "LO:HI:N, N from 1 to 1000", "correct it", key=option)
+    lo, hi, count = place(scene, words[0]), place(scene, words[1]), int(words[2])
+    return [lo + (hi - lo) * k / max(count - 1, 1) for k in range(count)]
+
+
+def position(scene: Scene, text: str) -> float:
+    """Read --x, where a part is to rest.
+
+    Raises
+    ------
+    LimitsetsError
+        No number, a unit of something else, or a place before the joint or beyond the arm's end.
+    """
+    value = place(scene, text)
+    if not 0.0 <= value <= scene.arm_length:
+        allowed = f"a place on the arm, from 0 to {scene.arm_length:g} {scene.unit}"
+        raise LimitsetsError("x", text, allowed, "start where a part can rest", key="--x")
+    return value
+
+
+def deviations(option: str, words: list[str] | None) -> dict[str, str]:
+    """Read the words of a repeatable option, QUANTITY=DEVIATION each."""
+    found: dict[str, str] = {}
+    for word in words or []:
+        name, sign, text = word.partition("=")
+        name = name.strip()
+        if not sign or name in found:
+            remedy = "name each quantity once" if sign else "put a sign of equality between them"
+            raise LimitsetsError(option.lstrip("-"), word, "QUANTITY=DEVIATION", remedy, key=option)
+        found[name] = text.strip()
+    return found
+
+
+def laid_ranges(words: list[str] | None) -> dict[int, list[tuple[float | str, float | str]]] | None:
+    """Read the words of --laid, SIDE=LO:HI each; bare numbers are in the scene's unit.
+
+    A unit behind one end is that of both.
+    """
+    found: dict[int, list[tuple[float | str, float | str]]] = {}
+    for word in words or []:
+        side, sign, text = word.partition("=")
+        ends = [number(end.strip("'\" ")) for end in text.split(":")]
+        units = [end.lstrip("+-.0123456789eE").strip() for end in ends if isinstance(end, str)]
+        if not sign or not side.strip().isascii() or not side.strip().isdigit() or len(ends) != 2:
+            remedy = "name a side, the sign =, and two places with : between them, like 0=8:20"
+            raise LimitsetsError("where parts are laid down", word, "SIDE=LO:HI", remedy, key="--laid")
+        if len(units) == 1:
+            ends = [f"{end!r} {units[0]}" if isinstance(end, float) else end for end in ends]
+        found.setdefault(int(side), []).append((ends[0], ends[1]))
+    return found or None
+
+
+def _ends_of(words: list[str] | None) -> dict[str, _Ends]:
+    """Read the words of --bounds, QUANTITY=LOWEST:HIGHEST each."""
+    found: dict[str, _Ends] = {}
+    for word in words or []:
+        name, sign, text = word.partition("=")
+        lo, colon, hi = text.partition(":")
+        if not (sign and colon) or name.strip() in found:
+            remedy = (
+                "name each quantity once"
+                if sign and colon
+                else "put = after the quantity, : between the bounds"
+            )
+            raise LimitsetsError("the bounds", word, "QUANTITY=LOWEST:HIGHEST", remedy, key="--bounds")
+        ends = [number(end.strip("'\" ")) if end.strip("'\" ") else None for end in (lo, hi)]
+        found[name.strip()] = (ends[0], ends[1])
+    return found
+
+
+def bounds_of(scene: Scene, words: list[str] | None) -> dict[str, tuple[float | None, float | None]]:
+    """Read --bounds in the units of a scene; a bare number is in the unit in which people read the quantity."""
+    from limitsets.feeder.scene.quantities import in_units, unit_read
+
+    def read(name: str, end: float | str | None) -> float | None:
+        if end is None:
+            return None
+        text = end if isinstance(end, str) else f"{end!r} {unit_read(scene.text, scene.unit, name)}".strip()
+        return in_units(scene.unit, name, text, key="--bounds")
+
+    found = {name: (read(name, lo), read(name, hi)) for name, (lo, hi) in _ends_of(words).items()}
+    for name, (lo, hi) in found.items():
+        if lo is not None and hi is not None and not lo < hi:
+            word = next(word for word in words or [] if word.split("=")[0].strip() == name)
+            raise LimitsetsError(
+                "the bounds", word, "a lower and a higher one", "turn them round", key="--bounds"
+            )
+    return found
+
+
+# ----------------------------------------------------------------
+# Certificates as files of the commands: their names, and `--certificate FILE`, checked before it gets its name.
+
+
+def own_file(scene: Scene) -> Path:
+    """Name a certificate after the scene's file; a certificate of another scene that has this name stays."""
+    file, name = Path(f"{stem_of(scene)}.proof.zip"), scene.name
+    with suppress(OSError, BadZipFile, ValueError, TypeError, LookupError), ZipFile(file) as other:
+        name = loads(other.read("header.json"))["boxes"][0]["scene"]["name"]
+    if name != scene.name:
+        raise LimitsetsError(
+            "the certificate", str(file), f"one of {scene.name}, or a new one",
+            f"it is one of {name}; name another with --out, or delete it",
+        )  # fmt: skip
+    return file
+
+
+def with_ending(file: Path) -> Path:
+    """Give a certificate its ending where its name has none; what is there, a folder or a device, keeps its name."""
+    return file if file.suffix or file.exists() else file.with_name(f"{file.name}.proof.zip")
+
+
+def certified(
+    found: Any, file: Path, claim: str, *, proved: bool, recheck: bool
+) -> tuple[Any, dict[str, Any]]:
+    """Write the certificate; what is left of the answer where the checker denies it, and what is said of the file."""
+    from limitsets.proofs.prover.certificate import DeniedError
+
+    if not proved:
+        return found, {"file": None, "denied": False, "recheck": None}
+    begin, file = time.perf_counter(), with_ending(file)
+    with saved(file) as draft:
+        try:
+            found.save(draft, recheck=recheck, workers=None)
+        except DeniedError as error:
+            kept = str(file.with_name(Path(error.file or "").name))
+            return found.denied(error.claims[claim]), {"file": kept, "denied": True, "recheck": None}
+    seconds = time.perf_counter() - begin if recheck else None
+    return found, {"file": str(file), "denied": False, "recheck": seconds}
+
+
+def said_of(written: dict[str, Any], missing: str) -> str:
+    """Say it to people; `missing` is why there is no file."""
+    file, seconds = written["file"], written["recheck"]
+    if file is None:
+        return f"no certificate is written: {missing}"
+    if written["denied"]:
+        return f"the checker denies the certificate: it is kept as {file}"
+    done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
+    return f"certificate: {file}, {done} (check it: {proposed('recheck', file)})"

@@ -1,0 +1,322 @@
+"""A small atlas beside the scene: computed when it is asked for, or one that was stored; a click opens its feeder."""
+
+from __future__ import annotations
+
+import atexit
+import json
+import queue
+import subprocess
+import sys
+import threading
+import weakref
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+import numpy as np
+import panel as pn
+from scipy.ndimage import distance_transform_edt
+
+from limitsets.face.explorer.canvas import SAID, SLIDER, Canvas, Hand, Layer, Words, swatch
+from limitsets.face.explorer.estimates import Knob
+from limitsets.face.explorer.pictures import pattern
+from limitsets.face.plot import style
+from limitsets.face.plot.atlas_maps import edges
+from limitsets.feeder.scene import Scene, dump
+from limitsets.feeder.scene.units import written
+
+# ----------------------------------------------------------------
+# Questions that take seconds, asked of a process of its own which is ended when nobody wants the answer any
+# more.
+
+
+RUNNING = threading.BoundedSemaphore(2)
+"""Processes of all visitors together; others wait in line."""
+
+LONGEST = 600.0
+"""Seconds after which an answer is given up."""
+
+
+_ALL: weakref.WeakSet[Background] = weakref.WeakSet()
+
+
+@atexit.register
+def _stop_all() -> None:
+    """Leave no process behind when the server ends."""
+    for each in list(_ALL):
+        each.stop()
+
+
+class Background:
+    """One question at a time, of one visitor.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> asked = Background()
+    >>> asked.ask({"what": "proof", "scene": ls.dump(ls.load("paper-designed")), "margins": []})
+    >>> [line.get("verdict") for line in asked.wait()]
+    ['proved', 'proved', None]
+    """
+
+    def __init__(self) -> None:
+        self._lines: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        self._wanted = threading.Event()
+        self._process: subprocess.Popen[str] | None = None
+        self._thread: threading.Thread | None = None
+        _ALL.add(self)
+
+    def ask(self, question: dict[str, Any]) -> None:
+        """Drop what is being answered and ask this; the answers end with ``{"done": True}``."""
+        self.stop()
+        self._lines, self._wanted = queue.SimpleQueue(), threading.Event()
+        about = question, self._lines, self._wanted
+        self._thread = threading.Thread(target=self._run, args=about, daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the process; what it said is forgotten."""
+        self._wanted.set()
+        self._lines = queue.SimpleQueue()
+        if self._process is not None:
+            self._process.kill()
+
+    def answers(self) -> list[dict[str, Any]]:
+        """Take what has been answered since the last call, without waiting."""
+        found = []
+        while not self._lines.empty():
+            found.append(self._lines.get())
+        return found
+
+    def wait(self) -> list[dict[str, Any]]:
+        """Wait for all answers."""
+        if self._thread is not None:
+            self._thread.join()
+        return self.answers()
+
+    def _run(
+        self, question: dict[str, Any], lines: queue.SimpleQueue[dict[str, Any]], dropped: threading.Event
+    ) -> None:
+        with RUNNING:
+            if dropped.is_set():
+                return
+            command = [sys.executable, "-m", "limitsets.face.explorer.work"]
+            process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            )
+            self._process = process
+            if dropped.is_set():  # between the two: nobody else would end it
+                process.kill()
+            late = threading.Timer(LONGEST, process.kill)
+            late.start()
+            try:
+                _answered(process, question, lines)
+            finally:
+                late.cancel()
+                process.kill()
+                process.wait()
+        lines.put({"done": True})
+
+
+def _answered(
+    process: subprocess.Popen[str], question: dict[str, Any], lines: queue.SimpleQueue[dict[str, Any]]
+) -> None:
+    assert process.stdin is not None  # they are pipes
+    assert process.stdout is not None
+    assert process.stderr is not None
+    with process.stdin, process.stdout, process.stderr:
+        try:
+            json.dump(question, process.stdin)
+            process.stdin.close()
+            for line in process.stdout:
+                lines.put(json.loads(line))
+        except (BrokenPipeError, ValueError):  # ended from outside, in the middle of a line
+            return
+        if process.wait() != 0:
+            lines.put({"error": "no answer: it took too long, or was given up"})
+
+
+# ----------------------------------------------------------------
+
+
+POINTS = 33
+"""Along each axis of an atlas that is computed for the page."""
+
+
+class AtlasPage:
+    """The atlas of one visitor.
+
+    Parameters
+    ----------
+    opened : callable
+        Told the quantities at a point that was clicked, with their units.
+    say : callable
+        Told what is wrong.
+    table : dict, optional
+        A stored one, as `limitsets.face.explorer.work.table_of` gives it.
+    """
+
+    def __init__(
+        self,
+        opened: Callable[[dict[str, str]], None],
+        say: Callable[[object], None],
+        table: dict[str, Any] | None,
+    ) -> None:
+        self._opened, self._say, self._asked = opened, say, Background()
+        self._table: dict[str, Any] | None = None
+        self._scene: Scene | None = None
+        self._knobs: tuple[Knob, ...] = ()
+        look: dict[str, Any] = {"stylesheets": [SLIDER]}
+        self._x = pn.widgets.Select(label="across", width=190, **look)
+        self._y = pn.widgets.Select(label="up", width=190, **look)
+        self._go = pn.widgets.Button(label=f"Compute {POINTS} x {POINTS} points", align="end", **look)
+        self._go.on_click(lambda _: self._compute())
+        self._words = Words(stylesheets=[SAID])
+        self._boxes = Layer("bars", "classes", columns=(*BOX, "face", "hatch", "words"))
+        words: dict[str, Any] = {"columns": ("x", "y", "words"), "align": "center", "size": 12, "plate": True}
+        self._numbers = Layer("words", "numbers", colour=style.INK, **words)
+        mark: dict[str, Any] = {"size": 16, "fill": "#ffffff", "line": style.INK, "width": 2}
+        self._here = Layer("marks", "here", shape="cross", **mark)
+        self._chosen = Layer(
+            "marks", "chosen", shape="square", **mark | {"fill": "#ffffff00", "line": style.FLIP}
+        )
+        layers = [self._boxes, self._numbers, self._here, self._chosen]
+        view = {"margins": MARGINS, "across": " ", "up": "", "keys": True}
+        self._canvas = Canvas("atlas", layers, 400, self._touched, stylesheets=[SLIDER], **view)
+        self._canvas.visible = False
+        self.column = pn.Card(
+            pn.FlexBox(self._x, self._y, self._go), self._canvas, self._words,
+            title="Atlas: where the topology changes; click a point to open that feeder",
+            collapsed=table is None, sizing_mode="stretch_width",
+        )  # fmt: skip
+        if table is not None:
+            self._show(table)
+
+    def follow(self, scene: Scene, knobs: tuple[Knob, ...]) -> None:
+        """Know which scene is shown."""
+        self._scene, self._knobs = scene, knobs
+        names = {knob.title: knob.name for knob in knobs}
+        if self._x.options != names:
+            self._x.options, self._y.options = names, names
+            chosen = [name for name in ("throw.speed", "throw.kappa") if name in names.values()]
+            self._x.value, self._y.value = chosen[0], "arm.surface_height"
+        self._mark()
+
+    def _compute(self) -> None:
+        if self._scene is None or self._x.value == self._y.value:
+            self._say(
+                "the two quantities of the atlas are the same; allowed: two different ones; choose another"
+            )
+            return
+        self._say("")
+        lines = {}
+        for word, name in (("x", self._x.value), ("y", self._y.value)):
+            knob = next(each for each in self._knobs if each.name == name)
+            lines[word] = f"{name}={written(knob.lo, knob.unit)}:{written(knob.hi, knob.unit)}:{POINTS}"
+        self._words.object = '<p role="status">the atlas is being computed</p>'
+        self._asked.ask({"what": "atlas", "scene": dump(self._scene), **lines})
+
+    def tell(self) -> None:
+        """Show what has been answered."""
+        for line in self._asked.answers():
+            if "error" in line:
+                self._words.object = ""
+                self._say(line["error"])
+            elif "axes" in line:
+                self._show(line)
+
+    def _show(self, table: dict[str, Any]) -> None:
+        self._table = table
+        (x, y), numbers = table["axes"], np.array(table["numbers"])
+        across, up = (edges(np.array(axis["values"])) for axis in (x, y))
+        looks = {each["number"]: each for each in table["classes"]}
+        shown = np.argwhere(np.isin(numbers, list(looks)))
+        i, j = shown.T
+        kinds = [looks[int(each)] for each in numbers[i, j]]
+        self._boxes.data = {
+            "left": across[j].tolist(), "right": across[j + 1].tolist(),
+            "bottom": up[i].tolist(), "top": up[i + 1].tolist(),
+            "face": [_colour(each["facecolor"]) for each in kinds],
+            "hatch": [pattern(each["hatch"]) for each in kinds],
+            "words": [each["words"] for each in kinds],
+        }  # fmt: skip
+        marks = [(k + 1, numbers == each["number"]) for k, each in enumerate(table["classes"])]
+        places = [(k, *_middle(where)) for k, where in marks if where.any()]
+        self._numbers.data = {
+            "x": [x["values"][column] for _, _, column in places],
+            "y": [y["values"][row] for _, row, _ in places],
+            "words": [str(k) for k, _, _ in places],
+        }
+        names = (f"{axis['name']} [{axis['unit']}]" for axis in (x, y))
+        view = {"x": [float(across[0]), float(across[-1])], "y": [float(up[0]), float(up[-1])]}
+        self._canvas.view |= {**view, **dict(zip(("across", "up"), names, strict=True))}
+        self._canvas.heading = "atlas: arrow keys choose a point, Enter opens it"
+        self._canvas.visible = True
+        rows = "".join(
+            f"<tr><td>{swatch(_colour(each['facecolor']), pattern(each['hatch']))}{k + 1}</td>"
+            f"<td>{escape(each['words'])}</td><td>{100 * each['share']:.3g} %</td></tr>"
+            for k, each in enumerate(table["classes"][:12])
+        )
+        self._words.object = f'<table class="said">{rows}</table><p class="how">estimated, not proved</p>'
+        self._chosen.data = {"x": [], "y": []}
+        self._mark()
+        self._canvas.send()
+
+    def _mark(self) -> None:
+        """Show where the scene on the page is, if the atlas knows of such a place."""
+        if self._table is None or self._scene is None:
+            return
+        values = {knob.name: knob for knob in self._knobs}
+        names = [axis["name"] for axis in self._table["axes"]]
+        if all(
+            name in values and values[name].unit == axis["unit"]
+            for name, axis in zip(names, self._table["axes"], strict=True)
+        ):
+            x, y = (values[name].value for name in names)
+            self._here.data = {"x": [x], "y": [y]}
+        self._canvas.send()
+
+    def _touched(self, hand: Hand) -> None:
+        """Open the point that is tapped; keys say steps from point to point instead of a place."""
+        if self._table is None:
+            return
+        axes = [np.array(axis["values"]) for axis in self._table["axes"]]
+        at = [layer.data[axis][0] for layer in (self._chosen, self._here) if layer.data["x"] for axis in "xy"]
+        if hand.what == "tap":
+            at = [hand.x, hand.y]
+        elif not at:  # the scene on the page is not in this atlas
+            at = [float(values.mean()) for values in axes]
+        numbers = [int(np.abs(values - each).argmin()) for values, each in zip(axes, at, strict=False)]
+        if hand.what == "step":
+            numbers = [
+                min(max(number + int(by), 0), values.size - 1)
+                for number, by, values in zip(numbers, (hand.x, hand.y), axes, strict=True)
+            ]
+        x, y = (float(values[number]) for values, number in zip(axes, numbers, strict=True))
+        if hand.what == "step":
+            self._chosen.data = {"x": [x], "y": [y]}
+            self._canvas.send()
+        elif hand.what in ("tap", "enter"):
+            self._chosen.data = {"x": [], "y": []}
+            places = zip(self._table["axes"], (x, y), strict=True)
+            self._opened({axis["name"]: written(value, axis["unit"]) for axis, value in places})
+
+    def close(self) -> None:
+        """End what is still being computed."""
+        self._asked.stop()
+
+
+BOX = ("left", "right", "bottom", "top")
+MARGINS = (64, 12, 40, 38)
+
+
+def _middle(where: Any) -> tuple[int, int]:
+    """Give the point of a region that is farthest from its edge."""
+    room = distance_transform_edt(np.pad(where, 1))[1:-1, 1:-1]
+    row, column = np.unravel_index(int(room.argmax()), room.shape)
+    return int(row), int(column)
+
+
+def _colour(face: Any) -> str:
+    """Give a face of the figures as the web writes it."""
+    return face if isinstance(face, str) else "#" + "".join(f"{round(255 * each):02x}" for each in face)

@@ -1,0 +1,471 @@
+"""What follows the sliders: attractors, basins, critical points and the goal's threshold, in some 10 ms.
+
+Cells find what attracts and from where; the compiled loop of the atlas then finds the ends of each attractor to the
+last digits, where it can decide them.  Both are estimates: no rounding is enclosed, and images of cells are sampled.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from limitsets.base.errors import LimitsetsError, shown
+from limitsets.feeder.geometry import side_ends
+from limitsets.feeder.geometry.polygon import above_side
+from limitsets.feeder.scene import Scene
+from limitsets.feeder.scene.quantities import STANDARD_GRAVITY, find, text_at, unit_read
+from limitsets.feeder.scene.units import convert, parse, written
+from limitsets.systems.cells import Domain, grid
+from limitsets.systems.graph import transitions
+from limitsets.systems.maps import Orbit, critical_points, has_slope, kind_of, orbit
+from limitsets.systems.maps.pieces import stacked
+from limitsets.systems.sets import Attractor, Basins, attractors, basins
+from limitsets.systems.topology import Topologies, topologies
+from limitsets.systems.topology.work import DECIDED
+
+# ----------------------------------------------------------------
+# Knobs: the numbers of a scene, or of a map, that sliders move, and what follows from moving them.
+
+
+# Point masses that get sliders; more would be a table, not a picture.
+MOST_POINTS = 3
+STEPS = 400
+# Ends of the slider of a point mass, which cannot be 0.
+LIGHTEST, HEAVIEST = 0.1, 3.0
+
+
+class Knob(NamedTuple):
+    """A number that a slider moves.
+
+    Attributes
+    ----------
+    name : str
+        The quantity of the scene, or the field of the map's parameters.
+    words : str
+        What it is called.
+    unit : str
+        Its unit; empty for a map.
+    value, lo, hi : float
+        Where it stands, and the slider's ends, in this unit.
+    """
+
+    name: str
+    words: str
+    unit: str
+    value: float
+    lo: float
+    hi: float
+
+    @property
+    def step(self) -> float:
+        """What one press of an arrow key moves: a round number, some 400 of them from end to end."""
+        rough = (self.hi - self.lo) / STEPS
+        ten = 10.0 ** math.floor(math.log10(rough))
+        return float(f"{ten * min((1, 2, 5, 10), key=lambda each: abs(each * ten - rough)):.3g}")
+
+    def read(self, text: str) -> float:
+        """Read what is typed: a number in the knob's unit, or with a unit of its own.
+
+        Raises
+        ------
+        LimitsetsError
+            It is no such quantity.
+
+        Examples
+        --------
+        >>> Knob("throw.speed", "speed", "deg/s", 150.0, 100.0, 200.0).read("2.5 rad/s")
+        143.23...
+        """
+        words = text.strip()
+        try:
+            value = float(words)
+        except ValueError:
+            if not self.unit:
+                raise LimitsetsError(self.words, shown(words), "a number", "correct it") from None
+            value = convert(parse(words, find(self.name).dimension, key=self.name), self.unit)
+        if not math.isfinite(value):
+            raise LimitsetsError(self.words, shown(words), "a finite number", "correct it")
+        return value
+
+    @property
+    def title(self) -> str:
+        """Its name and unit."""
+        return f"{self.words} [{self.unit}]" if self.unit else self.words
+
+
+def knobs_of(scene: Scene) -> tuple[Knob, ...]:
+    """List the knobs of a scene: centre of mass or point masses, speed, height, tilt.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> [knob.words for knob in knobs_of(ls.load("paper-designed"))]
+    ['centre of mass, along', 'centre of mass, above', 'speed', 'height of the surface', 'tilt']
+    """
+    return (*_of_mass(scene), _of_throw(scene), _of_height(scene), *_of_gravity(scene))
+
+
+def _of_mass(scene: Scene) -> list[Knob]:
+    unit, tree = scene.unit, scene.text
+    if text_at(tree, "part.mass.center.along") is not None:
+        along, above = (scene.value(f"part.mass.center.{word}") for word in ("along", "above"))
+        side = tree["part"]["mass"]["center"]["side"]
+        left, right = side_ends(len(scene.vertices), side)
+        measured = [
+            above_side(scene.vertices[left], scene.vertices[right], corner) for corner in scene.vertices
+        ]
+        reach = [float(each[0]) for each in measured]
+        return [
+            Knob("part.mass.center.along", "centre of mass, along", unit, along, min(reach), max(reach)),
+            Knob(
+                "part.mass.center.above",
+                "centre of mass, above",
+                unit,
+                above,
+                0.0,
+                float(max(m[1] for m in measured)),
+            ),
+        ]
+    found = []
+    lo, hi = scene.vertices.min(axis=0), scene.vertices.max(axis=0)
+    for k in range(min(len(tree["part"]["mass"].get("points", [])), MOST_POINTS)):
+        for axis, word in enumerate("xy"):
+            name = f"part.mass.points[{k}].{word}"
+            ends = float(lo[axis]), float(hi[axis])
+            found.append(Knob(name, f"point mass {k}, {word}", unit, scene.value(name), *ends))
+        name = f"part.mass.points[{k}].mass"
+        text, own = text_at(tree, name), unit_read(tree, unit, name)
+        mass = convert(parse(text, "mass"), own)
+        found.append(Knob(name, f"point mass {k}, mass", own, mass, LIGHTEST * mass, HEAVIEST * mass))
+    return found
+
+
+def _of_throw(scene: Scene) -> Knob:
+    if scene.gravity is None:
+        return Knob("throw.kappa", "kappa", scene.unit, scene.kappa, 0.5 * scene.kappa, 1.5 * scene.kappa)
+    speed = math.degrees(scene.value("throw.speed"))
+    return Knob("throw.speed", "speed", "deg/s", speed, 0.7 * speed, 1.3 * speed)
+
+
+def _of_height(scene: Scene) -> Knob:
+    height, reach = scene.surface_height, 0.05 * scene.arm_length
+    lo, hi = min(-reach, 1.5 * height), max(reach, 1.5 * height)
+    return Knob("arm.surface_height", "height of the surface", scene.unit, height, lo, hi)
+
+
+def _of_gravity(scene: Scene) -> list[Knob]:
+    """Give the tilt of the table; none where gravity is unknown, or stronger than a tilt could make it."""
+    if scene.gravity is None:
+        return []
+    sine = scene.gravity / convert(parse(STANDARD_GRAVITY, "acceleration"), f"{scene.unit}/s^2")
+    if sine > 1.0 + 1e-9:
+        return []
+    return [Knob("gravity.tilt", "tilt", "deg", math.degrees(math.asin(min(sine, 1.0))), 5.0, 90.0)]
+
+
+def texts_of(knobs: tuple[Knob, ...], values: Mapping[str, float]) -> dict[str, str]:
+    """Write the values that differ from where the knobs stood, with their units."""
+    units = {knob.name: knob for knob in knobs}
+    return {
+        name: written(value, units[name].unit) for name, value in values.items() if value != units[name].value
+    }
+
+
+def scene_with(scene: Scene, knobs: tuple[Knob, ...], values: Mapping[str, float]) -> Scene:
+    """Give the scene with its knobs at other values; one that was not moved stays as it is written.
+
+    A tilt that is moved leaves the speed of the machine as it is, whether the scene gives a speed or kappa.
+
+    Raises
+    ------
+    SceneError
+        There is no such scene.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> scene = ls.load("paper-designed")
+    >>> scene_with(scene, knobs_of(scene), {"gravity.tilt": 90.0}).kappa  # twice the gravity of 30 deg
+    50.75...
+    """
+    texts = texts_of(knobs, values)
+    if "gravity.tilt" in texts and "throw.speed" not in texts:
+        texts["throw.speed"] = written(
+            next(each.value for each in knobs if each.name == "throw.speed"), "deg/s"
+        )
+    return scene.with_values(texts) if texts else scene
+
+
+def centre_at(scene: Scene, x: float, y: float) -> dict[str, float]:
+    """Say where a point of the part's frame is along and above the side from which the scene gives its centre of mass.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = centre_at(ls.load("paper-designed"), *ls.load("paper-designed").centre)
+    >>> [round(value, 6) for value in found.values()]
+    [4.225578, 0.708249]
+    """
+    left, right = side_ends(len(scene.vertices), scene.text["part"]["mass"]["center"]["side"])
+    along, above, _ = above_side(scene.vertices[left], scene.vertices[right], (x, y))
+    return {"part.mass.center.along": float(along), "part.mass.center.above": float(above)}
+
+
+def knobs_of_map(params: Any) -> tuple[Knob, ...]:
+    """List the numbers among a map's parameters.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> [(knob.name, knob.lo, knob.hi) for knob in knobs_of_map(maps.Henon())]
+    [('a', 0.7, 2.1), ('b', 0.15, 0.45)]
+    """
+    found = []
+    for name, value in zip(params._fields, params, strict=True):
+        if isinstance(value, float | int | np.floating):
+            ends = sorted((0.5 * float(value), 1.5 * float(value))) if value else [-1.0, 1.0]
+            found.append(Knob(name, name, "", float(value), round(ends[0], 9), round(ends[1], 9)))
+    return tuple(found)
+
+
+def map_with(params: Any, values: Mapping[str, float]) -> Any:
+    """Give the map with other parameters."""
+    return params._replace(**{name: float(value) for name, value in values.items()})
+
+
+# ----------------------------------------------------------------
+
+
+CELLS = 2048
+"""Cells per side."""
+
+# Of the orbits on which jogs are counted, and of the samples among which branches change.
+THROWS, SAMPLES = 2000, 512
+# Points of a map in the plane, from so many starts; what an orbit runs through first is left out.
+POINTS, STARTS, SKIP = 12_000, 8, 500
+# An orbit is gone that is so many sizes of the domain from its middle.
+FAR = 100.0
+
+Extents = dict[int, list[tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What is estimated of one map of one dimension.
+
+    Attributes
+    ----------
+    lo, hi : tuple of float
+        Where a part can rest on each side [length].
+    sets : tuple of dict
+        Per attractor its intervals by side.
+    bands : tuple of int
+        Per attractor how many intervals the compiled loop tells apart; 0 where it does not decide.
+    sharp : bool
+        Whether the points of cycles and the outermost ends of other attractors are those of the compiled loop;
+        otherwise ends are edges of cells.
+    orders : tuple
+        Per attractor the flip order, None where it changes.
+    shares : tuple of (int, float)
+        Of the starts, those of each label that occurs: a number of an attractor, or a code of an exit.
+    basins : tuple of (int, float, float, int)
+        Side, ends, label.
+    critical : tuple of (int, int, float)
+        Side, number on the side, x.
+    holds : bool or None
+        Whether the goal does; None where that is not decided, or there is no goal.
+    vacuous : bool
+        Whether it holds because nothing gets there.
+    threshold : float or None
+        Where the goal begins or ceases to hold.
+    """
+
+    lo: tuple[float, ...]
+    hi: tuple[float, ...]
+    sets: tuple[Extents, ...]
+    bands: tuple[int, ...]
+    sharp: bool
+    orders: tuple[tuple[int, ...] | None, ...]
+    shares: tuple[tuple[int, float], ...]
+    basins: tuple[tuple[int, float, float, int], ...]
+    critical: tuple[tuple[int, int, float], ...]
+    holds: bool | None = None
+    vacuous: bool = False
+    threshold: float | None = None
+
+
+def estimate(scene: Scene) -> Estimate:
+    """Estimate where the throws of a scene lead.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = estimate(ls.load("paper-designed"))
+    >>> found.holds, round(found.threshold, 4)
+    (True, 19.7527)
+    """
+    return _estimated(scene.map, scene.domain, scene)
+
+
+def estimate_of_map(params: Any, domain: Domain) -> Estimate:
+    """Estimate the same of any map of one dimension.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> from limitsets.cells import as_domain
+    >>> found = estimate_of_map(maps.Logistic(3.9), as_domain([(0, 1)]))
+    >>> [round(x, 4) for x in found.sets[0][0][0]]
+    [0.0951, 0.975]
+    """
+    return _estimated(params, domain, None)
+
+
+def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
+    graph = transitions(params, grid(domain, cells=CELLS))
+    found = attractors(graph, throws=THROWS)
+    split = basins(graph, found)
+    told = _told(params, domain, len(found))
+    sharpened = [_sharpened(each, params, told) for each in found]
+    sets = tuple(extents for extents, _ in sharpened)
+    goal: dict[str, Any] = {}
+    if scene is not None and scene.goal is not None:
+        from limitsets.parameters.analysis.checks import goal_outcome
+
+        outcome = goal_outcome(scene.goal, graph, found, split, sets)
+        goal = {"holds": outcome.holds, "vacuous": outcome.vacuous, "threshold": outcome.threshold}
+    labels, counts = np.unique(split.labels, return_inverse=True)
+    weight = np.bincount(counts, weights=graph.grid.measure) / graph.grid.measure.sum()
+    return Estimate(
+        tuple(domain.lo[:, 0].tolist()),
+        tuple(domain.hi[:, 0].tolist()),
+        sets,
+        tuple(bands for _, bands in sharpened),
+        told is not None,
+        tuple(each.flip_order for each in found),
+        tuple(zip(labels.tolist(), weight.tolist(), strict=True)),
+        tuple(_runs(split)),
+        tuple(
+            (side, number, point.x)
+            for side, points in critical_points(params, domain, samples=SAMPLES).items()
+            for number, point in enumerate(points)
+        ),
+        **goal,
+    )
+
+
+def _told(params: Any, domain: Domain, count: int) -> Topologies | None:
+    """Ask the compiled loop of the atlas; None where it does not decide, or counts other attractors."""
+    if not has_slope(params) or not count:
+        return None
+    anchor = None if domain.anchor is None else domain.anchor[None]
+    found = topologies(stacked([params]), domain.lo[:, 0][None], domain.hi[:, 0][None], anchor)
+    return found if found.undecided[0] == DECIDED and found.attractors[0] == count else None
+
+
+def _sharpened(attractor: Attractor, params: Any, told: Topologies | None) -> tuple[Extents, int]:
+    """Replace the cells of a cycle by its points, and move the outermost ends of other attractors to their own.
+
+    Both where they lie in the cells, which may join what are several intervals; how many these are, 0 if not known.
+    """
+    found = {side: list(parts) for side, parts in attractor.extents.items()}
+    for k in range(0 if told is None else int(told.attractors[0])):
+        assert told is not None  # the range is empty
+        lowest, reach, period = told.lowest[0, k], told.reach[0, k], int(told.period[0, k])
+        sides = [int(side) for side in np.flatnonzero(np.isfinite(lowest))]
+        if sides != sorted(found) or not all(
+            found[side][0][0] <= reach[side] and lowest[side] <= found[side][-1][1] for side in sides
+        ):
+            continue
+        if period:
+            cycle = orbit(params, float(told.start[0, k]), int(told.start_side[0, k]), period - 1)
+            points = {side: np.sort(cycle.x[cycle.side == side]).tolist() for side in sides}
+            return {side: [(x, x) for x in points[side]] for side in sides}, period
+        for side in sides:
+            found[side][0] = float(lowest[side]), found[side][0][1]
+            found[side][-1] = found[side][-1][0], float(reach[side])
+        return found, int(told.bands[0, k].sum())
+    return found, 0
+
+
+def _runs(split: Basins) -> list[tuple[int, float, float, int]]:
+    """Join cells of one label that lie side by side."""
+    found = []
+    for side in range(split.grid.sides):
+        edges, labels = split.grid.edges[side][0], split.labels[split.grid.of_side(side)]
+        if not labels.size:
+            continue
+        border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
+        for first, last in pairwise(border.tolist()):
+            found.append((side, float(edges[first]), float(edges[last]), int(labels[first])))
+    return found
+
+
+class Points(NamedTuple):
+    """Points of the attractors of a map of two or three dimensions.
+
+    Attributes
+    ----------
+    x : ndarray of shape (n, dimension)
+        Of the orbits that stay.
+    starts : int
+        How many orbits there were.
+    gone : dict of str to int
+        Where the others went, in words, and how many of them.
+    """
+
+    x: npt.NDArray[np.float64]
+    starts: int
+    gone: dict[str, int]
+
+
+def points_of_map(params: Any, domain: Domain) -> Points:
+    """Sample the attractors of a map of two or three dimensions by orbits from a few starts.
+
+    Orbits that leave are left out: no points where all of them do.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> from limitsets.cells import as_domain
+    >>> domain = as_domain(maps.domain_of(maps.Henon()))
+    >>> points_of_map(maps.Henon(), domain).x.shape[1]
+    2
+    >>> points_of_map(maps.Henon(2.0, 0.3), domain).gone
+    {'pass x_0 = -400': 8}
+    """
+    share = np.array([0.5 + 0.5 * math.cos(2.4 * k) * math.sqrt((k + 0.5) / STARTS) for k in range(STARTS)])
+    other = np.roll(share, 3)
+    found, gone = [np.empty((0, kind_of(params).dimension))], Counter[str]()
+    for side in range(domain.sides):
+        lo, hi = domain.lo[side], domain.hi[side]
+        for k in range(STARTS):
+            at = np.array([share[k], other[k], share[k]])[: domain.dimension]
+            path = orbit(params, lo + at * (hi - lo), side, SKIP + POINTS // STARTS)
+            fate = _fate(path, lo, hi)
+            if fate:
+                gone[fate] += 1
+            else:
+                found.append(path.x[SKIP:])
+    return Points(np.concatenate(found), STARTS * domain.sides, dict(gone))
+
+
+def _fate(path: Orbit, lo: npt.NDArray[np.float64], hi: npt.NDArray[np.float64]) -> str:
+    """Say where an orbit goes that does not stay within many times the size of where the map is looked at."""
+    far = (path.x - 0.5 * (lo + hi)) / (hi - lo)
+    gone = np.flatnonzero(~(np.abs(far) <= FAR).all(axis=1))
+    if not gone.size:
+        return "leave by an exit of the map" if path.stopped else ""
+    at = far[gone[0]]
+    if np.isnan(at).any():
+        return "come to an image that is no number"
+    axis = int(np.abs(at).argmax())
+    limit = 0.5 * (lo + hi)[axis] + math.copysign(FAR, at[axis]) * (hi - lo)[axis]
+    return f"pass x_{axis} = {limit:.6g}"

@@ -1,0 +1,383 @@
+"""The page of a scene: one visitor's sliders, pictures and answers, and what happens when they are touched.
+
+Everything that moves is done by `beat`, some sixty times a second: slider events only say that something has changed,
+so that a hand that is faster than the computation leaves no queue behind.
+"""
+
+from __future__ import annotations
+
+import io
+import time
+from typing import Any
+
+import panel as pn
+
+from limitsets.base.errors import LimitsetsError
+from limitsets.face.animation.film import Film, Pace
+from limitsets.face.animation.legs import require_start
+from limitsets.face.animation.thrown_scenes import film_of_throws
+from limitsets.face.explorer.answers import (
+    KEY,
+    Opening,
+    careful_line,
+    error_line,
+    estimate_words,
+    points_words,
+    proof_words,
+)
+from limitsets.face.explorer.atlas_page import AtlasPage, Background
+from limitsets.face.explorer.canvas import SAID, SLIDER, Hand, Sliders, Words
+from limitsets.face.explorer.estimates import (
+    centre_at,
+    estimate,
+    estimate_of_map,
+    knobs_of,
+    knobs_of_map,
+    map_with,
+    points_of_map,
+    scene_with,
+)
+from limitsets.face.explorer.pictures import ArmPicture, LanesPicture, PartPicture, PointsPicture
+from limitsets.face.explorer.work import within_reach
+from limitsets.feeder.scene import Scene, dump
+from limitsets.feeder.scene.left_out import Model
+from limitsets.systems.cells import Domain
+
+# ----------------------------------------------------------------
+# The page of a map: its parameters as sliders, and where it leads.
+
+
+WORDS = 0.25
+"""Seconds between two changes of the text."""
+
+
+class MapPage:
+    """What one visitor sees of a map.
+
+    Parameters
+    ----------
+    params : NamedTuple
+        The map's parameters.
+    domain : Domain
+        Where it is looked at.
+    """
+
+    def __init__(self, params: Any, domain: Domain) -> None:
+        self._params, self._domain, self._dirty = params, domain, True
+        wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
+        self._error, self._said = Words(error_line(""), stylesheets=[SAID]), Words(stylesheets=[SAID])
+        self.sliders = Sliders(self._moved, self.say)
+        self.sliders.open(knobs_of_map(params))
+        self.lanes = LanesPicture() if domain.dimension == 1 else None
+        self.points = None if self.lanes else PointsPicture(domain.lo[0].tolist(), domain.hi[0].tolist())
+        shown = self.lanes or self.points
+        assert shown is not None  # it is one of the two
+        self._shown = shown
+        self._refit, self._told, self._wrote, self._words = True, False, -1.0, ""
+        self.beat()
+        title = Words(f"<h1>limitsets: {type(params).__name__}</h1>", stylesheets=[SAID])
+        controls = pn.Column(self.sliders.column, styles={"flex": "1 1 300px", "min-width": "0"}, **wide)
+        pictures = pn.Column(
+            self._shown.canvas,
+            self._said,
+            styles={"flex": "3 1 330px", "min-width": "0"},
+            **wide,
+        )
+        self.layout = pn.Column(title, self._error, pn.FlexBox(controls, pictures, **wide), **wide)
+
+    def say(self, error: object = "") -> None:
+        """Show one line of what is wrong, or take it away."""
+        self._error.object = error_line(error)
+
+    def _moved(self) -> None:
+        self._dirty = True
+
+    def beat(self) -> None:
+        """Draw what has changed."""
+        if not self._told and time.monotonic() - self._wrote > WORDS:
+            self._told, self._wrote = True, time.monotonic()
+            self.sliders.tell()
+            self._said.object = self._words
+        if not self._dirty:
+            return
+        self._dirty, self._told = False, False
+        try:
+            params = map_with(self._params, self.sliders.values)
+            if self.lanes is None:
+                assert self.points is not None  # it is one of the two
+                points = points_of_map(params, self._domain)
+                self.points.show(points.x)
+                self._words = points_words(points)
+            else:
+                found = estimate_of_map(params, self._domain)
+                if self._refit:
+                    self.lanes.frame(found, "")
+                    self._refit = False
+                self.lanes.show(found)
+                self._words = estimate_words(found, None, "")
+        except LimitsetsError as error:
+            self.say(error)
+        else:
+            self.say()
+        self._shown.canvas.send()
+
+    def close(self) -> None:
+        """Nothing is being computed."""
+
+
+# ----------------------------------------------------------------
+
+
+RESTS = 0.6
+"""Seconds after which a slider that is not moved rests."""
+
+
+THROWS, FPS, SLOW = 6, 20.0, 2.0
+BEING = "being computed; the first proof on a machine also compiles, for a minute or more"
+MARGINS = "margins are being computed"
+SAVE: dict[str, Any] = {"stylesheets": [SLIDER], "sizing_mode": "stretch_width"}
+
+
+class ScenePage:
+    """What one visitor sees of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Where it begins.
+    atlas : dict, optional
+        Of a stored atlas, as `limitsets.face.explorer.work.table_of` gives it.
+    """
+
+    def __init__(self, scene: Scene, atlas: dict[str, Any] | None = None) -> None:
+        self._first = within_reach(scene)
+        self._proofs = Background()
+        self._lines: list[dict[str, Any]] = []
+        self._film: Film | None = None
+        self._began = 0.0
+        self._wrote, self._told = -1.0, True
+        self._holding = False
+        self.part, self.arm = PartPicture(self._on_part), ArmPicture()
+        self.lanes = LanesPicture(self._on_lanes)
+        self.sliders = Sliders(self._moved, self.say)
+        self.opening = Opening(self.open, self._draw, self.say)
+        self.atlas = AtlasPage(self._at_point, self.say, atlas)
+        self._error = Words(error_line(""), stylesheets=[SAID])
+        self._title, self._careful, self._estimated, self._proved = (
+            Words(stylesheets=[SAID]) for _ in range(4)
+        )
+        self._x = pn.widgets.FloatInput(label="start x", value=0.0, width=110, stylesheets=[SLIDER])
+        self._side = pn.widgets.Select(label="side", options=[0], width=80, stylesheets=[SLIDER])
+        self._toml = pn.widgets.FileDownload(
+            callback=lambda: io.StringIO(dump(self.scene)),
+            filename="scene.toml",
+            label="Save the scene (TOML)",
+            **SAVE,
+        )
+        self.open(scene)
+        self.beat()
+        self.layout = self._laid_out()
+
+    # ------------------------------------------------------------ what is shown
+
+    def _laid_out(self) -> pn.viewable.Viewable:
+        wide: dict[str, Any] = {"sizing_mode": "stretch_width", "gap": "0 18px"}
+        throw = pn.widgets.Button(label="Throw", color="primary", width=80, align="end", stylesheets=[SLIDER])
+        throw.on_click(lambda _: self.throw(self._x.value, self._side.value))
+        reset = pn.widgets.Button(label="Back to the first scene", stylesheets=[SLIDER])
+        reset.on_click(lambda _: self.open(self._first))
+        svg = pn.widgets.FileDownload(
+            callback=self._svg, filename="limit-set.svg", label="Save the figure (SVG)", **SAVE
+        )
+
+        def part(*shown: Any, room: str) -> pn.Column:
+            return pn.Column(*shown, styles={"flex": room, "min-width": "0"}, sizing_mode="stretch_width")
+
+        key = Words(KEY, stylesheets=[SAID])
+        start = pn.Row(self._x, self._side, throw)
+        return pn.Column(
+            self._title,
+            self._error,
+            pn.FlexBox(
+                part(self.sliders.column, start, room="1 1 300px"),
+                part(self.lanes.canvas, key, room="2 1 340px"),
+                **wide,
+            ),
+            pn.FlexBox(
+                part(self.arm.canvas, room="2 1 330px"),
+                part(self.part.canvas, room="1 1 220px"),
+                part(reset, self._toml, svg, self.opening.column, room="1 1 300px"),
+                **wide,
+            ),
+            pn.FlexBox(  # a line that comes or goes moves nothing that a hand may be on
+                part(self._careful, self._estimated, room="1 1 330px"),
+                part(self._proved, room="1 1 330px"),
+                **wide,
+            ),
+            self.atlas.column,
+            sizing_mode="stretch_width",
+        )
+
+    @property
+    def _of(self) -> str:
+        """Of which model the page speaks, and which facts of the scene that leaves out."""
+        return Model.of(self.scene).line()
+
+    def say(self, error: object = "") -> None:
+        """Show one line of what is wrong, or take it away."""
+        self._error.object = error_line(error)
+
+    # ------------------------------------------------------------ what happens
+
+    def open(self, scene: Scene) -> None:
+        """Begin with a scene."""
+        self.base, self.scene = scene, scene
+        self.sliders.open(knobs_of(scene))
+        self.opening.show(scene)
+        self._side.options = list(range(len(scene.sides)))
+        self.start: tuple[float, int] | None = None
+        self._refit = True
+        self._moved()
+
+    def _moved(self) -> None:
+        """Remember that something has changed; `beat` draws it."""
+        self._dirty, self._asked, self._last, self._film = True, False, time.monotonic(), None
+
+    def beat(self) -> None:
+        """Do what is due: draw what has changed, show the next frame of a film, ask for proofs, tell their answers."""
+        if self._dirty:
+            self._dirty = False
+            try:
+                self._redraw(scene_with(self.base, self.sliders.knobs, self.sliders.values))
+            except LimitsetsError as error:
+                self.say(error)
+        else:
+            if not self._asked and time.monotonic() - self._last > RESTS:
+                self._ask()
+            if self._film is not None:
+                number = min(int((time.monotonic() - self._began) * FPS), self._film.frames - 1)
+                self._show(self._film, number)
+        if not self._told and time.monotonic() - self._wrote > WORDS:
+            self._told, self._wrote = True, time.monotonic()
+            self.sliders.tell()
+            self._careful.object = careful_line(self._found, self.scene)
+            self._estimated.object = estimate_words(self._found, self.scene.goal, self.scene.unit, self._of)
+        for picture in (self.lanes, self.part, self.arm):
+            picture.canvas.send()
+        self._tell(self._proofs.answers())
+        self.atlas.tell()
+
+    def _redraw(self, scene: Scene) -> None:
+        found = estimate(scene)
+        self.scene = scene
+        self.say()
+        if self._refit:
+            self.lanes.frame(found, scene.unit)
+            self._title.object = (
+                f"<h1>limitsets: {scene.name}</h1>"  # a name of letters, digits, dots and dashes
+            )
+            self._refit = False
+        if not self._startable(scene):
+            side, parts = (
+                next(iter(found.sets[0].items())) if found.sets else (0, [(found.lo[0], found.hi[0])])
+            )
+            self.start = 0.5 * sum(parts[0]), side
+            self._x.value, self._side.value = round(self.start[0], 3), side
+        assert self.start is not None  # just chosen
+        self.part.show(scene)
+        self.arm.rest(scene, *self.start)
+        self.lanes.mark(*self.start)
+        self.lanes.show(found, scene)
+        self._found, self._told = found, False
+        self._proofs.stop()  # also where nothing is answered yet: an answer would be of another scene
+        self._lines = []
+        self._proved.object = proof_words([], (), "waits until the sliders rest", self._of)
+
+    def _startable(self, scene: Scene) -> bool:
+        try:
+            return self.start is not None and require_start(scene, self.start) is not None
+        except LimitsetsError:
+            return False
+
+    def _ask(self) -> None:
+        self._asked, self._lines = True, []
+        self.opening.show(self.scene)
+        self._toml.filename = f"{self.scene.name}.toml"
+        self.atlas.follow(self.scene, knobs_of(self.scene))
+        self._proved.object = proof_words([], (), BEING, self._of)
+        names = [knob.name for knob in self.sliders.knobs]
+        self._proofs.ask({"what": "proof", "scene": dump(self.scene), "margins": names})
+
+    def _tell(self, lines: list[dict[str, Any]]) -> None:
+        if lines:
+            self._lines += lines
+            claimed = any("claim" in line for line in self._lines)
+            state = "" if "done" in self._lines[-1] else MARGINS if claimed else BEING
+            self._proved.object = proof_words(self._lines, self.sliders.knobs, state, self._of)
+
+    def throw(self, x: float, side: int) -> None:
+        """Show throws from a start."""
+        try:
+            self.start = require_start(self.scene, (float(x), int(side)))
+            clock = "1/w" if self.scene.gravity is None else "s"
+            self._film = film_of_throws(self.scene, self.start, THROWS, Pace(FPS, SLOW, clock))
+        except (LimitsetsError, TypeError) as error:  # TypeError: an empty field
+            self.say(error)
+            return
+        self.say()
+        self._x.value, self._side.value = round(float(x), 3), int(side)
+        self._began = time.monotonic()
+        self.arm.begin(self._film)
+
+    def _show(self, film: Film, number: int) -> None:
+        self.arm.frame(film, number)
+        self.lanes.mark(*film.position[number].tolist())
+        if number == film.frames - 1:
+            self._film = None
+            last = film.rests[-1]
+            if film.position[number].tolist() == [
+                last.x,
+                last.side,
+            ]:  # it has not left: the arm is near again
+                self.arm.rest(self.scene, last.x, last.side)
+
+    def _on_lanes(self, hand: Hand) -> None:
+        if hand.what == "tap":
+            self.throw(hand.x, round(-hand.y))
+
+    def _on_part(self, hand: Hand) -> None:
+        """Move the centre of mass with a hand that began on its mark; a tap is a corner, while a part is drawn."""
+        if hand.what == "tap":
+            self.opening.corner(hand.x, hand.y)
+        elif hand.what == "grasp":
+            self._holding = self.sliders.has_centre and self.part.is_at_mark(hand.x, hand.y)
+        elif hand.what == "release":
+            self._holding = False
+        elif self._holding:
+            self.sliders.put(centre_at(self.scene, hand.x, hand.y))
+
+    def _draw(self, corners: list[tuple[float, float]], drawing: bool) -> None:
+        self.part.sketch(corners)
+        self.part.show(self.scene)
+        if drawing:
+            self.part.canvas.heading = "click the corners in turn"
+
+    def _at_point(self, values: dict[str, str]) -> None:
+        """Open the feeder at a point of the atlas."""
+        try:
+            self.open(self.base.with_values(values))
+        except LimitsetsError as error:
+            self.say(error)
+
+    def _svg(self) -> io.BytesIO:
+        from limitsets.face.plot import limit_set
+
+        found, written = estimate(self.scene), io.BytesIO()
+        limit_set(self.scene, found.sets).savefig(written, format="svg")
+        written.seek(0)
+        return written
+
+    def close(self) -> None:
+        """End what is still being computed."""
+        self._proofs.stop()
+        self.atlas.close()

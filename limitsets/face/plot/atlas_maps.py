@@ -1,0 +1,401 @@
+"""Maps of an atlas: the classes of its points, with a legend in words.
+
+The colour of a class comes from the class alone, so it is the same in every picture: the structure of the attractors
+gives the face, ways out a hatch.  Faces come back after seven, lighter; neighbours are told apart by a line and by the
+number of their line in the legend, which stands in the largest region of each class.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+from matplotlib.patheffects import Normal, Stroke, withTickedStroke
+from scipy.ndimage import distance_transform_edt, label
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
+from limitsets.face.plot import style
+from limitsets.parameters.atlas.classes import (
+    UNDECIDED,
+    AttractorKind,
+    Entry,
+    is_classified,
+    legend,
+    named_class,
+    numbers_of,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from limitsets.parameters.atlas import Atlas
+
+
+# ----------------------------------------------------------------
+# What the pictures of an atlas share: axes, pixels about the points, hatches, and the mark of the scene itself.
+
+
+def title_of(found: Atlas) -> str:
+    """Name what is varied."""
+    return str(found.dataset.attrs.get("title", "")).removeprefix("atlas of ")
+
+
+# Hatch of points at which no part gets to the X of the goal: another than those of the classes in `atlas_maps`.
+UNREACHED = "oo"
+
+
+def frame(found: Atlas, tall: float = 0.0) -> tuple[Figure, Axes]:
+    """Make a figure with its axes labelled, flat where one quantity varies, but at least so tall [inches]."""
+    names = found.axes
+    figure, (axes,) = style.canvas(10.2, max(5.4 if len(names) == 2 else 2.6, tall))
+    axes.set_xlabel(_with_unit(found, names[-1]))
+    if len(names) == 2:
+        axes.set_ylabel(_with_unit(found, names[0]))
+    x, y = pixels(found)
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(y[0], y[-1])
+    return figure, axes
+
+
+def _with_unit(found: Atlas, name: str) -> str:
+    unit = found.dataset[name].attrs.get("units", "")
+    return f"{name} [{unit}]" if unit else name
+
+
+def edges(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Give the edges of pixels about values: half way between them."""
+    if values.size == 1:
+        return np.array([values[0] - 0.5, values[0] + 0.5])
+    middle = 0.5 * (values[1:] + values[:-1])
+    return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
+
+
+def pixels(found: Atlas) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Edges of the pixels along x and along y."""
+    data, names = found.dataset, found.axes
+    across = edges(data[names[-1]].values)
+    return across, edges(data[names[0]].values) if len(names) == 2 else np.array([0.0, 1.0])
+
+
+def hatched(
+    axes: Axes,
+    x: npt.NDArray[np.float64],
+    y: npt.NDArray[np.float64],
+    where: npt.NDArray[np.bool_],
+    hatch: str,
+) -> None:
+    """Hatch pixels, given their edges."""
+    if not where.any():
+        return
+    # a box for each row of neighbours: contours would cut the corners of pixels
+    vertices: list[tuple[float, float]] = []
+    for i, row in enumerate(where):
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], row, [False]]).astype(np.int8)))
+        for a, b in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
+            vertices += [(x[a], y[i]), (x[b], y[i]), (x[b], y[i + 1]), (x[a], y[i + 1]), (x[a], y[i])]
+    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY] * (len(vertices) // 5)
+    axes.add_patch(
+        PathPatch(
+            Path(vertices, codes), facecolor="none", edgecolor=style.INK, hatch=hatch, lw=0.0, zorder=2, alpha=0.55,
+            hatch_linewidth=0.5,
+        )
+    )  # fmt: skip
+
+
+def goal_line(axes: Axes, found: Atlas) -> list[Any]:
+    """Draw where the scene's goal begins or ceases to hold, ticks where it fails; the entry of a legend."""
+    data = found.dataset
+    if "threshold" not in data:
+        return []
+    from limitsets.feeder.goals import OrientedBeyond
+
+    goal = _goal_of(found)
+    over = (data["threshold"].values - goal.x) * (1 if isinstance(goal, OrientedBeyond) else -1)
+    fails = over[np.isfinite(over)] > 0.0
+    if fails.all() or not fails.any():
+        word = "fails" if fails.any() else "holds"
+        return (
+            [Patch(label=f"the goal {word} wherever there is a limit set", alpha=0.0)] if fails.size else []
+        )
+    ticks: dict[str, Any] = {"spacing": 8.0, "length": 0.6}
+    looks = [Stroke(linewidth=3.2, foreground="white"), Normal()]
+    names = found.axes
+    if len(names) == 2:
+        xs, ys = (data[name].values for name in reversed(names))
+        line = axes.contour(
+            xs, ys, np.ma.masked_invalid(over), [0.0], colors=style.GOAL, linewidths=1.6, zorder=4
+        )
+        # a contour has the higher values on its left
+        line.set(path_effects=[*looks, withTickedStroke(angle=90, **ticks)], gid="goal")
+    else:
+        x = data[names[0]].values
+        both = np.isfinite(over[1:]) & np.isfinite(over[:-1])
+        for k in np.flatnonzero(both & ((over[1:] > 0.0) != (over[:-1] > 0.0))).tolist():
+            at = x[k] - over[k] * (x[k + 1] - x[k]) / (over[k + 1] - over[k])
+            angle = -90 if over[k + 1] > over[k] else 90
+            effects = [*looks, withTickedStroke(angle=angle, **ticks)]
+            axes.axvline(at, color=style.GOAL, lw=1.6, zorder=4, gid="goal", path_effects=effects)
+    ticked = [withTickedStroke(angle=-90, **ticks)]
+    return [
+        style.key("the goal fails on the side of the ticks", color=style.GOAL, lw=1.6, path_effects=ticked)
+    ]
+
+
+def _goal_of(found: Atlas) -> Any:
+    """Read the goal of an atlas that says thresholds: only these two kinds have one."""
+    from limitsets.feeder.goals import OrientedBeyond, Reaches
+    from limitsets.feeder.scene import load
+
+    goal = load(found.dataset.attrs["scene"]).goal
+    assert isinstance(goal, OrientedBeyond | Reaches)
+    return goal
+
+
+def unreached(axes: Axes, found: Atlas) -> list[Any]:
+    """Hatch where no part gets to the goal's X: a goal that asks of parts beyond X holds there of none.
+
+    Returns the entry of a legend.
+    """
+    data = found.dataset
+    if "threshold" not in data or "reach" not in data:
+        return []
+    goal = _goal_of(found)
+    reach = np.where(np.isnan(data["reach"].values), -np.inf, data["reach"].values)
+    farthest = reach.reshape(*data["threshold"].shape, -1, reach.shape[-1]).max(axis=(-2, -1))
+    none = np.isfinite(farthest) & (farthest <= goal.x)
+    if not none.any():
+        return []
+    hatched(axes, *pixels(found), np.atleast_2d(none), UNREACHED)
+    return [
+        Patch(
+            label=f"no part gets to x = {goal.x:g}", hatch=UNREACHED, fill=False, edgecolor=style.INK, lw=0.5
+        )
+    ]
+
+
+def mark(axes: Axes, found: Atlas) -> list[Any]:
+    """Mark the scene or map itself, if it lies in the window; the entry of a legend."""
+    values = []
+    for name in found.axes:
+        value, given = _value_of(found, name), found.dataset[name].values
+        if value is None or not given[0] <= value <= given[-1]:
+            return []
+        values.append(value)
+    look: dict[str, Any] = {
+        "marker": "*",
+        "ms": 13.0,
+        "mfc": "white",
+        "mec": style.INK,
+        "mew": 1.0,
+        "ls": "none",
+    }
+    x, y = values[-1], values[0] if len(values) == 2 else 0.15
+    axes.plot([x], [y], zorder=6, gid="design", **look)
+    numbers = ", ".join(f"{value:.6g}" for value in reversed(values))
+    return [style.key(f"{title_of(found)}: {numbers}", **look)]
+
+
+def _value_of(found: Atlas, name: str) -> float | None:
+    """Return the value of a quantity in the scene or map that is varied, in the unit of its axis."""
+    data, plan = found.dataset, found.dataset.attrs["plan"]
+    if "scene" not in plan:
+        value = plan.get("parameters", {}).get(name)
+        return float(value) if isinstance(value, int | float) else None
+    from limitsets.feeder.scene import load
+    from limitsets.feeder.scene.quantities import base_unit, find
+    from limitsets.feeder.scene.units import exact_factor
+
+    scene = load(data.attrs["scene"])
+    base = base_unit(find(name).dimension, scene.unit)
+    return scene.value(name) / float(exact_factor(data[name].attrs.get("units", ""), base))
+
+
+# ----------------------------------------------------------------
+
+
+# Paul Tol's light scheme, made for areas and colour-blind readers, without its orange; a cycle's face.
+FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#99DDFF", "#BBCC33", "#AAAA00")
+# Bands that no cycle is are darker by this share of ink; without an attractor these, by what every start does.
+DARKER = 0.16
+# Shares of white of classes with the same face: other bands by side, another order, seven bands more.
+LIGHTER = (0.0, 0.32, 0.58)
+ALL_LEAVE, ALL_COLLAPSE, NEITHER_ALL = "#EE9A62", "#6A4C93", "#F6D9C4"
+DOUBT, DOUBT_HATCH = "#B4B4B4", "xxxx"
+LEAVE_HATCH, COLLAPSE_HATCH = "////", "...."
+MOST_LINES = 12
+# What a line of the legend, and the room below an entry, take [inches].
+LINE, GAP = 0.145, 0.13
+# Beyond so many edges between pixels lines would hide what they part.
+MOST_EDGES = 12_000
+# Least room around a number, as a share of the points along the shorter axis.
+ROOM = 0.025
+
+
+def look_of(number: int, name: str) -> dict[str, Any]:
+    """Return face and hatch of a class.
+
+    Examples
+    --------
+    >>> look_of(0, "undecided")
+    {'facecolor': '#B4B4B4', 'hatch': 'xxxx'}
+    >>> look_of(1, "bands:3,order:0,period:3;leaves:some;collapses:none")
+    {'facecolor': (0.4667, 0.6667, 0.8667), 'hatch': '////'}
+    """
+    if number == UNDECIDED:
+        return {"facecolor": DOUBT, "hatch": DOUBT_HATCH}
+    found = named_class(name)
+    hatch = LEAVE_HATCH * (found.leaves == "some") + COLLAPSE_HATCH * (found.collapses == "some")
+    if not found.attractors:
+        face = {found.leaves: ALL_LEAVE, found.collapses: ALL_COLLAPSE}.get("all", NEITHER_ALL)
+        return {"facecolor": face, "hatch": hatch}
+    parts = sum(sum(each.bands) for each in found.attractors)
+    share = 0.0 if any(each.period for each in found.attractors) else DARKER
+    lap, hue = divmod(parts + 2 * len(found.attractors) - 3, len(FACES))
+    light = LIGHTER[(lap + sum(map(_spread, found.attractors))) % len(LIGHTER)]
+    colour = (1.0 - share) * np.array(to_rgb(FACES[hue])) + share * np.array(to_rgb(style.INK))
+    mixed = (1.0 - light) * colour + light
+    return {"facecolor": tuple(round(each, 4) for each in mixed.tolist()), "hatch": hatch}
+
+
+def _spread(kind: AttractorKind) -> int:
+    """Give a small number that tells attractors of as many bands apart: by sides, and by the order of these."""
+    order = kind.flip_order
+    turned = 2 if order is None else int(order != tuple(sorted(order)))
+    return turned + sum(side * bands for side, bands in enumerate(kind.bands))
+
+
+@arguments_checked
+def atlas(found: Atlas) -> Figure:
+    """Draw the classes of an atlas of one or two axes, with a legend in words, most frequent classes first.
+
+    Parameters
+    ----------
+    found : Atlas
+        From `limitsets.atlas`, with the variable `class`, or those of which classes are made.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Shares in the legend are of the points at which there is a scene or map.
+
+    Raises
+    ------
+    AnswerError
+        It says nothing of classes.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = ls.atlas(ls.maps.Logistic(3.2), "r=3.2:3.84:3", domain=[(0, 1)])
+    >>> for text in ls.plot.atlas(found).legends[0].get_texts()[:3]:
+    ...     print(text.get_text())
+    1: one attractor, a cycle of 2 (33 %)
+    2: one attractor, a cycle of 3 (33 %)
+    3: one attractor, a cycle of 4 (33 %)
+    """
+    data = found.dataset
+    if not is_classified(data):
+        raise AnswerError(
+            "the atlas",
+            ", ".join(map(str, data)),
+            "one with the variable class, which the task of the topology gives",
+            "draw what a task of your own says with ls.plot.atlas_surface",
+        )
+    numbers, _ = numbers_of(data)
+    entries = legend(data)
+    looks = {each.number: look_of(each.number, each.name) for each in entries}
+    doubt = [each for each in entries if each.number == UNDECIDED]
+    sure = entries[: len(entries) - len(doubt)]
+    lines, rest = sure[:MOST_LINES] + doubt, sure[MOST_LINES:]
+    words = [_words(k + 1, each) for k, each in enumerate(lines)]
+    figure, axes = frame(found, 1.1 + sum(LINE * (1 + text.count("\n")) + GAP for text in words))
+    if len(found.axes) == 1:
+        axes.set_yticks([])
+    rows = np.atleast_2d(numbers)
+    _paint(axes, found, rows, looks)
+    goal = goal_line(axes, found) + unreached(axes, found)
+    for k, each in enumerate(lines):
+        _label(axes, found, rows == each.number, str(k + 1))
+    handles = [
+        Patch(label=text, edgecolor=style.INK, lw=0.5, **looks[each.number])
+        for text, each in zip(words, lines, strict=True)
+    ]
+    if rest:
+        share = _percent(sum(each.share for each in rest))
+        handles.append(Patch(label=f"{len(rest)} other class{'es' * (len(rest) > 1)} ({share})", alpha=0.0))
+    handles += goal + mark(axes, found)
+    figure.legend(
+        handles=handles, loc="outside right upper", fontsize=style.SMALL, frameon=False, handlelength=2.4,
+        handleheight=1.6, labelspacing=0.9, borderaxespad=0.8,
+    )  # fmt: skip
+    computed = ""
+    if "level" in data:
+        computed = f"; {_percent(float((data['level'].values >= 0).mean()))} of the points computed"
+    axes.set_title(
+        f"{title_of(found)}: topology of the attractors{computed}", loc="left", fontsize=style.TEXT + 1
+    )
+    return figure
+
+
+def _percent(share: float) -> str:
+    percent = 100.0 * share
+    digits = ".0f" if percent >= 9.95 else ".1f" if percent >= 0.05 else ".1g"
+    return f"{percent:{digits}} %"
+
+
+def _words(number: int, entry: Entry) -> str:
+    share = _percent(entry.share).replace(" ", "\N{NO-BREAK SPACE}")  # on one line
+    lines = textwrap.wrap(f"{number}: {entry.words} ({share})", 46, subsequent_indent="   ")
+    return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def _paint(
+    axes: Axes, found: Atlas, rows: npt.NDArray[np.int64], looks: Mapping[int, dict[str, Any]]
+) -> None:
+    """Paint the classes, their hatches, and lines between them."""
+    x, y = pixels(found)
+    picture = np.ones((*rows.shape, 3))
+    for number, look in looks.items():
+        picture[rows == number] = to_rgb(look["facecolor"])
+    axes.pcolorfast(x, y, picture, zorder=1)
+    for hatch in {look["hatch"] for look in looks.values()} - {""}:
+        numbers = [number for number, look in looks.items() if look["hatch"] == hatch]
+        hatched(axes, x, y, np.isin(rows, numbers), hatch)
+    across, along = np.nonzero(rows[:, 1:] != rows[:, :-1]), np.nonzero(rows[1:] != rows[:-1])
+    if across[0].size + along[0].size <= MOST_EDGES:
+        i, j = across
+        lines = [np.stack([x[j + 1], y[i], x[j + 1], y[i + 1]], axis=1)]
+        i, j = along
+        lines.append(np.stack([x[j], y[i + 1], x[j + 1], y[i + 1]], axis=1))
+        pairs = np.concatenate(lines).reshape(-1, 2, 2)
+        axes.add_collection(
+            LineCollection(list(pairs), colors=style.INK, linewidths=0.5, zorder=3, gid="boundaries"),
+            autolim=False,
+        )
+
+
+def _label(axes: Axes, found: Atlas, where: npt.NDArray[np.bool_], words: str) -> None:
+    """Write the number of a class into its largest region, as far from the region's edge as can be."""
+    if len(found.axes) == 1:
+        where = np.repeat(where, max(where.size // 4, 3), axis=0)
+    regions, count = label(where)
+    if count == 0:
+        return
+    largest = regions == 1 + np.bincount(regions.ravel())[1:].argmax()
+    room = distance_transform_edt(np.pad(largest, 1))[1:-1, 1:-1]
+    i, j = np.unravel_index(room.argmax(), room.shape)
+    if room[i, j] < max(ROOM * min(where.shape), 1.5):
+        return
+    x = float(found.dataset[found.axes[-1]].values[j])
+    y = float(found.dataset[found.axes[0]].values[i]) if len(found.axes) == 2 else 0.5
+    box = {"boxstyle": "circle,pad=0.22", "fc": "white", "ec": style.INK, "lw": 0.5, "alpha": 0.92}
+    axes.text(x, y, words, ha="center", va="center", fontsize=style.SMALL, bbox=box, zorder=5, gid="number")

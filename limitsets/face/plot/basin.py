@@ -1,0 +1,324 @@
+"""Basins: strips per side in one dimension, pictures of the plane in two."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import networkx as nx
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.patches import FancyArrowPatch, Patch
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
+from limitsets.face.plot import style
+from limitsets.feeder.scene import Scene
+from limitsets.systems.cells import CellSet, Grid
+from limitsets.systems.graph import TransitionGraph, morse_graph
+from limitsets.systems.maps import codes, kind_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.typing import ColorType
+
+    from limitsets.systems.sets import Basins
+
+
+# Lightness falls, so that neighbours differ in grey as well; hatches tell them apart in strips.
+ATTRACTORS = ("#CFE5F5", "#F0B429", "#5FB59B", "#B5548A", "#3F4E96", "#2B2A1E")
+HATCHES = ("", "///", "...", "\\\\\\", "xxx", "+++")
+EDGE: dict[str, Any] = {"edgecolor": "#444444", "lw": 0.4}
+OUT: dict[int, tuple[str, str, str]] = {
+    codes.INWARD: ("#6E6E6E", "ooo", "leaves inward"),
+    codes.OUTWARD: ("#3A3A3A", "", "leaves outward"),
+    codes.OUTSIDE_MODEL: ("#A8A8A8", "***", "outside the model"),
+    codes.UNDECIDED: ("#FFFFFF", "|||||", "undecided"),
+    codes.UNDEFINED: ("#E4D7C5", "ooo...", "the map is undefined"),
+}
+
+
+@arguments_checked
+def basins(source: Any, shares: Basins, found: Any = None) -> Figure:
+    """Draw from where each attractor is reached.
+
+    Parameters
+    ----------
+    source : Scene, TransitionGraph, map or Grid
+        What the basins belong to; a scene gives names and units, a map of one's own or its graph a name.
+    shares : Basins
+        From `limitsets.basins`, in one or two dimensions.
+    found : attractors, limit sets, one of them, or an Analysis, optional
+        Drawn dark inside their basins: as bars, in two dimensions as the cells of attractors.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    AnswerError
+        For basins in three dimensions, or something without extents (in two dimensions: without cells).
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> analysis = ls.analyse("paper-designed")
+    >>> len(ls.plot.basins(analysis.scene, analysis.basins).axes)
+    1
+    """
+    grid = shares.grid
+    if grid.dimension > 2:
+        remedy = "draw a section of them yourself"
+        raise AnswerError("the dimension of the basins", grid.dimension, "1 or 2", remedy)
+    (name, unit), cells = _words(source), list[CellSet]()
+    if grid.dimension == 1:
+        figure = _strips(shares, [] if found is None else style.extents_of(found), unit)
+    else:
+        cells = [] if found is None else _cells_of(found)
+        figure = _plane(shares, cells)
+    style.title(figure, f"Basins{name}: where a start ends up")
+    handles = _legend(shares)
+    if (found is not None and grid.dimension == 1) or any(cells):
+        shown = style.INK if grid.dimension == 1 else style.FLIP
+        handles.append(Patch(facecolor=shown, label="the limit set itself"))
+    style.legend(figure, handles, 3 if figure.get_figwidth() > 8.0 else 2)
+    return figure
+
+
+def _words(source: Any) -> tuple[str, str]:
+    """Say whose basins they are, and the unit of x in brackets."""
+    if isinstance(source, Scene):
+        return f" of {source.name}", f" [{source.unit}]"
+    if isinstance(source, Grid):
+        return "", ""
+    return f" of {kind_of(getattr(source, 'map', source)).name}", ""
+
+
+def _cells_of(found: Any) -> list[CellSet]:
+    """Read sets of cells off attractors, or one of them."""
+    several = found if isinstance(found, Iterable) else [found]
+    cells = [getattr(each, "cells", None) for each in several]
+    known = [each for each in cells if isinstance(each, CellSet)]
+    if len(known) < len(cells):
+        raise AnswerError("what to draw", type(found).__name__, "attractors", "pass those of ls.attractors")
+    return known
+
+
+def _look(label: int) -> dict[str, Any]:
+    number = label % len(ATTRACTORS)
+    face, hatch = OUT[label][:2] if label < 0 else (ATTRACTORS[number], HATCHES[number])
+    return {"facecolor": face, "hatch": hatch, **EDGE}
+
+
+def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
+    grid = shares.grid
+    figure, (axes,) = style.canvas(9.0, 0.72 * grid.sides + 1.7)
+    for side in range(grid.sides):
+        edges, labels = grid.edges[side][0], shares.labels[grid.of_side(side)]
+        if not labels.size:
+            continue
+        border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
+        for first, last in pairwise(border.tolist()):
+            label, ends = int(labels[first]), (float(edges[first]), float(edges[last]))
+            style.bar(axes, *ends, -side, 0.32, gid=f"label {label}", **_look(label))
+        for extents in sets:
+            for lo, hi in extents.get(side, ()):
+                style.bar(axes, lo, hi, -side, 0.07, facecolor=style.INK, lw=0, zorder=3, gid="attractor")
+    axes.set_yticks([-side for side in range(grid.sides)], [f"side {side}" for side in range(grid.sides)])
+    axes.set_ylim(-grid.sides + 0.5, 0.5)
+    lo, hi = float(grid.domain.lo.min()), float(grid.domain.hi.max())
+    axes.set_xlim(lo - 0.01 * (hi - lo), hi + 0.01 * (hi - lo))
+    axes.set_xlabel(f"x of the start{unit}")
+    style.lanes(axes)
+    return figure
+
+
+def _plane(shares: Basins, attractors: list[CellSet]) -> Figure:
+    grid = shares.grid
+    figure, panels = style.canvas(4.6 * grid.sides + 0.6, 5.2, 1, grid.sides)
+    kinds = sorted(set(shares.labels.tolist()))
+    colours: list[ColorType] = [_look(kind)["facecolor"] for kind in kinds]
+    number = np.searchsorted(kinds, shares.labels)
+    norm = BoundaryNorm(np.arange(len(kinds) + 1) - 0.5, len(kinds))
+    for side, axes in enumerate(panels):
+        picture = number[grid.of_side(side)].reshape(tuple(grid.shape[side]))
+        axes.pcolormesh(
+            *grid.edges[side], picture.T, cmap=ListedColormap(colours), norm=norm, rasterized=True
+        )
+        for each in attractors:
+            inside = each.mask[grid.of_side(side)].reshape(tuple(grid.shape[side]))
+            axes.pcolormesh(
+                *grid.edges[side], np.ma.masked_where(~inside, inside).T, cmap=ListedColormap([style.FLIP]),
+                rasterized=True, gid="attractor",
+            )  # fmt: skip
+        axes.set_xlabel("$x_0$")
+        axes.set_ylabel("$x_1$")
+        if grid.sides > 1:
+            axes.set_title(f"side {side}", fontsize=style.TEXT)
+    return figure
+
+
+def _legend(shares: Basins) -> list[Patch]:
+    texts = {
+        k: f"to limit set {k}: {_percent(share)} of all starts"
+        for k, share in enumerate(shares.attractors[: len(ATTRACTORS)])
+    }
+    parts = {codes.UNDECIDED: shares.undecided_between}
+    names = {name: code for code, name in codes.NAMES.items()}
+    parts |= {names.get(name, codes.OUTSIDE): share for name, share in shares.exits.items()}
+    present = set(shares.labels.tolist())
+    for label, share in sorted(parts.items(), reverse=True):
+        if label in present:
+            way = (
+                "leaves the domain" if label == codes.OUTSIDE and "outside" in shares.exits else OUT[label][2]
+            )
+            texts[label] = f"{way}: {_percent(share)}"
+    plain = {} if shares.grid.dimension == 1 else {"hatch": ""}  # the picture of the plane has none
+    return [Patch(label=text, **{**_look(label), **plain}) for label, text in texts.items()]
+
+
+def _percent(share: float) -> str:
+    """Round to a tenth, but never to all or nothing."""
+    percent = 100 * share
+    if percent >= 100 - 1e-9 or percent == 0:
+        return f"{percent:.0f} %"
+    return "> 99.9 %" if percent > 99.9 else "< 0.1 %" if percent < 0.1 else f"{percent:.1f} %"
+
+
+# ----------------------------------------------------------------
+# The Morse graph: recurrent sets in layers, each above its successors.
+
+
+# More nodes than this cannot be told apart: the attracting and the largest are drawn, the title says how many are not.
+MOST = 12
+Place = tuple[float, float]
+
+
+@arguments_checked
+def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = "") -> Figure:
+    """Draw recurrent components and the order among them.
+
+    Parameters
+    ----------
+    graph : networkx.DiGraph or TransitionGraph
+        From `limitsets.morse_graph`, or the transition graph itself.
+    name : str
+        Whose it is, for the title.
+    unit : str
+        Of x, behind the intervals.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid([(-1.2, 1.2)], cells=100), method="corners")
+    >>> "2 attracting" in ls.plot.morse(graph).axes[0].get_title(loc="left")
+    True
+    """
+    whole = morse_graph(graph) if isinstance(graph, TransitionGraph) else graph
+    drawn = _condensed(whole)
+    place = _places(drawn)
+    depth = round(max((y for _, y in place.values()), default=0))
+    widest = max((sum(1 for _, y in place.values() if y == layer) for layer in range(depth + 1)), default=1)
+    few = len(place) <= 6
+    wide, tall = 3.0 if few else 1.4, max(0.7, min(1.45, 9.0 / (depth + 1)))
+    figure, (axes,) = style.canvas(min(16.0, max(7.0, wide * widest + 1.0)), tall * (depth + 1) + 1.2)
+    for one, other in drawn.edges:
+        _arrow(axes, place[one], place[other], dotted=isinstance(other, str))
+    for node, (x, y) in place.items():
+        _node(axes, node, drawn.nodes[node], x, y, few=few, unit=unit)
+    axes.set_xlim(-0.5 * max(widest, 2) - 0.1, 0.5 * max(widest, 2) + 0.1)
+    axes.set_ylim(-0.72, depth + 0.55)
+    axes.set_axis_off()
+    axes.set_title(_title(whole, drawn, name), fontsize=style.TEXT + 1, loc="left")
+    figure.supxlabel(
+        "Arrows lead down the order. Areas grow with the number of cells; a double border: attracting.",
+        fontsize=style.SMALL,
+    )
+    return figure
+
+
+def _condensed(whole: nx.DiGraph[int]) -> nx.DiGraph[Any]:
+    """Keep at most `MOST` nodes and the order among them; ways out become nodes named after them."""
+    rank = sorted(
+        whole.nodes, key=lambda node: (-whole.nodes[node]["attracting"], -whole.nodes[node]["cells"])
+    )
+    kept = set(rank[:MOST])
+    order: nx.DiGraph[Any] = nx.DiGraph()
+    order.add_nodes_from((node, whole.nodes[node]) for node in sorted(kept))
+    for node in kept:
+        order.add_edges_from((node, other) for other in nx.descendants(whole, node) & kept)
+        order.add_edges_from((node, way) for way in whole.nodes[node]["exits"])
+    drawn = nx.transitive_reduction(order)
+    drawn.add_nodes_from(order.nodes(data=True))
+    return drawn
+
+
+def _places(drawn: nx.DiGraph[Any]) -> dict[Any, Place]:
+    """Height: the longest way down; across: side by side, in the middle of what they lead to."""
+    place: dict[Any, Place] = {}
+    order = {node: number for number, node in enumerate(drawn)}
+
+    def pull(node: Any) -> tuple[float, int]:
+        below = [place[other][0] for other in drawn.successors(node)]
+        return sum(below) / len(below) if below else 0.0, order[node]
+
+    for layer, nodes in enumerate(nx.topological_generations(drawn.reverse(copy=False))):
+        for k, node in enumerate(sorted(nodes, key=pull)):
+            place[node] = (k - 0.5 * (len(nodes) - 1), float(layer))
+    return place
+
+
+def _radius(cells: int) -> float:
+    """Radius in points: the area grows with the root of the number of cells, so that small sets stay visible."""
+    return 7.0 + 17.0 * math.sqrt(math.sqrt(min(cells / 200_000, 1.0)))
+
+
+def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, few: bool, unit: str) -> None:
+    if isinstance(node, str):
+        axes.plot([x], [y], "s", ms=16, mfc="white", mec=style.FAINT, ls="none", gid="exit")
+        style.note(axes, f"leaves:\n{node}", (x, y), (0, -13), ha="center", va="top")
+        return
+    size = 2 * _radius(data["cells"])
+    circle: dict[str, Any] = {"marker": "o", "mec": style.INK, "mew": 1.2, "ls": "none"}
+    face, gid = (style.SETS[0][0], "attracting") if data["attracting"] else ("white", "recurrent")
+    axes.plot([x], [y], ms=size, mfc=face, gid=gid, **circle)
+    if data["attracting"]:
+        axes.plot([x], [y], ms=size + 6, mfc="none", gid="border", **circle)
+    axes.annotate(str(node), (x, y), ha="center", va="center", fontsize=style.SMALL)
+    lines = [f"{data['cells']} cell{'' if data['cells'] == 1 else 's'}"]
+    if few:
+        members = data.get("members")  # a graph made elsewhere has intervals only
+        axes_of = range(1 if members is None else members.grid.dimension)
+        along = [data["extents"], *(data["members"].extents(axis) for axis in axes_of[1:])]
+        sides = members is None or members.grid.sides > 1  # a map without sides says nothing of side 0
+        every = [(side, axis, parts) for axis in axes_of for side, parts in along[axis].items()]
+        for side, axis, parts in every:
+            shown = ", ".join(f"{lo:z.2f} to {hi:z.2f}" for lo, hi in parts[:2])
+            words = [f"side {side}:"] * sides + [f"$x_{axis}$"] * (len(axes_of) > 1)
+            lines.append(f"{' '.join([*words, shown])}{' ...' if len(parts) > 2 else ''} {unit}".rstrip())
+    # An arrow to a way out may run behind the words.
+    box = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
+    style.note(axes, "\n".join(lines), (x, y), (size / 2 + 7, 0), va="center", bbox=box, gid="words")
+
+
+def _arrow(axes: Axes, start: Place, end: Place, *, dotted: bool) -> None:
+    head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 11, "shrinkA": 13, "shrinkB": 16}
+    line: dict[str, Any] = {"color": "#555555", "lw": 1.0, "ls": ":" if dotted else "-"}
+    axes.add_patch(FancyArrowPatch(start, end, **head, **line))
+
+
+def _title(whole: nx.DiGraph[int], drawn: nx.DiGraph[Any], name: str) -> str:
+    attracting = sum(data["attracting"] for _, data in whole.nodes(data=True))
+    sets = whole.number_of_nodes()
+    owner = f" of {name}" if name else ""
+    text = f"Morse graph{owner}: {sets} recurrent set{'' if sets == 1 else 's'}, {attracting} attracting"
+    hidden = sets - sum(not isinstance(node, str) for node in drawn)
+    return f"{text}\n({hidden} of the smallest are not drawn)" if hidden else text

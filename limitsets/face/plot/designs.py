@@ -1,0 +1,239 @@
+"""The path of a design: limit sets and critical points of its scenes (Fig. 6 of the paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
+from limitsets.face.plot import style
+from limitsets.face.plot.style import Extents
+from limitsets.parameters.margins.margin_result import bound
+from limitsets.systems.maps import critical_points
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+    from limitsets.feeder.scene import Scene
+    from limitsets.parameters.design import Design, RobustDesign
+
+
+HALF = 0.3  # half the height of a bar; lanes are 1 apart
+MOST = 12  # scenes that are drawn: start, design, and of those between evenly many
+GAP = 0.9  # between the lanes of one scene and the next, beside the 1
+# A second attractor of the same scene.
+ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
+
+
+@arguments_checked
+def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Figure:
+    """Draw the limit sets of the scenes on a design's path, one group of bars per scene, one bar row per side.
+
+    Of more than twelve scenes start, design and evenly many of the steps between are drawn.
+
+    Parameters
+    ----------
+    found : Design
+        From `limitsets.design`; with `stages` its path moves the critical points evenly.
+    sets : sequence, optional
+        What `limitsets.inverse.limit_sets_along` gave; computed otherwise.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> vary = ["part.mass.center.along", "part.mass.center.above", "throw.speed"]
+    >>> figure = ls.plot.design(ls.design("paper-initial", critical_points=[10, 10, 20], vary=vary, stages=2))
+    >>> [label.get_text() for label in figure.axes[0].get_yticklabels()][:3]
+    ['side 0', 'side 1', 'side 2']
+    """
+    if sets is None:
+        from limitsets.parameters.design import limit_sets_along
+
+        sets = limit_sets_along(found)
+    count, rows = len(found.start.sides), min(len(found.path), MOST)
+    steps = np.linspace(0, len(found.path) - 1, rows).round().astype(int).tolist()
+    drawn = [sets[step] for step in steps]
+    deep = count + GAP
+    figure, (axes,) = style.canvas(9.4, 0.27 * deep * rows + 1.75)
+    ticks = []
+    for row, (step, attractors) in enumerate(zip(steps, drawn, strict=True)):
+        scene, top = found.path[step], -deep * row
+        ticks += [top - side for side in range(count)]
+        _lanes(axes, scene, top)
+        for number, extents in enumerate(attractors):
+            for side, parts in extents.items():
+                look = ANOTHER if number else style.of_set(side)
+                for lo, hi in parts:
+                    style.bar(axes, lo, hi, top - side, HALF, lw=0.8, zorder=2, gid="limit set", **look)
+        _marks(axes, scene, top)
+        _words(axes, found, scene, step, top - 0.5 * (count - 1))
+    axes.set_yticks(
+        ticks, [f"side {side}" for _ in range(rows) for side in range(count)], fontsize=style.SMALL
+    )
+    _frame(axes, found, drawn, deep * rows)
+    several = max((len(attractors) for attractors in drawn), default=1) > 1
+    some = f"\n({rows} of {len(found.path)} scenes are drawn)" if rows < len(found.path) else ""
+    style.title(figure, f"{found.start.name}: limit sets while the critical points move{some}")
+    style.legend(figure, _legend(found, count, several), 5)
+    return figure
+
+
+def _lanes(axes: Axes, scene: Scene, top: float) -> None:
+    for side, a in enumerate(scene.sides.a.tolist()):
+        axes.plot([a, scene.arm_length], [top - side] * 2, color=style.FAINT, lw=0.6, zorder=1)
+
+
+def _marks(axes: Axes, scene: Scene, top: float) -> None:
+    """Mark every critical point; the first of a side is the one that is designed."""
+    for side, points in critical_points(scene.bare_map, scene.domain).items():
+        for number, point in enumerate(points):
+            look: dict[str, Any] = {"lw": 2.2, "gid": "critical point"}
+            if number:
+                look = {"lw": 1.0, "ls": (0, (1, 1)), "gid": "further critical point"}
+            ends = [top - side - 0.43, top - side + 0.43]
+            axes.plot([point.x] * 2, ends, color=style.FLIP, zorder=4, **look)
+
+
+def _words(axes: Axes, found: Design, scene: Scene, step: int, middle: float) -> None:
+    """Say beside each scene what its quantities are."""
+    head = "start" if step == 0 else "design" if step == len(found.path) - 1 else f"step {step}"
+    values = []
+    for name in found.jacobian.names[:4]:
+        if name.startswith("throw."):
+            values.append(f"$\\kappa$ = {scene.kappa:.4g} {scene.unit}")
+        else:
+            unit = found.quantities()[name][2]
+            values.append(f"{name.split('.')[-1].replace('_', ' ')} = {scene.value(name):.4g} {unit}")
+    how: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "gid": "words"}
+    style.note(axes, "\n".join([head, *values]), (1.0, middle), (6, 0), fontsize=style.SMALL - 1.0, **how)
+
+
+def _frame(axes: Axes, found: Design, sets: Sequence[Sequence[Extents]], depth: float) -> None:
+    ends = [x for row in sets for x in style.ends_of(row)]
+    ends += [x for x in (*found.before.x.tolist(), *found.jacobian.x.tolist()) if x <= found.start.arm_length]
+    lo, hi = min(ends, default=0.0), max(ends, default=found.start.arm_length)
+    room = 0.05 * (hi - lo)
+    axes.set_xlim(max(lo - room, 0.0), hi + room)
+    axes.set_ylim(-depth + GAP + 0.1, 0.8)
+    axes.set_xlabel(f"x of the centre of mass from the joint [{found.start.unit}]")
+    style.lanes(axes)
+    style.goal(axes, found.start, zorder=3)
+
+
+def _legend(found: Design, count: int, several: bool) -> list[Any]:
+    sides = [Patch(label=f"limit set on side {k}", lw=0.8, **style.of_set(k)) for k in range(count)]
+    another = [Patch(label="another limit set", **ANOTHER)] if several else []
+    mark = style.key("first critical point", color=style.FLIP, marker="|", ms=10, mew=2.2, ls="")
+    return [*sides, *another, mark, *style.key_of_goal(found.start)]
+
+
+# ----------------------------------------------------------------
+# A robust design: margin against throws to feed, and the share of each quantity of the tolerance.
+
+
+BEFORE, AFTER = "#6E6E6E", style.JOG
+# Bars of the scene before, apart from the design's also in grey.
+PALE = "#D6D6D6"
+# What is drawn of the quantities' names: the last word says which it is.
+MOST_ROWS = 12
+
+
+@arguments_checked
+def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: float | None = None) -> Figure:
+    """Draw the front of margin against throws to feed, and the cost of each quantity before and after.
+
+    Parameters
+    ----------
+    found : RobustDesign
+        From `limitsets.inverse.robust_design`.
+    wanted : float, optional
+        A margin that was wanted, a factor on the tolerance, as a line.
+    bound : float, optional
+        A margin that no design can have, a factor on the tolerance, as a line.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    AnswerError
+        There is no front to draw.
+    """
+    if not found.front:
+        raise AnswerError("the front", "empty", "one design at least", "look at more designs")
+    figure, (left, right) = style.canvas(11.5, 5.4, columns=2, width_ratios=[1.6, 1.0])
+    handles = _front(left, found)
+    for value, text, line in ((wanted, "wanted", "--"), (bound, "no part rests beyond", ":")):
+        if value is not None:
+            left.axvline(value, color=style.INK, ls=line, lw=1.0)
+            how: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "ha": "right", "va": "top"}
+            style.note(left, f"{text}\n{value:.2f}", (value, 0.98), (-4, 0), fontsize=9, **how)
+    _costs(right, found)
+    style.legend(figure, handles, 3)
+    style.title(figure, f"{found.before.name}: what the margin costs")
+    return figure
+
+
+def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
+    margins = [option.candidate.found.margin for option in found.front]
+    means = np.array([option.feeding.mean for option in found.front])
+    late = np.array([option.feeding.quantile_95 for option in found.front])
+    axes.vlines(margins, means, late, color=AFTER, lw=0.8, alpha=0.6)
+    look: dict[str, Any] = {"color": AFTER, "marker": "o", "ms": 4.0, "lw": 0.8}
+    axes.plot(margins, means, **look)
+    handles = [style.key("designs that none beats, sampled", **look)]
+    points = [
+        (found.before_margins, found.before_sampled, found.before_feeding, BEFORE, "s", "the scene before"),
+        (found.margins, found.sampled, found.feeding, style.FLIP, "D", "the design"),
+    ]
+    for margins_of, sampled, feeding, colour, marker, label in points:
+        if sampled is None or feeding is None:
+            continue
+        axes.vlines(sampled.margin, feeding.mean, feeding.quantile_95, color=colour, lw=0.8, alpha=0.6)
+        axes.plot(sampled.margin, feeding.mean, color=colour, marker=marker, ms=7.0, ls="none")
+        said = label
+        for one in margins_of:
+            axes.plot([one.proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.0, alpha=0.4)
+            said += f"\n{one.goals[0].kind.replace('_', ' ')}: proved to {bound(one.proved)}"
+        handles.append(style.key(said, color=colour, marker=marker, ms=7.0, lw=2.5))
+    axes.set_xlabel("joint margin, as a factor of the tolerance")
+    axes.set_ylabel("throws to feed from random starts")
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(ScalarFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_title("throws: mean, and 95 % at the end of each line", loc="left", fontsize=10)
+    return handles
+
+
+def _costs(axes: Axes, found: RobustDesign) -> None:
+    """Draw how much of the room between threshold and reach one tolerance of each quantity takes."""
+    names = list(found.sampled.effects)[:MOST_ROWS]
+    rows = np.arange(len(names))
+    for sampled, colour, shift, label in (
+        (found.before_sampled, BEFORE, -0.19, "before"),
+        (found.sampled, style.FLIP, 0.19, "design"),
+    ):
+        if sampled is None or not sampled.effects:
+            continue
+        room = sampled.reach - sampled.threshold
+        costs = [100.0 * sum(sampled.effects[name]) / room for name in names]
+        face = colour if colour != BEFORE else PALE
+        axes.barh(rows + shift, costs, height=0.36, facecolor=face, edgecolor=colour, label=label)
+    axes.set_yticks(rows, [name.removeprefix("part.mass.").removeprefix("part.") for name in names])
+    axes.invert_yaxis()
+    axes.set_xlabel("% of the room for X that one tolerance takes")
+    axes.set_title("what limits it", loc="left", fontsize=10)
+    axes.legend(loc="lower right", fontsize=9)

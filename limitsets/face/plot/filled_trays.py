@@ -1,0 +1,231 @@
+"""Trays in pictures: how a part lies in a depression, how depressions fill, what a kick does, what is remembered."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.patches import Polygon
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.face.plot import style
+from limitsets.face.plot.throwing import about_centre, turned
+from limitsets.parameters.noise.sampling import binomial_interval
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from limitsets.cell.trays import TrayFill
+    from limitsets.feeder.engine.depression import Pose
+
+
+# After so many points a curve has no more marks.
+MARKS = 9
+
+
+@arguments_checked
+def tray(found: TrayFill) -> Figure:
+    """Draw how a tray's depressions fill.
+
+    Parameters
+    ----------
+    found : TrayFill
+        From `limitsets.tray`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Parts in a depression as they came to lie, one of each state; the fraction filled rightly against passes, by the
+        chain with its interval, in histories and of many parts at once, if there are any; what a part that comes by
+        leaves, and what endless passes; captures after misses and releases after kicks that were stood, or without
+        histories what a kick leaves.
+    """
+    figure, axes = style.canvas(10.4, 7.6, 2, 2)
+    _poses(axes[0], found)
+    _curve(axes[1], found)
+    _shares(axes[2], found)
+    (_memory if found.histories else _kicks)(axes[3], found)
+    sizes, unit = found.passes.tray, found.scene.unit
+    depth, kick = sizes.depression_depth, sizes.agitation
+    words = (
+        f"side {found.passes.side} wanted, depressions {depth:.4g} {unit} deep, agitation {kick:.4g} {unit}"
+    )
+    style.title(figure, f"{found.scene.name}: {words}")
+    return figure
+
+
+def _short(state: str) -> str:
+    """Shorten a state's name to fit beside a bar."""
+    return state.replace("leaning, vertex ", "leaning, P").replace(" lowest", "")
+
+
+def _placed(found: TrayFill, pose: Pose, share: float = 1.0) -> NDArray[np.float64]:
+    """Where the vertices are, or points on the way to them."""
+    corners = turned(share * about_centre(found.scene), pose.angle)
+    corners += pose.x, pose.y
+    return corners
+
+
+def _poses(axes: Axes, found: TrayFill) -> None:
+    """Draw a depression for each state, one below the other in two columns, with a part in it."""
+    plate, counts = found.passes.plate, found.counts
+    wide, tall = 2.0 * plate.size, 1.35 * plate.size
+    for number, state in enumerate(counts.met):
+        column, row = number % 2, number // 2
+        at = np.array([column * wide, -row * tall])
+        half, edge = 0.5 * plate.width, 0.46 * wide
+        line = [
+            (-edge, 0.0),
+            (-half, 0.0),
+            (-half, -plate.depth),
+            (half, -plate.depth),
+            (half, 0.0),
+            (edge, 0.0),
+        ]
+        axes.plot(*(np.array(line) + at).T, color=style.INK, lw=1.4)
+        good = state == counts.right
+        look = {"fc": "#9BD1B8", "ec": style.GOAL} if good else {"fc": "none", "ec": style.FLIP}
+        pose = counts.poses[state]
+        axes.add_patch(Polygon(_placed(found, pose) + at, closed=True, lw=1.3, **look))
+        for k, (x, y) in enumerate(_placed(found, pose, 0.55) + at):
+            axes.text(x, y, f"P{k}", fontsize=6.5, ha="center", va="center", color=style.FAINT)
+        words = f"{_short(counts.states[state])}{': right' if good else ''}"
+        axes.text(at[0] - edge, at[1] - plate.depth - 0.1 * tall, words, fontsize=style.SMALL, va="top")
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.set_axis_off()
+    axes.set_title("as parts came to lie, one of each state", loc="left", fontsize=style.TEXT)
+
+
+def _curve(axes: Axes, found: TrayFill) -> None:
+    filled = found.filled
+    passes = np.arange(filled.right.size)
+    axes.fill_between(passes, *filled.interval.T, color="#9BD1B8", alpha=0.5, lw=0)
+    axes.plot(passes, filled.right, color=style.GOAL, lw=1.5, label="chain, with its 95 % interval")
+    places = np.unique(np.geomspace(1, passes[-1], MARKS).round().astype(int))
+    looks = {False: ("o", style.INK, "a new part each pass"), True: ("s", style.FLIP, "parts return")}
+    for each in found.histories:
+        marker, colour, words = looks[each.returning]
+        shares, ends = each.filled[places], np.array([each.interval(int(k)) for k in places])
+        bars = np.abs(ends - shares[:, None]).T
+        shift = 1.06 if each.returning else 1.0
+        label = f"{each.after_pass.shape[0]} histories: {words}"
+        axes.errorbar(
+            places * shift, shares, bars, ls="", marker=marker, ms=4, lw=0.9, color=colour, label=label
+        )
+    _crowds(axes, found, places)
+    axes.set_xscale("symlog", linthresh=1.0)
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xlim(0.0, 1.3 * passes[-1])
+    axes.set_ylim(0.0, 1.0)
+    axes.set_title("filled rightly", loc="left", fontsize=style.TEXT)
+    axes.set_xlabel("passes", fontsize=style.SMALL)
+    axes.set_ylabel("fraction of the depressions", fontsize=style.SMALL)
+    axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
+    style.open_frame(axes)
+
+
+def _crowds(axes: Axes, found: TrayFill, places: NDArray[np.intp]) -> None:
+    """Draw many parts at once beside the chain of single ones, where they were asked for."""
+    chain = found.crowd_chain
+    if chain is not None and not np.array_equal(chain.right, found.filled.right):
+        words = f"chain, {found.crowds[0].parts / found.crowds[0].depressions:g} parts a pass and depression"
+        axes.plot(np.arange(chain.right.size), chain.right, color=style.GOAL, lw=1.2, ls="--", label=words)
+    for crowd in found.crowds:
+        colour, shift = (style.ROLL, 0.96) if crowd.between else (style.JOG, 1.04)
+        how = "push" if crowd.between else "pass through"
+        words = f"{crowd.parts} at once that {how} each other"
+        shown = [(crowd.right, colour, words)]
+        if crowd.between:
+            shown.append((crowd.right + crowd.covered, "white", "the same, also under others"))
+        for counts, face, label in shown:
+            shares, ends = (each[places] for each in crowd.share(counts))
+            axes.errorbar(
+                places * shift,
+                shares,
+                np.abs(ends - shares[:, None]).T,
+                ls="",
+                marker="^",
+                ms=4.5,
+                lw=0.9,
+                color=colour,
+                mfc=face,
+                label=label,
+            )
+
+
+def _shares(axes: Axes, found: TrayFill) -> None:
+    counts, filled = found.counts, found.filled
+    numbers = np.array([0, *counts.met])
+    of = int(counts.captured.sum())
+    first = counts.captured[numbers] / of
+    ends = np.array([binomial_interval(int(counts.captured[k]), of) for k in numbers])
+    at = np.arange(numbers.size)[::-1]
+    for shift, shares, edges, look, words in (
+        (0.2, first, ends, style.of_set(4), "of parts that come by"),
+        (-0.2, filled.last, filled.last_interval, style.of_set(0), "of depressions, after endless passes"),
+    ):
+        bars = np.abs(edges - shares[:, None]).T
+        axes.barh(at + shift, shares, 0.38, xerr=bars, label=words, error_kw={"lw": 0.9}, **look)
+    axes.set_yticks(at, [_short(name) for name in filled.states], fontsize=style.SMALL)
+    axes.get_yticklabels()[filled.number].set_color(style.GOAL)
+    axes.get_yticklabels()[filled.number].set_fontweight("bold")
+    axes.set_xlim(left=0.0)
+    axes.set_title("what is left in the depression (bold: right)", loc="left", fontsize=style.TEXT)
+    axes.set_xlabel("share", fontsize=style.SMALL)
+    axes.legend(fontsize=style.SMALL, frameon=False)
+    style.open_frame(axes)
+
+
+def _kicks(axes: Axes, found: TrayFill) -> None:
+    counts = found.counts
+    numbers = [0, *counts.met]
+    shares = counts.kicked[np.ix_(counts.met, numbers)].astype(float)
+    shares /= shares.sum(axis=1, keepdims=True)
+    _grid(
+        axes,
+        shares,
+        [_short(counts.states[k]) for k in counts.met],
+        [_short(counts.states[k]) for k in numbers],
+    )
+    axes.set_title("what one kick leaves (rows: before)", loc="left", fontsize=style.TEXT)
+    axes.tick_params(axis="x", rotation=35)
+
+
+def _memory(axes: Axes, found: TrayFill) -> None:
+    rows = [("captured rightly\nafter misses", "captures"), ("released\nafter kicks it stood", "releases")]
+    words, height = ("0", "1", "2 or more"), 0.0
+    ticks, names = [], []
+    for title, method in rows:
+        for past in range(3):
+            for each in found.histories:
+                count, of = getattr(each, method)()[past]
+                share = count / of if of else math.nan
+                low, high = binomial_interval(count, of) if of else (0.0, 1.0)
+                marker, colour = ("s", style.FLIP) if each.returning else ("o", style.INK)
+                at = height - (0.14 if each.returning else -0.14)
+                bars = np.array([[share - low], [high - share]])
+                axes.errorbar([share], [at], xerr=bars, marker=marker, ms=4.5, lw=1.0, color=colour)
+            ticks.append(height)
+            names.append(f"{title}: {words[past]}" if past == 0 else words[past])
+            height -= 1.0
+        height -= 0.5
+    axes.set_yticks(ticks, names, fontsize=style.SMALL)
+    axes.set_xlim(left=0.0)
+    axes.set_title("does it forget? dots: new parts, squares: parts return", loc="left", fontsize=style.TEXT)
+    axes.set_xlabel("share in the histories, with 95 % interval", fontsize=style.SMALL)
+    style.open_frame(axes)
+
+
+def _grid(axes: Axes, shares: NDArray[np.float64], rows: list[str], columns: list[str]) -> None:
+    """Draw shares as shades with their numbers."""
+    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    for row, column in np.ndindex(shares.shape):
+        value = shares[row, column]
+        colour = "white" if value > 0.6 else style.INK
+        axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=style.SMALL, color=colour)
+    axes.set_xticks(range(len(columns)), columns, fontsize=style.SMALL)
+    axes.set_yticks(range(len(rows)), rows, fontsize=style.SMALL)

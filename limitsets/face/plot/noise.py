@@ -1,0 +1,276 @@
+"""Figures of noise: density of the places of rest, number of throws, and the effect of the noise level."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
+from limitsets.face.plot import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from limitsets.parameters.fitting import Fit
+    from limitsets.parameters.noise.absorbing import NoisyClass
+    from limitsets.parameters.noise.sampling import SampledStatistics
+    from limitsets.parameters.noise.statistics import Levels, NoiseStatistics
+
+
+BAR = "#C9DCEA"
+LINES = ("-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 1.5, 1.2, 1.5)))
+COLOURS = (style.JOG, style.FLIP, style.ROLL, style.GOAL)
+# Shares below this are not drawn: a mark on the axis says where they are.
+LEAST = 1e-6
+# What numbers are called in a legend, and what their axis shows.
+WORDS = {
+    "wrong beyond": "of the rests beyond X",
+    "first beyond is wrong": "of the first rests beyond X",
+    "mean throws": "mean",
+    "95 % throws": "until 95 % of the starts are there",
+    "escape": "from the limit set, per throw",
+    "lost": "of the starts, before they are there",
+}
+
+
+def _main(found: NoiseStatistics) -> NoisyClass:
+    if not found.classes:
+        remedy = "nothing stays: nothing to draw"
+        raise AnswerError("the classes of the noisy scene", "none", "one at least", remedy)
+    return max(found.classes, key=lambda part: len(part.cells))
+
+
+def _plain(axes: Axes) -> None:
+    style.open_frame(axes)
+    axes.tick_params(labelsize=style.SMALL)
+
+
+@arguments_checked
+def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = None) -> Figure:
+    """Draw how often the part rests where, side by side, and beside it what many throws did.
+
+    Parameters
+    ----------
+    found : NoiseStatistics
+        From `limitsets.robust.noise_statistics`.
+    thrown : SampledStatistics, optional
+        From `limitsets.parameters.noise.sampling.throw_many`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel per side.
+    """
+    part = _main(found)
+    sides = sorted(part.sides)
+    figure, panels = style.canvas(3.5 * min(len(sides), 4) + 0.6, 3.4, 1, len(sides), sharey=True)
+    for side, axes in zip(sides, panels, strict=True):
+        (edges,) = found.grid.edges[side]
+        height = part.density[found.grid.of_side(side)]
+        if thrown is not None:
+            label = f"{thrown.throws:.0e} throws".replace("e+0", "e")
+            axes.stairs(thrown.density[side], thrown.bins[side], fill=True, color=BAR, label=label)
+        axes.stairs(height, edges, color=style.INK, lw=1.0, label="transfer operator")
+        some = np.flatnonzero(height > LEAST)
+        if some.size:
+            axes.set_xlim(*_widened(float(edges[some[0]]), float(edges[some[-1] + 1])))
+        label = f"X = {found.goal[0]:g} {found.unit}"
+        axes.axvline(found.goal[0], color=style.GOAL, lw=1.0, ls=(0, (4, 2)), label=label)
+        words = f"side {side}: {100 * part.sides[side]:.2f} % of the rests"
+        axes.set_title(words, loc="left", fontsize=style.TEXT)
+        axes.set_xlabel(f"x [{found.unit}]", fontsize=style.SMALL)
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        _plain(axes)
+    panels[0].set_ylabel(f"share of the rests per {found.unit}", fontsize=style.SMALL)
+    style.title(figure, f"{found.scene}: where the part rests under noise")
+    style.legend(figure, panels[-1].get_legend_handles_labels()[0], 3)
+    return figure
+
+
+def _widened(lo: float, hi: float) -> tuple[float, float]:
+    return lo - 0.04 * (hi - lo), hi + 0.04 * (hi - lo)
+
+
+@arguments_checked
+def noise_arrivals(found: NoiseStatistics, thrown: SampledStatistics | None = None) -> Figure:
+    """Draw how many throws it takes from random starts to the goal: shares, and what is still under way.
+
+    Parameters
+    ----------
+    found : NoiseStatistics
+        From `limitsets.robust.noise_statistics`.
+    thrown : SampledStatistics, optional
+        From `limitsets.parameters.noise.sampling.throw_many`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Left the share that arrives with each throw, right the share that has not arrived.
+    """
+    fed = found.feeding
+    last = (fed.quantile(0.999) or fed.arrived.size - 1) + 2
+    number = np.arange(min(last, fed.arrived.size))
+    figure, (left, right) = style.canvas(9.6, 3.7, 1, 2)
+    if thrown is not None and thrown.arrived.size:
+        counted = np.bincount(thrown.arrived, minlength=number.size) / thrown.parts
+        left.bar(number, counted[: number.size], width=1.0, color=BAR, label=f"{thrown.parts} parts thrown")
+        still = 1.0 - np.cumsum(counted)
+        right.step(number, still[: number.size], where="post", color="#7FA9C4", lw=3.0)
+    look: dict[str, Any] = {"color": style.INK, "lw": 1.0}
+    edges = np.arange(number.size + 1) - 0.5
+    left.stairs(fed.arrived[: number.size], edges, label="transfer operator", **look)
+    right.step(number, fed.survivors[: number.size], where="post", **look)
+    for axes in (left, right):
+        _marks(axes, found)
+        axes.set_xlabel("throws", fontsize=style.SMALL)
+        _plain(axes)
+    left.set_ylabel("share that arrives with this throw", fontsize=style.SMALL)
+    right.set_ylabel("share that has not yet arrived", fontsize=style.SMALL)
+    right.set_yscale("log")
+    right.set_ylim(5e-4, 1.2)
+    x, side = found.goal
+    words = f"throws from random starts to x > {x:g} {found.unit} on side {side}"
+    style.title(figure, f"{found.scene}: {words}")
+    style.legend(figure, left.get_legend_handles_labels()[0], 4)
+    return figure
+
+
+def _marks(axes: Axes, found: NoiseStatistics) -> None:
+    mean, most = found.feeding.mean, found.feeding.quantile(0.95)
+    if mean is not None:
+        axes.axvline(mean, color=style.FLIP, lw=1.2, label=f"mean {mean:.1f}")
+    if most is not None:
+        axes.axvline(most, color=style.GOAL, lw=1.2, ls=(0, (4, 2)), label=f"95 % after {most}")
+
+
+@arguments_checked
+def noise_levels(
+    levels: Levels, at: Mapping[str, float], shown: Mapping[str, Sequence[str]] | None = None
+) -> Figure:
+    """Draw numbers against the level of the noise.
+
+    Parameters
+    ----------
+    levels : Levels
+        From `limitsets.robust.noise_levels`.
+    at : mapping of str to float
+        One entry: what the axis shows, in words, and its value at a factor of 1: ``{"speed noise [%]": 0.5}``.
+    shown : mapping of str to sequence of str, optional
+        Panels: title, and the numbers in it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A panel each for what is wrongly oriented, the throws to the goal and what leaves; where shares are below 1e-6
+        there is an open mark on the axis.
+    """
+    (word, unit), *_ = at.items()
+    panels_of = shown or {
+        "on a wrong side": ("wrong beyond", "first beyond is wrong"),
+        "throws to the goal": ("mean throws", "95 % throws"),
+        "leave the arm": ("escape", "lost"),
+    }
+    figure, panels = style.canvas(3.6 * len(panels_of) + 0.4, 4.0, 1, len(panels_of))
+    for axes, (title, names) in zip(panels, panels_of.items(), strict=True):
+        _against_level(axes, levels, names, unit)
+        axes.set_title(title, loc="left", fontsize=style.TEXT)
+        axes.set_xlabel(word, fontsize=style.SMALL)
+        axes.set_xlim(*_widened(0.0, float(levels.factors.max()) * unit))
+        if not axes.lines:
+            axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center", color=style.FAINT)
+            axes.set_yticks([])
+        elif "throws" in title:
+            axes.set_ylim(bottom=0.0)
+            axes.set_ylabel("throws", fontsize=style.SMALL)
+        else:
+            axes.set_yscale("log")
+            # a decade at least, or rounding looks like a change
+            low, high = axes.get_ylim()
+            axes.set_ylim(min(low, high / 30.0), 1.3 * high)
+            axes.set_ylabel("share", fontsize=style.SMALL)
+        if axes.lines:
+            axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.16))
+        _plain(axes)
+    return figure
+
+
+def _against_level(axes: Axes, levels: Levels, names: Sequence[str], unit: float) -> None:
+    """Draw the numbers of one panel; below the least share that is drawn, marks on the axis."""
+    x, none = levels.factors * unit, np.zeros(levels.factors.size, dtype=bool)
+    for name, colour, line in zip(names, COLOURS, LINES, strict=False):
+        values: NDArray[np.float64] = levels.numbers.get(name, np.full(x.size, np.nan))
+        some = values > LEAST
+        if not some.any():
+            continue
+        none |= values <= LEAST
+        label = WORDS.get(name, name)
+        axes.plot(x[some], values[some], color=colour, ls=line, marker="o", ms=3.5, lw=1.4, label=label)
+    if none.any():
+        on_axis: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 3}
+        look: dict[str, Any] = {"marker": "v", "s": 18, "facecolors": "white", "edgecolors": style.FAINT}
+        axes.scatter(x[none], np.zeros(int(none.sum())), label=f"below {LEAST:g}", **look, **on_axis)
+
+
+# ----------------------------------------------------------------
+# Figure of a fit: what is left of the landings, side by side.
+
+
+BARS = "#B5C8D6"
+KINDS = ((0, "o", style.JOG, "jog"), (1, "^", style.FLIP, "flip"))
+
+
+@arguments_checked
+def fit_residuals(found: Fit) -> Figure:
+    """Draw measured less predicted landings against the place before, with two standard deviations.
+
+    Parameters
+    ----------
+    found : Fit
+        From `limitsets.fit`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel per side that throws began on; jogs are circles, flips triangles, throws with a side recorded wrong
+        have a square around them, and crosses are those that are far off.
+    """
+    rows, unit = found.rows, found.scene.unit
+    x = rows.throws.x_before
+    sides = sorted({int(side) for side in rows.side})
+    misread = np.isin(rows.throws.row, [row for row, *_ in found.misread])
+    strange = np.isin(rows.throws.row, found.misfit.strange)
+    width = min(3.4 * len(sides) + 0.8, 12.0)
+    figure, panels = style.canvas(width, 3.6, 1, len(sides), sharex=True, sharey=True)
+    for side, axes in zip(sides, panels, strict=True):
+        own = rows.side == side
+        size = 2.0 * found.deviations[own]
+        axes.errorbar(x[own], np.zeros(size.size), size, fmt="none", ecolor=BARS, lw=1.4, zorder=1)
+        axes.axhline(0.0, color=style.FAINT, lw=0.8, zorder=1)
+        for branch, marker, colour, _ in KINDS:
+            here = own & (rows.branch == branch)
+            axes.plot(x[here], found.residuals[here], ls="", marker=marker, color=colour, ms=4.5, zorder=3)
+        for some, marker, size in ((own & misread, "s", 10.0), (own & strange, "x", 9.0)):
+            look: dict[str, Any] = {"mfc": "none", "mec": style.INK, "mew": 1.1}
+            axes.plot(x[some], found.residuals[some], ls="", marker=marker, ms=size, zorder=4, **look)
+        axes.set_title(f"side {side}: {int(own.sum())} throws", loc="left", fontsize=style.TEXT)
+        axes.set_xlabel(
+            f"{'left corner' if rows.throws.corner else 'x'} before [{unit}]", fontsize=style.SMALL
+        )
+        axes.tick_params(labelsize=style.SMALL)
+        style.open_frame(axes)
+    panels[0].set_ylabel(f"landing, measured less predicted [{unit}]", fontsize=style.SMALL)
+    style.title(figure, f"{found.scene.name}: residuals of {len(rows.throws)} throws")
+    keys = [style.key(word, ls="", marker=marker, color=colour, ms=4.5) for _, marker, colour, word in KINDS]
+    keys.append(style.key("two standard deviations", color=BARS, lw=1.4))
+    if misread.any():
+        keys.append(style.key("side recorded wrong", ls="", marker="s", mfc="none", mec=style.INK, ms=8.0))
+    if strange.any():
+        keys.append(style.key("far off", ls="", marker="x", mec=style.INK, ms=7.0))
+    style.legend(figure, keys, 5)
+    return figure

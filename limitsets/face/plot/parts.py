@@ -1,0 +1,416 @@
+"""The part on the arm: its outline, the numbers of its sides, its centre of mass, and where a side has its left end."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.patches import Patch, Polygon
+from numpy.typing import NDArray
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
+from limitsets.face.plot import style
+from limitsets.face.plot.throwing import angle_on_side, motion, outline, throws_of, turned
+from limitsets.feeder.geometry import side_ends
+from limitsets.feeder.thrower import trace
+from limitsets.systems.maps import codes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from limitsets.face.plot.throwing import Motion, Throw
+    from limitsets.feeder.scene import Scene
+    from limitsets.feeder.scene.reading import Sketch
+
+
+Array = NDArray[np.float64]
+
+CENTRE: dict[str, Any] = {"marker": "o", "ms": 9, "mfc": "white", "mec": style.INK, "mew": 1.6, "ls": ""}
+MASS: dict[str, Any] = {"marker": "D", "ms": 8, "color": style.FLIP, "ls": ""}
+FOOT: dict[str, Any] = {"color": style.JOG, "lw": 1.3, "ls": (0, (4, 2))}
+OUTLINE: dict[str, Any] = {"facecolor": "#e8eef4", "edgecolor": style.INK, "lw": 1.8}
+TIPS: dict[str, Any] = {"color": style.FLIP, "lw": 3.0, "ls": (0, (1.5, 1))}
+
+# What the name of a side keeps from it [points].
+CLEAR = 4
+
+
+@arguments_checked
+def part(scene: Scene) -> Figure:
+    """Draw the part as it lies on side 0 on the arm, its sides numbered in the order in which it flips.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        With the centre of mass, masses added to a plate, the side on which the centre of mass is a along and d above,
+        and every length in the scene's unit.  A side on which the part cannot rest is dashed.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> figure = ls.plot.part(ls.load("paper-designed"))
+    >>> [text.get_text() for text in figure.axes[0].texts if text.get_gid() == "side"]
+    ['side 0: 5.75 in', 'side 1: 3.6 in', 'side 2: 6.75 in']
+    """
+    corners = outline(scene, 0) + _centre_at(scene)
+    reach = np.ptp(corners, axis=0)
+    size = float(max(reach))
+    wide, high = float(reach[0]) + 0.8 * size, float(reach[1]) + 0.45 * size
+    figure, (axes,) = style.canvas(7.6, min(max(5.6 * high / wide, 3.2), 7.5) + 0.7)
+    ends = [float(corners[:, 0].min()) - 0.4 * size, float(corners[:, 0].max()) + 0.4 * size]
+    axes.set_aspect("equal")
+    axes.set_xlim(*ends)
+    axes.set_ylim(-0.28 * size, float(corners[:, 1].max()) + 0.15 * size)
+    axes.fill_between(
+        ends, 0.0, -0.035 * size, facecolor="#d9d9d9", hatch="////", edgecolor="#9a9a9a", lw=0, gid="arm"
+    )
+    axes.axhline(0.0, color=style.INK, lw=2.0, zorder=1)
+    axes.add_patch(Polygon(corners, closed=True, zorder=2, gid="part", **OUTLINE))
+    resting = scene.sides.rests.tolist()
+    _sides(axes, scene, corners, resting)
+    _centre(axes, scene, size)
+    masses = _masses(scene)
+    _added(axes, scene, masses)
+    style.note(
+        axes,
+        "\N{LEFTWARDS ARROW} to the joint",
+        (ends[0], 0.0),
+        (6, 8),
+        ha="left",
+        fontsize=style.SMALL,
+        gid="joint",
+    )
+    axes.set_axis_off()
+    style.title(figure, f"{scene.name}: the part, lying on side 0")
+    style.legend(figure, _legend_of_part(masses, resting), 3)
+    return figure
+
+
+def refused_part(found: Sketch, why: str) -> Figure:
+    """Draw a part that is refused as it is written: its corners by number, its sides, what is wrong.
+
+    Parameters
+    ----------
+    found : Sketch
+        From `limitsets.feeder.scene.reading.sketch`.
+    why : str
+        The error.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    corners, count = found.vertices, len(found.vertices)
+    size = max(float(np.ptp(corners, axis=0).max()), 1e-300)
+    figure, (axes,) = style.canvas(7.6, 6.0)
+    axes.set_aspect("equal")
+    lo, hi = corners.min(axis=0), corners.max(axis=0)
+    beside = size * np.array([0.4, 0.25])
+    room = np.stack([lo - beside, hi + beside])
+    axes.set(xlim=room[:, 0], ylim=room[:, 1])
+    axes.add_patch(Polygon(corners, closed=True, zorder=2, gid="part", **(OUTLINE | {"ls": "--"})))
+    axes.plot(*corners.T, ls="", marker="o", ms=4, color=style.INK, zorder=3)
+    middle = corners.mean(axis=0)
+    for k, corner in enumerate(corners):
+        way = middle - corner  # the names of sides are outside
+        shift = tuple((16.0 * way / max(float(np.hypot(*way)), 1e-300)).tolist())
+        at = tuple(corner.tolist())
+        style.note(axes, f"P{k}", at, shift, ha="center", va="center", gid="corner")
+    ahead = np.roll(corners, -1, axis=0)
+    turn = 1.0 if float(np.sum(corners[:, 0] * ahead[:, 1] - corners[:, 1] * ahead[:, 0])) >= 0.0 else -1.0
+    for side in range(count):
+        left, right = (corners[k] for k in side_ends(count, side))
+        length = float(np.hypot(*(right - left)))
+        outward = turn * np.array([right[1] - left[1], left[0] - right[0]]) / max(length, 1e-300)
+        words = f"side {side}: {length:.5g} {found.unit}"
+        away = _clear(words, style.SMALL, outward) * outward
+        halfway = tuple((0.5 * (left + right)).tolist())
+        style.note(axes, words, halfway, tuple(away.tolist()), ha="center", va="center", zorder=4, gid="side")
+    if found.centre is not None:
+        axes.plot(*found.centre, zorder=5, gid="centre of mass", **CENTRE)
+        style.note(axes, "centre of mass", found.centre, (9, 0), va="center", zorder=5)
+    reason = "\n".join(textwrap.wrap(why, 92))
+    axes.set_xlabel(f"x [{found.unit}]\n\n{reason}", fontsize=style.SMALL)
+    axes.set_ylabel(f"y [{found.unit}]")
+    style.title(figure, f"{found.name}: the part as it is written, which is refused")
+    return figure
+
+
+def _clear(words: str, size: float, way: Array) -> float:
+    """Say how far the middle of words has to be from a side, for them to be clear of it [points]."""
+    return CLEAR + float(np.abs(way) @ (0.31 * size * len(words), 0.5 * size))
+
+
+def _centre_at(scene: Scene) -> Array:
+    """Where the centre of mass is, from the left end of side 0."""
+    return np.array([float(scene.sides.a[0]), float(scene.sides.d[0])])
+
+
+def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> None:
+    """Name each side outside of its middle, with its length; mark where the part cannot rest."""
+    count = len(corners)
+    for side in range(count):
+        # of the outline the first vertex is the left end of side 0
+        left, right = (corners[k] for k in side_ends(count, side))
+        along = (right - left) / np.hypot(*(right - left))
+        outward = np.array([along[1], -along[0]])
+        words = f"side {side}: {float(scene.sides.length[side]):.5g} {scene.unit}"
+        away = _clear(words, style.TEXT, outward) + (10 if side == 0 else 0)
+        shift = away * outward
+        leader = None
+        if outward[1] < -0.1 and side != 0:  # an edge that overhangs: beside it, and not down on the arm
+            shift = np.array([away / outward[0], 0.0])
+            leader = {"arrowstyle": "-", "color": style.INK, "lw": 0.7}
+        middle = tuple((0.5 * (left + right)).tolist())
+        how: dict[str, Any] = {
+            "ha": "center",
+            "va": "center",
+            "fontsize": style.TEXT,
+            "weight": "bold",
+            "arrowprops": leader,
+        }
+        if side == 0:  # over the line down from the centre of mass
+            how["bbox"] = {"boxstyle": "square,pad=0.2", "fc": "white", "ec": "none"}
+        style.note(axes, words, middle, tuple(shift.tolist()), zorder=6, gid="side", **how)
+        if not resting[side]:
+            axes.plot(*np.stack([left, right], axis=-1), zorder=4, gid="no rest", **TIPS)
+
+
+def _centre(axes: Axes, scene: Scene, size: float) -> None:
+    """Draw the centre of mass, how far it is from the left end of side 0, and how high."""
+    a, d = float(scene.sides.a[0]), float(scene.sides.d[0])
+    axes.plot([a, a], [0.0, d], zorder=3, gid="height", **FOOT)
+    low = -0.2 * size
+    axes.annotate(
+        "", (0.0, low), (a, low), arrowprops={"arrowstyle": "<->", "color": style.JOG, "lw": 1.0}, gid="a"
+    )
+    axes.vlines([0.0, a], low, 0.0, color=style.JOG, lw=0.6, ls=":")
+    words = f"a = {a:.4g} {scene.unit}, d = {d:.4g} {scene.unit}"
+    style.note(axes, words, (max(a, 0.0), low), (6, 0), va="center", color=style.JOG, gid="measure")
+    axes.plot(a, d, zorder=5, gid="centre of mass", **CENTRE)
+
+
+def _masses(scene: Scene) -> list[tuple[Array, str]]:
+    """Give the masses added to a plate: where they are drawn, and how heavy, as the scene writes it."""
+    points = scene.text["part"]["mass"].get("points", ())
+    found = []
+    for k, point in enumerate(points):
+        name = f"part.mass.points[{k}]"
+        about = np.array([[scene.value(f"{name}.{axis}") for axis in "xy"]]) - np.asarray(scene.centre)
+        place = turned(about, angle_on_side(scene, 0))[0] + _centre_at(scene)
+        found.append((place, str(point["mass"])))
+    return found
+
+
+def _added(axes: Axes, scene: Scene, masses: list[tuple[Array, str]]) -> None:
+    for place, text in masses:
+        axes.plot(*place, zorder=5, gid="added mass", **MASS)
+        right = place[0] >= float(scene.sides.a[0])
+        shift, align = ((8, 0), "left") if right else ((-8, 0), "right")
+        style.note(
+            axes,
+            text,
+            tuple(place.tolist()),
+            shift,
+            ha=align,
+            va="center",
+            zorder=6,
+            color=style.FLIP,
+            gid="mass",
+        )
+
+
+def _legend_of_part(masses: list[Any], resting: list[bool]) -> list[Any]:
+    handles = [
+        style.key("centre of mass", **CENTRE),
+        style.key("a along side 0 from its left end, d above it", **FOOT),
+    ]
+    if masses:
+        handles.append(style.key("mass added", **MASS))
+    if not all(resting):
+        handles.append(style.key("the part cannot rest on this side", **TIPS))
+    return handles
+
+
+# ----------------------------------------------------------------
+# One throw: the part in the air, and how it comes to rest (Fig. 3 of the paper).
+
+
+SHOWN = 3  # outlines in the air, and as many on the way from the impact to rest
+WIDEST, TALLEST, LETTERS = 4.6, 8.0, 11  # of panels beside each other [inches], and letters to an inch
+AIR, LANDED = "#0072B2", "#C04A00"
+FLYING: dict[str, Any] = {"edgecolor": AIR, "ls": (0, (3, 2))}
+STRUCK: dict[str, Any] = {"edgecolor": AIR, "lw": 2.2}
+REST: dict[str, Any] = {"edgecolor": style.INK, "lw": 1.6}
+VERTEX: dict[str, Any] = {"color": LANDED, "marker": "v", "ls": ""}
+SMALL_CENTRE: dict[str, Any] = {"marker": "o", "ms": 4, "mfc": "white", "mec": style.INK}
+
+
+@arguments_checked
+def flight(scene: Scene, x: float, side: int) -> Figure:
+    r"""Draw one throw: above the flight up to the impact, below the way from there to rest.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    x : float
+        Where the part rests before the throw [length].
+    side : int
+        On which side.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    AnswerError
+        For a start from which there is no flight.
+    MapError
+        For a side that the part has not.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> figure = ls.plot.flight(ls.load("paper-designed"), 21.0, 2)
+    >>> figure.axes[1].get_title(loc="left").replace("\n", " ")
+    'After the impact: a flip, 21.00 to 16.55 in, onto side 0'
+    """
+    if x > scene.arm_length:
+        allowed = f"at most {scene.arm_length:.9g} {scene.unit}, the end of the arm"
+        raise AnswerError("the start x", x, allowed, "start where a part can rest")
+    throws = throws_of(scene, trace(scene.map, x, side, 1))
+    if not throws:
+        least = float(scene.sides.a[side])
+        allowed = f"more than {least:.6g} on side {side}"
+        if x > least:  # thrown, and not down again within a full turn
+            kappa = f"{scene.kappa:.6g} {scene.unit}"
+            raise AnswerError(
+                "the throw",
+                f"outside the model, from x = {x:.6g} on side {side}",
+                "one that lands within a full turn",
+                f"kappa is {kappa}: throw more softly, and see whether the speed has the right unit",
+            )
+        raise AnswerError("x of the throw", x, allowed, "start where a throw lifts the part")
+    throw, moves = throws[0], motion(scene, throws[0])
+    air = _placed(scene, side, moves.flight(np.linspace(0.0, 1.0, SHOWN + 2)))
+    stops = [0.0, 1.0] if moves.turning.drawn else np.linspace(0.0, 1.0, SHOWN + 1)
+    rolled = _placed(scene, side, moves.turning.pose(np.array(stops)))
+    everything = np.concatenate([*air, *rolled])
+    lo, hi = float(everything[:, 0].min()), float(everything[:, 0].max())
+    height = float(everything[:, 1].max() - min(0.0, scene.surface_height))
+    figure, (above, below) = _canvas(hi - lo + 2.0, height + 1.4)
+    for axes in (above, below):
+        _arm(axes, scene, lo - 1.0, hi + 1.0)
+        axes.set_aspect("equal")
+        axes.set_xlim(lo - 1.0, hi + 1.0)
+        axes.set_ylim(min(0.0, scene.surface_height) - 0.9, float(everything[:, 1].max()) + 0.5)
+        axes.set_xlabel(f"distance from the joint [{scene.unit}]")
+        axes.set_ylabel(f"height over the joint [{scene.unit}]")
+        axes.label_outer()  # last: it takes the inner labels away
+    _flight(above, scene, throw, moves, air)
+    _landing(below, scene, throw, moves, rolled)
+    caveat = " (small-angle formulas: the part hangs at its left vertex, whose path they give)"
+    style.title(figure, f"One throw of {scene.name}{'' if scene.flight == 'exact' else caveat}")
+    style.legend(figure, _legend_of_flight(len(rolled) > 2), 3)
+    return figure
+
+
+def _canvas(width: float, height: float) -> tuple[Figure, list[Axes]]:
+    """Two panels of one extent: beside each other where the picture is tall, else one above the other."""
+    if height > 0.6 * width:
+        tall = min(TALLEST, max(3.4, WIDEST * height / width))
+        return style.canvas(10.4, tall + 1.6, 1, 2, sharex=True, sharey=True)
+    return style.canvas(9.0, 2 * max(1.6, 8.2 * height / width) + 1.9, 2, 1, sharex=True, sharey=True)
+
+
+def _placed(scene: Scene, side: int, poses: Array) -> list[Array]:
+    """Outlines in some poses, the left end of the side thrown from first."""
+    shape, start = outline(scene, side), angle_on_side(scene, side)
+    return [np.array([x, y]) + turned(shape, angle - start) for x, y, angle in poses.tolist()]
+
+
+def _arm(axes: Axes, scene: Scene, lo: float, hi: float) -> None:
+    h, ends = scene.surface_height, [lo, min(hi, scene.arm_length)]
+    axes.plot(ends, [h, h], color=style.INK, lw=2.2, solid_capstyle="butt", zorder=1, gid="arm")
+    axes.fill_between(ends, h, h - 0.35, facecolor="#d9d9d9", hatch="////", edgecolor="#9a9a9a", lw=0)
+    if lo <= 0 <= hi:
+        axes.plot([0], [0], marker="o", ms=9, mfc="white", mec=style.INK, zorder=2, gid="joint")
+    style.open_frame(axes)
+
+
+def _part(axes: Axes, corners: Array, **look: Any) -> None:
+    axes.add_patch(Polygon(corners, closed=True, **look))
+
+
+def _impact(axes: Axes, moves: Motion, corners: Array, zorder: float) -> None:
+    """Draw the part when it meets the arm, and the vertex that is struck."""
+    _part(axes, corners, facecolor=(0.72, 0.84, 0.93, 0.8), zorder=zorder, gid="impact", **STRUCK)
+    axes.plot(*moves.struck, **VERTEX, ms=9, zorder=7, gid="struck vertex")
+
+
+def _flight(axes: Axes, scene: Scene, throw: Throw, moves: Motion, air: list[Array]) -> None:
+    _part(axes, air[0], facecolor="#dcdcdc", zorder=2, gid="start", **REST)
+    for k, corners in enumerate(air[1:-1]):
+        # Later ones cover earlier ones in part, as a photograph with a strobe would show them.
+        look = {"facecolor": (0.86, 0.92, 0.97, 0.72), "lw": 1.0, "zorder": 3 + 0.1 * k, **FLYING}
+        _part(axes, corners, gid="in the air", **look)
+    _impact(axes, moves, air[-1], zorder=4)
+    path, stops = (moves.flight(np.linspace(0.0, 1.0, count)) for count in (80, len(air)))
+    axes.plot(path[:, 0], path[:, 1], color=style.INK, lw=1.1, ls="-.", zorder=5, gid="path")
+    axes.plot(stops[:, 0], stops[:, 1], ls="", zorder=6, gid="centre of mass", **SMALL_CENTRE)
+    start = f"from x = {throw.x:.2f} {scene.unit} on side {throw.side}"
+    text = f"In the air: {start}, turning by {math.degrees(throw.phi):.1f}°"
+    _head(axes, text)
+
+
+def _landing(axes: Axes, scene: Scene, throw: Throw, moves: Motion, rolled: list[Array]) -> None:
+    before, after, side = throw.side, throw.after, throw.side_after
+    _part(axes, rolled[-1], facecolor=(0.86, 0.86, 0.86, 0.85), zorder=2, gid="rest", **REST)
+    _impact(axes, moves, rolled[0], zorder=1.5)
+    for corners in rolled[1:-1]:
+        _part(axes, corners, facecolor="none", edgecolor=LANDED, lw=1.0, ls=":", zorder=3, gid="turning")
+    height = scene.surface_height + float(scene.sides.d[side])
+    axes.plot(after, height, ls="", zorder=6, gid="centre at rest", **SMALL_CENTRE)
+    how = "roll" if throw.code == codes.ROLL else ("flip" if side != before else "jog")
+    where = f"onto side {side}" if side != before else f"still on side {side}"
+    note = {codes.OUTWARD: "; off the arm's end", codes.INWARD: "; into the joint"}.get(throw.code, "")
+    text = f"After the impact: a {how}, {throw.x:.2f} to {after:.2f} {scene.unit}, {where}{note}"
+    _head(axes, text)
+
+
+def _head(axes: Axes, text: str) -> None:
+    """Write a title, in lines of phrases as wide as the panel where panels stand beside each other."""
+    if axes.get_subplotspec().get_gridspec().ncols > 1:  # type: ignore[union-attr]  # of a grid
+        wide = min(WIDEST, TALLEST * float(np.ptp(axes.get_xlim()) / np.ptp(axes.get_ylim())))
+        first, *phrases = text.split(", ")
+        lines = [first]
+        for phrase in phrases:
+            if len(f"{lines[-1]}, {phrase}") <= LETTERS * wide:
+                lines[-1] += f", {phrase}"
+            else:
+                lines[-1] += ","
+                lines.append(phrase)
+        text = "\n".join(lines)
+    axes.set_title(text, fontsize=style.TEXT, loc="left")
+
+
+def _legend_of_flight(turns: bool) -> list[Any]:
+    handles: list[Any] = [
+        Patch(facecolor="#dcdcdc", label="at rest, before and after", **REST),
+        Patch(facecolor="#dbebf7", label="in the air", **FLYING),
+        Patch(facecolor="#b8d6ed", label="at the impact", **STRUCK),
+        style.key("path of the centre of mass", color=style.INK, ls="-.", **SMALL_CENTRE),
+        style.key("struck vertex", ms=8, **VERTEX),
+    ]
+    return [*handles, *([style.key("turning to rest", color=LANDED, ls=":")] if turns else [])]

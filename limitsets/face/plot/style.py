@@ -1,0 +1,304 @@
+"""Shared by all figures: colours, line styles, hatches, an empty figure, and a piece of an orbit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.goals import OrientedBeyond
+from limitsets.feeder.scene import Scene
+from limitsets.parameters.analysis import other_vertex_first
+from limitsets.systems.graph import TransitionGraph
+from limitsets.systems.maps import Orbit, orbit
+from limitsets.systems.maps.contract import kind_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from limitsets.feeder.goals import Goal
+    from limitsets.systems.cells import Domain
+
+
+# ----------------------------------------------------------------
+# What a figure is of: a scene, or a map of one's own with its domain, as a transition graph carries them.
+
+
+class Subject(NamedTuple):
+    """A map in one dimension, and how to speak of it.
+
+    Parameters
+    ----------
+    name : str
+        Whose figure it is.
+    unit : str
+        Of x; empty for a map of one's own.
+    map : NamedTuple
+        The parameters of the map.
+    domain : Domain
+        Where its states lie.
+    least, most : ndarray of shape (sides,), float
+        Where a state can be on each side, and on any: of a scene a_i and the arm's end.
+    goal : Goal or None
+        Of a scene.
+    branches : tuple of str
+        Names of the codes from 0.
+    flags : dict
+        Where another vertex lands first, per side.
+    thrown : bool
+        Whether it is a scene.
+    """
+
+    name: str
+    unit: str
+    map: Any
+    domain: Domain
+    least: NDArray[np.float64]
+    most: float
+    goal: Goal | None
+    branches: tuple[str, ...]
+    flags: Mapping[int, Sequence[tuple[float, float]]]
+    thrown: bool
+
+    @property
+    def in_brackets(self) -> str:
+        """The unit behind the name of a quantity."""
+        return f" [{self.unit}]" if self.unit else ""
+
+    @property
+    def sides(self) -> int:
+        """How many there are."""
+        return len(self.least)
+
+
+def subject_of(source: Scene | TransitionGraph) -> Subject:
+    """Read a scene or a transition graph.
+
+    Raises
+    ------
+    AnswerError
+        A map in more than one dimension.
+    """
+    if isinstance(source, Scene):
+        branches, flags = kind_of(source.map).branches, other_vertex_first(source)
+        ends = (source.sides.a, source.arm_length)
+        return Subject(
+            source.name, source.unit, source.map, source.domain, *ends, source.goal, branches, flags, True
+        )  # fmt: skip
+    domain = source.grid.domain
+    if source.grid.dimension > 1:
+        remedy = "draw its basins, or a section of it"
+        raise AnswerError("the dimension of the map", source.grid.dimension, "1", remedy)
+    kind = kind_of(source.map)
+    ends = (domain.lo[:, 0], float(domain.hi.max()))
+    return Subject(type(source.map).__name__, "", source.map, domain, *ends, None, kind.branches, {}, False)
+
+
+# ----------------------------------------------------------------
+
+
+Extents: TypeAlias = Mapping[int, Sequence[tuple[float, float]]]
+
+# After Okabe and Ito; as grey their lightness differs too: 0.38, 0.51, 0.59 and so on.
+INK = "#222222"
+JOG = "#0072B2"
+FLIP = "#C04A00"
+ROLL = "#8A3FA0"
+GOAL = "#007A5A"
+FAINT = "#8c8c8c"
+# Sets: face, hatch.  Light faces with dark hatches keep text and lines on them legible.
+SETS = (
+    ("#5BA3D0", ""),
+    ("#F2C14E", "///"),
+    ("#9BD1B8", "..."),
+    ("#D99AC0", "\\\\\\"),
+    ("#C9C9C9", "xxx"),
+    ("#E8E1A0", "+++"),
+)
+JOG_LINE, FLIP_LINE, ROLL_LINE = "-", (0, (4.5, 1.8)), (0, (4.5, 1.5, 1.0, 1.5))
+GOAL_LINE: dict[str, Any] = {"color": GOAL, "lw": 1.3, "ls": (0, (1, 1.5))}
+SMALL, TEXT = 8.5, 10.0
+
+# Steps before an orbit is taken to be on its attractor.
+TRANSIENT = 2000
+# Throws of an orbit that are drawn.
+MOST = 90
+
+
+def canvas(
+    width: float, height: float, rows: int = 1, columns: int = 1, **options: Any
+) -> tuple[Figure, list[Axes]]:
+    """Make a figure of `rows` times `columns` axes [inches]; the axes row by row."""
+    figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06), dpi=110)
+    grid = figure.subplots(rows, columns, squeeze=False, **options)
+    return figure, list(grid.ravel())
+
+
+def panels(
+    count: int, columns: int, size: tuple[float, float], room: tuple[float, float], below: str
+) -> tuple[Figure, list[Axes]]:
+    """Make a figure of panels that share their limits, and label the lowest in each column.
+
+    `size` is that of a panel, `room` what is left around all of them [inches].
+    """
+    rows = math.ceil(count / columns)
+    wide, tall = size[0] * columns + room[0], size[1] * rows + room[1]
+    figure, found = canvas(wide, tall, rows, columns, sharex=True, sharey=True)
+    for axes in found[count:]:
+        axes.set_axis_off()
+    for k, axes in enumerate(found[:count]):
+        lowest = k + columns >= count
+        axes.xaxis.set_tick_params(labelbottom=lowest)
+        axes.set_xlabel(below if lowest else "")
+    return figure, found[:count]
+
+
+def extents_of(found: Any) -> list[Extents]:
+    """Read intervals off an attractor, a limit set, an analysis, or several of them."""
+    extents = getattr(found, "extents", found)
+    if isinstance(extents, Mapping):
+        return [extents]
+    if isinstance(extents, Iterable) and not isinstance(extents, str):
+        parts = [getattr(one, "extents", one) for one in extents]
+        known = [part for part in parts if isinstance(part, Mapping)]
+        if len(known) == len(parts):
+            return known
+    allowed = "attractors, limit sets or an analysis"
+    raise AnswerError("what to draw", type(found).__name__, allowed, "pass one of these")
+
+
+def ends_of(sets: Iterable[Extents]) -> list[float]:
+    """List the ends of all intervals."""
+    return [x for extents in sets for parts in extents.values() for pair in parts for x in pair]
+
+
+def stretch(scene: Scene | Subject, extents: Extents, throws: int = 12) -> Orbit | None:
+    """Cut whole rounds out of an orbit: from an arrival on its first side to a later one, `throws` of them or more.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    extents : mapping
+        Intervals of the attractor.
+    throws : int
+        Least number of throws; there are at most 90, whether or not a round is complete then.
+
+    Returns
+    -------
+    Orbit or None
+        None where no orbit stays.
+    """
+    starts = [(hi - lo, side, 0.5 * (lo + hi)) for side, parts in extents.items() for lo, hi in parts]
+    if not starts:
+        return None
+    _, side, x = max(starts)
+    before = orbit(scene.map, x, side, TRANSIENT)
+    if before.stopped:
+        return None
+    path = orbit(scene.map, float(before.x[-1]), int(before.side[-1]), 6 * MOST)
+    if path.code.size == 0:
+        return None
+    first = min(extents)
+    arrivals = 1 + np.flatnonzero((path.side[1:] == first) & (path.side[:-1] != first))
+    begin = int(arrivals[0]) if arrivals.size else 0
+    later = arrivals[arrivals >= begin + throws]
+    end = min(int(later[0]) if later.size else begin + throws, begin + MOST, path.code.size)
+    return Orbit(path.x[begin : end + 1], path.side[begin : end + 1], path.code[begin:end], None)
+
+
+def of_set(number: int) -> dict[str, Any]:
+    """Face, hatch and edge of a set of this number."""
+    face, hatch = SETS[number % len(SETS)]
+    return {"facecolor": face, "hatch": hatch, "edgecolor": INK}
+
+
+def bar(axes: Axes, lo: float, hi: float, middle: float, half: float, **look: Any) -> None:
+    """Draw a bar from lo to hi, `half` its height."""
+    axes.add_patch(Rectangle((lo, middle - half), hi - lo, 2 * half, **look))
+
+
+def note(axes: Axes, words: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
+    """Write words at a shift [points] from a place: in data, or as `xycoords` says."""
+    axes.annotate(words, at, xytext=shift, textcoords="offset points", **{"fontsize": SMALL, **how})
+
+
+def name(axes: Axes, words: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
+    """Name a critical point, left below a place; `keep_apart` knows such names."""
+    note(axes, words, at, shift, ha="right", va="top", gid="name", **how)
+
+
+def open_frame(axes: Axes, *borders: str) -> None:
+    """Take borders of a frame away: the top and the right one, and those named."""
+    axes.spines[["top", "right", *borders]].set_visible(False)
+
+
+def lanes(axes: Axes) -> None:
+    """Leave nothing of the frame but its base: there is a lane for each name on the left."""
+    open_frame(axes, "left")
+    axes.tick_params(axis="y", length=0)
+
+
+def goal(axes: Axes, scene: Scene | Subject, zorder: float) -> None:
+    """Draw a line where the goal begins beyond which only one side is allowed, if that is the scene's goal."""
+    if isinstance(scene.goal, OrientedBeyond):
+        axes.axvline(scene.goal.x, zorder=zorder, gid="goal", **GOAL_LINE)
+
+
+def key(label: str, **look: Any) -> Line2D:
+    """Make the entry of a line or, with ``ls=""``, of a marker in a legend."""
+    return Line2D([], [], label=label, **look)
+
+
+def key_of_goal(scene: Scene | Subject) -> list[Line2D]:
+    """Make the entry of what `goal` draws."""
+    if not isinstance(scene.goal, OrientedBeyond):
+        return []
+    return [key(f"goal: side {scene.goal.side} beyond {scene.goal.x:g} {scene.unit}", **GOAL_LINE)]
+
+
+def legend(figure: Figure, handles: Sequence[Any], columns: int) -> None:
+    """Put a legend below all axes."""
+    columns = min(columns, max(len(handles), 1))
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=SMALL, frameon=False)
+
+
+def title(figure: Figure, text: str) -> None:
+    """Put a title above all axes."""
+    figure.suptitle(text, fontsize=TEXT + 1.5)
+
+
+def keep_apart(axes: Axes, share: float) -> None:
+    """Take away names of critical points that would run into the name before: each is left of its point.
+
+    Parameters
+    ----------
+    axes : Axes
+        With its limits set; the names have the gid "name", and those of one row stand together, from left to right.
+    share : float
+        Room that a name takes, of the width of the axes.
+    """
+    lo, hi = axes.get_xlim()
+    row, last = None, lo
+    for text in [each for each in axes.texts if each.get_gid() == "name"]:
+        x, y = text.xy  # type: ignore[attr-defined]  # of an annotation
+        if y == row and x - last < share * (hi - lo):
+            text.remove()
+        else:
+            row, last = y, x
+
+
+def interval_text(parts: Sequence[tuple[float, float]]) -> str:
+    """Intervals as text, one per line, two lines at most."""
+    lines = [f"{lo:.2f} to {hi:.2f}" for lo, hi in parts[:2]]
+    if len(parts) > 2:
+        lines[-1] = f"... {len(parts)} intervals"
+    return "\n".join(lines)

@@ -1,0 +1,528 @@
+"""The pages: an answer in the words of someone who builds a feeder.
+
+The words stand in `templates`.  A paragraph there may be broken into lines as its sentences come: it is one line in the
+page, and one whose sentences are all left out is none.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from itertools import pairwise
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from limitsets.base.errors import AnswerError
+from limitsets.base.proposals import proposed
+from limitsets.feeder.goals import (
+    Goal,
+    OrientedBeyond,
+    Reaches,
+    StaysOnArm,
+    laid_words,
+    order_of,
+    unknown_goal,
+)
+from limitsets.parameters.analysis import in_limit_sets
+from limitsets.parameters.fitting.misfit import MOST_MISREAD
+from limitsets.proofs.prover.parameters import simulated
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from matplotlib.figure import Figure
+
+    from limitsets.feeder.scene import Scene
+    from limitsets.parameters.analysis import Analysis, GoalOutcome
+    from limitsets.parameters.fitting import Fit
+    from limitsets.proofs.prover import Proof
+
+
+# ---------------------------------------------------------------- Markdown: tables and numbers with units
+
+
+Extents = Mapping[int, Sequence[tuple[float, float]]]
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Write a Markdown table.
+
+    Examples
+    --------
+    >>> print(table(["side", "x"], [[0, 1.5]]))
+    | side | x |
+    |---|---|
+    | 0 | 1.5 |
+    """
+
+    def line(cells: Sequence[object]) -> str:
+        return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+    return "\n".join([line(heads), "|" + "---|" * len(heads), *(line(row) for row in rows)])
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Write a number with a fixed count of decimals, or a dash.
+
+    Examples
+    --------
+    >>> number(19.7526), number(None)
+    ('19.753', '-')
+    """
+    return "-" if value is None else f"{value:z.{digits}f}"
+
+
+def percent(share: float) -> str:
+    """Write a share; all and nothing are written only where they are meant.
+
+    Examples
+    --------
+    >>> percent(1.0), percent(0.99999), percent(0.305)
+    ('100 %', 'more than 99.9 %', '30.5 %')
+    """
+    if share >= 1 - 1e-9 or share == 0:
+        return f"{100 * share:.0f} %"
+    if share > 0.999 or share < 0.001:
+        return "more than 99.9 %" if share > 0.5 else "less than 0.1 %"
+    return f"{100 * share:.1f} %"
+
+
+def count(least: int, most: int) -> str:
+    """Write a range of whole numbers.
+
+    Examples
+    --------
+    >>> count(3, 11), count(0, 0)
+    ('3 to 11', '0')
+    """
+    return str(least) if least == most else f"{least} to {most}"
+
+
+def in_time(throws: float | None, rate: float | None, *, parts: bool = False) -> str:
+    """Write a number of throws in seconds, and as parts per minute one after the other; empty where no rate is known.
+
+    Parameters
+    ----------
+    throws : float or None
+        How many.
+    rate : float or None
+        Throws per second (`world.throw_rate`).
+    parts : bool
+        Whether a part is fed after so many.
+
+    Examples
+    --------
+    >>> in_time(12.0, 2.0, parts=True), in_time(12.0, None)
+    (' (6 s, 10 parts per minute)', '')
+    """
+    if throws is None or rate is None or not isfinite(throws) or throws <= 0.0:
+        return ""
+    minute = f", {60.0 * rate / throws:.3g} parts per minute" if parts else ""
+    return f" ({throws / rate:.3g} s{minute})"
+
+
+def intervals(parts: Iterable[tuple[float, float]], digits: int = 3) -> str:
+    """Write intervals.
+
+    Examples
+    --------
+    >>> intervals([(1.0, 2.0), (3.0, 4.5)], 1)
+    '1.0 to 2.0, 3.0 to 4.5'
+    """
+    return ", ".join(f"{lo:z.{digits}f} to {hi:z.{digits}f}" for lo, hi in parts)
+
+
+def bands(extents: Extents) -> list[tuple[float, float, tuple[int, ...]]]:
+    """Cut the x axis where a side begins or ceases to occur: ``(lo, hi, sides)``, ascending; empty stretches left out.
+
+    Examples
+    --------
+    >>> bands({0: [(1.0, 3.0)], 1: [(2.0, 4.0)]})
+    [(1.0, 2.0, (0,)), (2.0, 3.0, (0, 1)), (3.0, 4.0, (1,))]
+    """
+    cuts = sorted({x for parts in extents.values() for pair in parts for x in pair})
+    found = []
+    for lo, hi in pairwise(cuts):
+        middle = 0.5 * (lo + hi)
+        sides = tuple(sorted(s for s, parts in extents.items() if any(a <= middle <= b for a, b in parts)))
+        if sides:
+            found.append((lo, hi, sides))
+    return found
+
+
+# ---------------------------------------------------------------- Goals as sentences
+
+
+# So many times as many cells are proposed where starts are undecided, up to the last.
+FINER, MOST_CELLS = 4, 1_000_000
+
+# Of a sum of shares.
+ROUNDING = 1e-9
+
+
+def goal_sentence(goal: Goal, unit: str) -> str:
+    """Say what a goal asks, and of what.
+
+    Examples
+    --------
+    >>> goal_sentence(OrientedBeyond(20.0, 2), "in")
+    'every part at rest beyond x = 20 in lies on side 2 (asked of the limit set)'
+    """
+    if not isinstance(goal, Goal):
+        raise unknown_goal(goal)
+    laid = f"parts laid down at {laid_words(goal.laid, unit)}" if goal.laid else ""
+    if goal.of_every_start:
+        return f"{goal.question(unit)} (asked of {laid})" if laid else goal.question(unit)
+    where = "every throw from every start" if goal.from_anywhere else "the limit set"
+    if laid:
+        where = f"every throw of {laid}" if goal.from_anywhere else f"where {laid} come to"
+    return f"{goal.question(unit)} (asked of {where})"
+
+
+def verdict_of(outcome: GoalOutcome, share: float) -> str:
+    """Say what became of a goal: where it holds, of what, and which share of the starts comes there.
+
+    Examples
+    --------
+    >>> from limitsets.analysis import GoalOutcome
+    >>> verdict_of(GoalOutcome(OrientedBeyond(20.0, 2), True, 17.5, reach=(24.0,)), 0.965)
+    'holds of the limit set, to which 96.5 % of all starts come'
+    >>> verdict_of(GoalOutcome(OrientedBeyond(20.0, 2), True, 17.5, reach=(19.0,)), 0.965)
+    'holds vacuously'
+    """
+    return verdict_words(outcome.goal, outcome.holds, share, len(outcome.reach), vacuous=outcome.vacuous)
+
+
+def verdict_words(goal: Goal, holds: bool | None, share: float, sets: int, *, vacuous: bool) -> str:
+    """Say the same of a goal that was judged otherwise, on so many limit sets."""
+    if vacuous:
+        return "holds vacuously"
+    if holds and not (goal.from_anywhere or goal.of_every_start):
+        come = "" if share >= 1.0 - ROUNDING else f", to which {percent(share)} of all starts come"
+        return f"holds of {'the' if sets < 2 else 'each'} limit set{come}"
+    return {True: "holds", False: "does not hold", None: "was not decided"}[holds]
+
+
+def starts_words(starts: object, share: float | None) -> str:
+    """Say for which starts a goal is proved, the share rounded down.
+
+    Examples
+    --------
+    >>> starts_words("every", 1.0), starts_words("cells", 0.96459)
+    ('for every start', 'for 96.4 % of all starts')
+    """
+    if starts in ("every", "almost-every"):
+        return f"for {str(starts).replace('-', ' ')} start"
+    return f"for {math.floor(1000.0 * (share or 0.0)) / 10.0:g} % of all starts"
+
+
+def next_command(analysis: Analysis) -> str:
+    """Name the command that goes on from an analysis with a goal: prove it, find what can deviate, or a design.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> next_command(ls.analyse("paper-initial", 1024))
+    'limitsets design paper-initial --goal (a scene that meets it: centre of mass, throw and surface moved)'
+    """
+    outcome, scene = analysis.goal, analysis.scene
+    source = _source(scene)
+    assert outcome is not None
+    if analysis.choice.tipping:  # which no other command switches on
+        lines = " and ".join(f"{effect} = true" for effect in analysis.choice.tipping)
+        return f"write {lines} under [effects] of {source}; {proposed('check', source)} says whether it is in order"
+    audited = f"{proposed('audit', source)} (which assumptions it breaks)"
+    if not can_be_proved(scene):
+        return audited
+    if outcome.holds and not outcome.goal.from_anywhere and any(analysis.basins.exits.values()):
+        return f"{proposed('certify', source)} (a proof for the starts that stay; margins need all to stay)"
+    if outcome.holds and not outcome.vacuous:
+        proof, margins = proposed("certify", source), proposed("margin", source)
+        return f"{proof} (a proof), {margins} (how much each quantity may deviate)"
+    if outcome.holds is None and not analysis.attractors and (speeds := _speeds(scene)):
+        return f"{proposed('atlas', source, *speeds)} (at which speeds of the throw parts stay)"
+    if outcome.holds is None:
+        return f"{proposed('certify', source)} (whether it can be proved)"
+    return design_command(scene, [outcome.goal]) or audited
+
+
+def can_be_proved(scene: Scene) -> bool:
+    """Whether there are proofs about a scene: not with effects that nothing encloses."""
+    try:
+        simulated(scene)
+    except AnswerError:
+        return False
+    return True
+
+
+def _speeds(scene: Scene) -> tuple[str, ...]:
+    """Write an axis of an atlas from half to twice the speed that a scene gives; empty where it gives none."""
+    given = scene.text["throw"].get("speed")
+    if given is None:
+        return ()
+    value = float(given.split()[0])
+    return "--x", f"throw.speed={0.5 * value:g}:{2.0 * value:g}:100"
+
+
+def after_undecided(analysis: Analysis) -> str:
+    """Name the command that decides more starts; empty where none is undecided, or more cells do not help.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> after_undecided(ls.analyse("paper-designed", 16))
+    'limitsets analyse paper-designed --cells 64 (finer cells)'
+    """
+    cells = FINER * int(analysis.grid.shape[:, 0].max())
+    creeping = analysis.scene.surface_height > 0.0  # to the joint, for ever
+    if analysis.basins.undecided_between == 0.0 or cells > MOST_CELLS or creeping:
+        return ""
+    return f"{proposed('analyse', _source(analysis.scene), '--cells', cells)} (finer cells)"
+
+
+def after_unproved(proof: Proof) -> str:
+    """Name the command that goes on from a proof in which a claim is not proved."""
+    scene, goal = proof.scene, proof.scene.goal
+    verdicts = {claim.verdict for claim in proof.claims if claim.claim == "goal"}
+    if (proof.noise or proof.tolerance) and "proved-on-cells" not in verdicts:
+        return f"{proposed('margin', _source(scene))} (how much each quantity may deviate)"
+    if "refuted" in verdicts and goal is not None and (design := design_command(scene, [goal])):
+        return design
+    source = _source(scene)
+    sampled, audited = proposed("analyse", source), proposed("audit", source)
+    return f"{sampled} (what sampled throws say), {audited} (what the model leaves out)"
+
+
+def without_margin(scene: Scene, goals: Sequence[Goal], *, fails: bool) -> str:
+    """Name the command that goes on from a scene without margins: its goal fails, or is not proved of it."""
+    analysed = proposed("analyse", _source(scene))
+    starts = f"{analysed} (which starts leave the arm: margins need a scene in which none does)"
+    if can_be_proved(scene):
+        starts = f"{proposed('certify', _source(scene))} (what is proved of it, and what is not), {starts}"
+    return (design_command(scene, goals) if fails else "") or starts
+
+
+def design_command(scene: Scene, goals: Sequence[Goal]) -> str:
+    """Name the command that looks for a scene that meets a goal; empty where there is none for it."""
+    if scene.effects.on() or not any(isinstance(goal, OrientedBeyond | Reaches) for goal in goals):
+        return ""
+    words = "a scene that meets it: centre of mass, throw and surface moved"
+    return f"{proposed('design', _source(scene), '--goal')} ({words})"
+
+
+def _source(scene: Scene) -> str:
+    return scene.file or f"{scene.name}.toml"
+
+
+def void_of(outcome: GoalOutcome, unit: str, spread: str | None) -> str:
+    """Say where a goal that holds speaks of nothing; empty where it does not.
+
+    With `spread` the scene scatters its throws, and the limit set is that without scatter.
+
+    Examples
+    --------
+    >>> from limitsets.analysis import GoalOutcome
+    >>> void_of(GoalOutcome(OrientedBeyond(20.0, 2), True, 17.5, reach=(19.0,)), "in", None)
+    'no part gets there: the limit set ends at x = 19.000 in, before x = 20 in'
+    """
+    goal = outcome.goal
+    if isinstance(goal, StaysOnArm) and outcome.holds and not goal.from_anywhere:
+        return "no throw leads out of any limit set; from_anywhere = true asks it of every start"
+    if not isinstance(goal, OrientedBeyond) or not outcome.holds:
+        return ""
+    short = [k for k, x in enumerate(outcome.reach) if x <= goal.x]
+    if goal.from_anywhere:
+        ends = [f"the farthest landing is at x = {outcome.reach[k]:.3f} {unit}" for k in short]
+    elif len(outcome.reach) == 1:
+        ends = [f"the limit set ends at x = {outcome.reach[k]:.3f} {unit}" for k in short]
+    else:
+        ends = [f"limit set {k} ends at x = {outcome.reach[k]:.3f} {unit}" for k in short]
+    who = "no part gets there" if outcome.vacuous else "not every part gets there"
+    thrown = "without scatter " if spread else ""
+    return f"{thrown}{who}: {', '.join(ends)}, before x = {goal.x:g} {unit}" if ends else ""
+
+
+# ----------------------------------------------------------------
+
+
+# Blocks of these signs keep their lines: headings, tables, lists, commands.
+LINES = ("#", "|", "* ", "    ")
+
+
+@cache
+def environment() -> Environment:
+    """Give the templates, with what they call."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    found = Environment(
+        loader=PackageLoader("limitsets.face.report"),
+        trim_blocks=True,
+        undefined=StrictUndefined,
+        autoescape=False,  # Markdown, no HTML
+    )
+    found.filters |= {
+        "bands": bands,
+        "count_of": lambda pair: count(*pair),
+        "degrees": math.degrees,
+        "f": format,
+        "first_up": lambda text: text[:1].upper() + text[1:],
+        "intervals": intervals,
+        "percent": percent,
+    }
+    found.globals |= {
+        "next_command": next_command,
+        "order_of": order_of,
+        "proposed": proposed,
+        "question_of": goal_sentence,
+        "table": table,
+        "verdict_of": verdict_of,
+        "void_of": void_of,
+    }
+    return found
+
+
+def words(template: str, figures: Mapping[str, str] | None = None, **answers: Any) -> str:
+    """Fill in a template of `templates`: paragraphs with an empty line between, without a break at the end.
+
+    Parameters
+    ----------
+    template : str
+        Its name, without endings.
+    figures : mapping of str to str, optional
+        File names of the pictures by kind; a picture that is not there is left out.
+    **answers
+        What the template speaks of.
+    """
+
+    def figure(kind: str, caption: str) -> str:
+        if not figures or kind not in figures:
+            return ""
+        link = f"[{caption}]({figures[kind]})"
+        return link if figures[kind].endswith(".pdf") else f"!{link}"  # no page shows PDF in its text
+
+    text = environment().get_template(f"{template}.md.j2").render(figure=figure, **answers)
+    blocks = [block.strip("\n") for block in re.split(r"\n\s*\n", text)]
+    return "\n\n".join(
+        block if block.startswith(LINES) else re.sub(r"\s*\n\s*", " ", block) for block in blocks if block
+    )
+
+
+def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
+    """Write the report.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        From `limitsets.analyse`.
+    figures : mapping of str to str
+        File names of the pictures by kind: "part", "limit-set", "map", "basins", "morse", "flight".
+
+    Returns
+    -------
+    str
+        Markdown.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.face.report.pages import page
+    >>> page(ls.analyse("paper-designed"), {}).splitlines()[0]
+    '# paper-designed: where the throws lead'
+    """
+    from limitsets.feeder.thrower.effects import EFFECTS  # lazily: it loads numba
+
+    effects = analysis.scene.effects
+    assumed = [each.lifts for name, each in EFFECTS.items() if name not in effects.words]
+    # of the throw; no effect lifts this
+    assumed.insert(0 if effects.drive else 1, "it does not tip the part")
+    broken = in_limit_sets(analysis.other_vertex_first, analysis.extents)
+    return words("report", figures, analysis=analysis, broken=broken, assumed=assumed) + "\n"
+
+
+# ----------------------------------------------------------------
+# A page as one file of HTML that stands alone: the Markdown of the report, with its figures inside.
+
+
+def as_uri(figure: Figure) -> str:
+    """Write a figure as SVG into a `data:` address."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="svg", metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode("ascii")
+
+
+def as_html(text: str, images: Mapping[str, str]) -> str:
+    """Write a page of Markdown as HTML.
+
+    Parameters
+    ----------
+    text : str
+        The page, which begins with its title.
+    images : mapping of str to str
+        Addresses of its figures, by their names in the page.
+
+    Examples
+    --------
+    >>> "<h1>Throws &amp; flips</h1>" in as_html("# Throws & flips", {})
+    True
+    """
+    from markdown_it import MarkdownIt  # lazily: only this page needs it
+
+    reader = MarkdownIt("commonmark", {"html": False}).enable("table")
+    blocks = reader.parse(text)
+    for image in (each for block in blocks for each in block.children or () if each.type == "image"):
+        source = str(image.attrs["src"])
+        image.attrs["src"] = images.get(source, source)
+    body = reader.renderer.render(blocks, reader.options, {})
+    title = text.split("\n", 1)[0].lstrip("# ")
+    return environment().get_template("page.html.j2").render(title=title, body=body) + "\n"
+
+
+# ----------------------------------------------------------------
+# What a fit says in words: what the throws do not tell, rows to look at, whether the model fits, what to film
+# next.
+
+
+def lines_of(found: Fit) -> list[str]:
+    """Write the sentences, one a line."""
+    unit = found.scene.unit
+    lines = [f"{name} is kept as it was: {why}" for name, why in found.held.items()]
+    lines += [
+        f"{name} is not determined by these throws: its value goes with that of {others}, which they do not tell"
+        for name, others in found.undetermined.items()
+    ]
+    if found.error is None:
+        lines.append(
+            "no measurement error is given: the scatter is an upper bound (give --error or a column error)"
+        )
+    else:
+        lines.append(f"measurement error: {found.error:.3g} {unit} (standard deviation of a measured place)")
+    for row, column, recorded, fits in found.misread:
+        lines.append(f"row {row}: {column} is recorded as {recorded}, but the part landed as on side {fits}")
+    if found.misread_rate[0] > MOST_MISREAD:
+        lines.append(
+            f"{100.0 * found.misread_rate[0]:.0f} % of the sides do not fit where parts landed, and no other reading of"
+            " the columns explains it: the sides are recorded wrong, or the part is another one"
+        )
+    test = found.misfit
+    if test.lacking:
+        why = "the throws do something that it leaves out, like rolling or slipping, or a number is wrong"
+        lines.append(
+            f"the model does not fit (p = {test.p:.2g}): {found.explained or why}; do not trust the values"
+        )
+    else:
+        lines.append(f"the model fits: such residuals or larger ones have probability {test.p:.2g}")
+    if test.strange:
+        lines.append(
+            f"far off: the landings of row{'s' * (len(test.strange) > 1)} {', '.join(map(str, test.strange))}"
+        )
+    for each in found.further[:1]:
+        name, factor = max(each.shrinks.items(), key=lambda pair: pair[1])
+        gain = f"ten of them shorten the interval of {name} {factor:.2g} times"
+        if not found[name].bounded:
+            gain = f"they tell most of {name}, which these throws do not bound"
+        where = "the left corner at" if found.rows.throws.corner else "x ="
+        lines.append(f"film next: throws from {where} {each.x:.3g} {unit} on side {each.side}; {gain}")
+    return lines

@@ -1,0 +1,355 @@
+"""Write the report's files, all of them or none."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from limitsets.base.errors import AnswerError, LimitsetsError
+from limitsets.base.files import as_json, replaced
+from limitsets.face import plot
+from limitsets.face.plot.basin import basins, morse
+from limitsets.face.plot.limit_sets import limit_set
+from limitsets.face.plot.limit_sets import map as map_of_scene
+from limitsets.face.plot.parts import flight, part
+from limitsets.face.plot.style import stretch
+from limitsets.face.report.pages import as_html, as_uri, page, percent, words
+from limitsets.systems.maps import FLIP
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from limitsets.parameters.analysis import Analysis
+    from limitsets.proofs.auditing import Audit, Finding
+
+
+Progress = Callable[[str, int, int], None]
+
+DPI = 150
+FIGURES = ("part", "limit-set", "map", "basins", "morse", "flight")
+
+
+def _typical_throw(analysis: Analysis) -> tuple[float, int]:
+    """Choose a throw to draw: the first flip of an orbit on the limit set, or one from the middle of the arm."""
+    scene = analysis.scene
+    for extents in analysis.extents[:1]:
+        path = stretch(scene, extents)
+        if path is not None and path.code.size:
+            k = int((path.code == FLIP).argmax())
+            return float(path.x[k]), int(path.side[k])
+    return 0.5 * (float(scene.sides.a[0]) + scene.arm_length), 0
+
+
+def figure(analysis: Analysis, kind: str, throw: tuple[float, int] | None = None) -> Figure:
+    """Draw one figure of an analysis.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        From `limitsets.analyse`.
+    kind : str
+        One of `FIGURES`.
+    throw : (float, int), optional
+        For "flight": x and side of the throw to draw; one is chosen otherwise.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    LimitsetsError
+        For another kind.
+    """
+    scene, sets = analysis.scene, analysis.extents
+    if kind == "part":
+        return part(scene)
+    if kind == "limit-set":
+        return limit_set(scene, sets)
+    if kind == "map":
+        return map_of_scene(scene, sets)
+    if kind == "basins":
+        return basins(scene, analysis.basins, sets)
+    if kind == "morse":
+        return morse(analysis.morse, scene.name, scene.unit)
+    if kind == "flight":
+        return flight(scene, *(throw or _typical_throw(analysis)))
+    raise LimitsetsError("the kind of figure", kind, ", ".join(FIGURES), "correct the word")
+
+
+def require_place(folder: str | Path) -> None:
+    """Refuse a folder that plainly cannot be written, before anything is computed for it.
+
+    Raises
+    ------
+    LimitsetsError
+        It, or the nearest of its parents that is there, is no folder or may not be written.
+    """
+    nearest = next(path for path in (Path(folder), *Path(folder).absolute().parents) if path.exists())
+    if not nearest.is_dir():
+        raise _refusal(folder, f"{nearest} is not a folder")
+    if not os.access(nearest, os.W_OK):
+        raise _refusal(folder, f"{nearest} may not be written")
+
+
+def _refusal(folder: str | Path, reason: str) -> LimitsetsError:
+    return LimitsetsError("the folder of the report", str(folder), "a folder that can be written", reason)
+
+
+@contextmanager
+def filled(folder: str | Path) -> Iterator[Path]:
+    """Write files of a report as `limitsets.files.replaced` does: all of them or none.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder cannot be written.
+    """
+    try:
+        with replaced(folder) as draft:
+            yield draft
+    except OSError as error:
+        raise _refusal(folder, f"it could not be: {error.strerror or error}") from None
+
+
+def laid(
+    folder: str | Path,
+    drawn: Iterable[tuple[str, Figure]],
+    texts: Callable[[dict[str, str]], dict[str, str]],
+    form: str = "png",
+    *,
+    html: bool = False,
+) -> list[Path]:
+    """Write figures and texts into a folder, all of them or none.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where to; made if it is not there.
+    drawn : iterable of (str, Figure)
+        Figures by kind: KIND.png, or of the form asked for.
+    texts : callable
+        Takes the figures' files by kind, gives texts by file.
+    form : str
+        Of the figures: "png", "svg" or "pdf".
+    html : bool
+        Whether to write report.html too: report.md in one file that stands alone, figures inside.
+
+    Returns
+    -------
+    list of Path
+        The files, texts first.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder cannot be written.
+    """
+    figures: dict[str, str] = {}
+    inside: dict[str, str] = {}
+    with filled(folder) as draft:
+        for kind, figure in drawn:
+            figures[kind] = f"{kind}.{form}"
+            figure.savefig(draft / figures[kind], dpi=DPI)
+            if html:
+                inside[figures[kind]] = as_uri(figure)
+        told = texts(figures)
+        if html:
+            told["report.html"] = as_html(told["report.md"], inside)
+        for name, text in told.items():
+            (draft / name).write_text(text, encoding="utf-8", newline="\n")
+    return [Path(folder) / name for name in (*told, *figures.values())]
+
+
+def write(
+    analysis: Analysis,
+    folder: str | Path,
+    *,
+    form: str = "png",
+    html: bool = False,
+    progress: Progress | None = None,
+) -> list[Path]:
+    """Write report.md, analysis.json and the figures into a folder.
+
+    Files that are there are replaced once all new ones are written, each in one step.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        From `limitsets.analyse`.
+    folder : str or Path
+        Where to; made if it is not there.
+    form : str
+        Of the figures: "png", "svg" or "pdf".
+    html : bool
+        Whether to write report.html too: one file that stands alone, figures inside.
+    progress : callable, optional
+        Called as ``progress(file, done, of)`` before each file.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, limitsets as ls
+    >>> from limitsets.face.report.writing import write
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     [path.name for path in write(ls.analyse("paper-designed"), folder)][:2]
+    ['report.md', 'analysis.json']
+    """
+    tell = progress or (lambda file, done, of: None)
+    count = len(FIGURES) + 2
+
+    def drawn() -> Iterator[tuple[str, Figure]]:
+        for number, kind in enumerate(FIGURES):
+            tell(f"{kind}.{form}", number, count)
+            try:
+                shown = figure(analysis, kind)
+            except AnswerError:
+                if kind != "flight":
+                    raise
+                continue  # throws too hard for the model have no flight to draw
+            yield kind, shown
+        tell("report.md", len(FIGURES), count)
+
+    def texts(figures: dict[str, str]) -> dict[str, str]:
+        return {"report.md": page(analysis, figures), "analysis.json": as_json(analysis)}
+
+    return laid(folder, drawn(), texts, form, html=html)
+
+
+# ----------------------------------------------------------------
+# An audit in words: the lines of its table, a page, and its files.
+
+
+HEADS = ("effect", "assumed", "on the limit set", "worst there", "on the whole arm")
+
+
+def _measured(finding: Finding, value: float | None, unit: str) -> str:
+    if value is None:
+        return "-"
+    if finding.about.dimension == "angle":
+        return f"{math.degrees(value):.1f} deg"
+    return f"{value:.3g} {unit}" if finding.about.dimension == "length" else f"{value:.3g}"
+
+
+def _share(finding: Finding) -> str:
+    """Say which of the throws on the limit set are concerned."""
+    parts = []
+    kinds = (("jog", finding.jogs), ("flip", finding.flips), ("roll", finding.others))
+    for name, (hit, of) in kinds:
+        if hit:
+            parts.append(f"every {name}" if hit == of else f"{percent(hit / of)} of {name}s")
+    return " and ".join(parts)
+
+
+def _verdict(finding: Finding) -> str:
+    if finding.called_for is None:
+        return f"cannot tell: {finding.missing}?" if finding.missing else "cannot tell: no throw known"
+    if not finding.called_for:
+        return f"holds ({finding.how})"
+    if finding.place == "limit-set":
+        return f"BREAKS: {_share(finding)}"
+    return f"breaks on side {', '.join(map(str, finding.ranges))}"
+
+
+def _worst(finding: Finding, unit: str) -> str:
+    """Say what was found where it is worst; without a fact, which value of it would matter."""
+    if finding.x is None:
+        return "-"
+    place = f"side {finding.side}, x = {finding.x:.2f}"
+    if finding.worst is None:
+        return f"no friction is enough ({place})"
+    if finding.missing:
+        return f"{_needed(finding, unit)} ({place})"
+    value = _measured(finding, finding.worst, unit)
+    if finding.threshold is None:
+        return f"{value} ({place})"
+    sign = "at most" if finding.about.below else "at least"
+    return f"{value}, {sign} {_measured(finding, finding.threshold, unit)} ({place})"
+
+
+def _needed(finding: Finding, unit: str) -> str:
+    at = finding.threshold
+    if finding.missing == "friction":
+        return f"needs {finding.worst:.3g}"
+    if at is None:
+        fall = finding.missing == "restitution"
+        return f"falls from {_measured(finding, finding.worst, unit)}" if fall else "never matters"
+    if finding.missing == "stroke":
+        return f"matters from {math.degrees(at):.2g} deg"
+    if finding.missing == "scatter":
+        return f"matters from {100 * at:.2g} % of the speed"
+    return f"matters {'below' if finding.missing == 'bounce_threshold' else 'from'} {at:.2g}"
+
+
+def lines_of(found: Audit) -> list[list[str]]:
+    """Give the table, one line per assumption; columns as in `HEADS`."""
+    unit = found.scene.unit
+    return [
+        [
+            f"{here.effect} (on)" if here.simulated else here.effect,
+            here.about.name,
+            _verdict(here),
+            _worst(here, unit),
+            _verdict(everywhere),
+        ]
+        for here, everywhere in zip(found.on("limit-set"), found.on("domain"), strict=True)
+    ]
+
+
+def summary(found: Audit) -> list[str]:
+    """Say in a few sentences what the scene calls for."""
+    return words("audit_summary", found=found).split("\n\n")
+
+
+def audit_page(found: Audit, figures: Mapping[str, str] | None = None) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    found : Audit
+        From `limitsets.audit`.
+    figures : mapping of str to str, optional
+        File names of the pictures by kind: "part", "audit".
+
+    Returns
+    -------
+    str
+        Markdown.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> audit_page(ls.audit("paper-designed")).splitlines()[0]
+    '# paper-designed: what the model leaves out'
+    """
+    told = {"summary": summary(found), "heads": HEADS, "rows": lines_of(found)}
+    return words("audit", figures or {}, found=found, **told) + "\n"
+
+
+def write_audit(found: Audit, folder: str | Path, form: str = "png") -> list[Path]:
+    """Write audit.md, audit.json and the figures into a folder, all of them or none.
+
+    Raises
+    ------
+    LimitsetsError
+        The folder cannot be written.
+    """
+    return laid(
+        folder,
+        [("part", plot.part(found.scene)), ("audit", plot.audit(found))],
+        lambda figures: {"audit.md": audit_page(found, figures), "audit.json": as_json(found)},
+        form,
+    )

@@ -1,0 +1,47 @@
+"""The shape of a part: its polygon, its mass, and the sides it can rest on.
+
+The formulas are written on scalars with ``+ - * /`` and a passed-in ``sqrt`` and ``atan2``, so that the same lines
+serve floats, high precision and intervals.  What a person gives is checked first, in floats, and refused with a
+`limitsets.errors.GeometryError` that says what is wrong and by how much.
+
+Sides are counted in flip order: with vertices ``P0 .. P(n-1)`` counterclockwise, side 0 is the edge P0-P1, side 1 the
+edge P(n-1)-P0, side 2 the edge P(n-2)-P(n-1), and so on: a flip about the left vertex takes side i to side i + 1.
+"""
+
+from limitsets.feeder.geometry.polygon import (
+    Mass,
+    OnSide,
+    RestingSides,
+    convex_polygon,
+    heights_inside,
+    is_convex,
+    is_triangle,
+    mass_of,
+    plate_with_points,
+    require_inside,
+    require_rest,
+    rest_of,
+    resting_sides,
+    side_ends,
+    triangle,
+    triangle_of,
+)
+
+__all__ = [
+    "Mass",
+    "OnSide",
+    "RestingSides",
+    "convex_polygon",
+    "heights_inside",
+    "is_convex",
+    "is_triangle",
+    "mass_of",
+    "plate_with_points",
+    "require_inside",
+    "require_rest",
+    "rest_of",
+    "resting_sides",
+    "side_ends",
+    "triangle",
+    "triangle_of",
+]

@@ -1,0 +1,525 @@
+"""All that is wrong with a scene, and what is improbable, at once."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args, get_origin
+
+import numpy as np
+
+from limitsets.base.errors import SceneError, TipsError
+from limitsets.feeder.geometry.polygon import mass_of
+from limitsets.feeder.scene.facts import TIPPING
+from limitsets.feeder.scene.numbers import hull_of
+from limitsets.feeder.scene.quantities import find
+from limitsets.feeder.scene.reading import can_name, load, replace_file, structure_of
+from limitsets.feeder.scene.scene import Scene, turns
+from limitsets.feeder.scene.units import UNITS, convert, density_dimension, exact_factor, parse
+from limitsets.feeder.scene.validation import Tree, plain, refusals, respelled
+
+if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
+
+    from limitsets.feeder.scene.schema import Table
+
+
+# ----------------------------------------------------------------
+# What is improbable in a scene: values that most often have a wrong unit.  They are told, and not refused.
+
+
+# A speed in deg/s for rad/s turns a part by 1/3000 of what is usual, one in rpm for deg/s 36 times as far.
+LEAST_TURNS, MOST_TURNS = 0.005, 4
+USUAL_TURNS = (0.05, 1)
+
+
+class Doubt(NamedTuple):
+    """An improbable value, in the words of an error.
+
+    Parameters
+    ----------
+    key : str
+        Where it stands.
+    thing, value : str
+        What it comes to, and how it is written.
+    allowed, remedy : str
+        What is usual, and what to look at.
+    file : str or None
+        The file.
+    """
+
+    key: str
+    thing: str
+    value: str
+    allowed: str
+    remedy: str
+    file: str | None
+
+    def __str__(self) -> str:
+        place = f"{self.file}: {self.key}" if self.file else self.key
+        return f"{place}: careful, {self.value!r}: {self.thing}; usual: {self.allowed}; {self.remedy}"
+
+
+# Key, value as written, what is measured of it, least and largest that is believed, what it comes to, what is usual.
+Row: TypeAlias = tuple[str, str, float, float, float, str, str]
+
+
+def doubts(scene: Scene) -> tuple[Doubt, ...]:
+    """Find what is improbable in a scene: the first of each key.
+
+    Examples
+    --------
+    >>> from limitsets.scene import load
+    >>> doubts(load("paper-designed"))
+    ()
+    >>> doubts(load("paper-designed").with_values({"arm.surface_height": "-0.2 m"}))[0].thing
+    "1.17 times the part's longest side"
+    """
+    found: dict[str, Doubt] = {}
+    for key, value, measured, least, most, thing, usual in _rows(scene):
+        if not least <= measured <= most and not (key.startswith("throw.") and "arm.length" in found):
+            thing = thing.format(f"{measured:.3g}" if measured < 1000 else f"{measured:.0f}")
+            found.setdefault(key, Doubt(key, thing, value, usual, "has it the right unit?", scene.file))
+    return tuple(found.values())
+
+
+def _rows(scene: Scene) -> Iterator[Row]:
+    """Give what is measured of a scene."""
+    text, unit, metre = scene.text, scene.unit, float(exact_factor(scene.unit, "m"))
+    part, throw, mass = text["part"], text["throw"], text["part"]["mass"]
+    arm, size, over = scene.arm_length, float(scene.sides.length.max()), "{} times the part's longest side"
+    shape = "part.sides" if "sides" in part else "part.vertices"
+    yield shape, f"{size:.4g} {unit}", size * metre, 1e-4, 1.0, "the longest side is {} m", "1 mm to 0.5 m"
+    yield "arm.length", text["arm"]["length"], arm * metre, 1e-3, 3.0, "the arm is {} m long", "1 cm to 2 m"
+    yield "arm.length", text["arm"]["length"], arm / size, 0.0, 40.0, over, "2 to 10 times"
+    height = abs(scene.surface_height) / size
+    yield "arm.surface_height", text["arm"]["surface_height"], height, 0.0, 0.5, over, "below 0.5 times"
+    if "center" in mass:
+        reach = max(math.dist(scene.centre, vertex) for vertex in scene.vertices.tolist())
+        key, radius = "part.mass.radius_of_gyration", scene.radius_of_gyration / reach
+        said = "{} times the way from the centre of mass to the farthest vertex"
+        yield key, mass["radius_of_gyration"], radius, 0.02, 1.0, said, "0.2 to 0.7 times"
+    else:
+        yield from _rows_of_plate(mass, (scene.vertices * metre).tolist(), size * metre)
+    if scene.gravity is not None:
+        ((word, given),) = text["gravity"].items()
+        pull = scene.gravity * metre
+        said = "gravity in the plane of the motion is {} m/s^2"
+        yield f"gravity.{word}", given, pull, 0.3, 11.0, said, "0.5 to 9.81 m/s^2"
+    ((word, given),) = throw.items()
+    speeds = [f"{_in_words(scene, word, share):.3g}" for share in USUAL_TURNS]
+    here = f"{USUAL_TURNS[0]} to {USUAL_TURNS[1]} times, here {' to '.join(speeds)}"
+    unit_of_throw = "deg/s" if word == "speed" else unit
+    said = "a part thrown from the arm's end turns {} times before it lands"
+    turned = turns(arm, scene.kappa)
+    yield f"throw.{word}", given, turned, LEAST_TURNS, MOST_TURNS, said, f"{here} {unit_of_throw}"
+    for name, deviation in scene.tolerance.items():
+        key, given = f'tolerance."{name}"', text["tolerance"][name]
+        if find(name).dimension == "length" and not deviation.relative and name != "throw.kappa":
+            yield key, given, deviation.value / size, 0.0, 0.25, over, "below 0.05 times"
+        elif deviation.relative or name != "gravity.tilt" or "tilt" in text["gravity"]:
+            share = deviation.value if deviation.relative else deviation.value / abs(scene.value(name))
+            yield key, given, share, 0.0, 0.5, "{} times the value itself", "below 0.1 times"
+    if "throw_rate" in text.get("world", {}):
+        rate = scene.world.more["throw_rate"]
+        given, said = text["world"]["throw_rate"], "{} throws a second"
+        yield "world.throw_rate", given, rate, 0.01, 20.0, said, "0.1 to 10"
+
+
+def _in_words(scene: Scene, word: str, turned: float) -> float:
+    """Give kappa [length], or the speed [deg/s], with which a part thrown from the arm's end turns so often."""
+    kappa = scene.kappa * turns(scene.arm_length, scene.kappa) / turned
+    if word == "kappa" or scene.gravity is None:
+        return kappa
+    return math.degrees(math.sqrt(scene.gravity / kappa))
+
+
+def _rows_of_plate(mass: Mapping[str, Any], vertices: list[Any], size: float) -> Iterator[Row]:
+    """Give what is measured of a plate with point masses; vertices and size in metres."""
+    text, thickness = mass["plate_density"], 1.0
+    volume = density_dimension(text) == "mass per volume"
+    unit = "kg/m^3" if volume else "kg/m^2"
+    density = convert(parse(text, density_dimension(text)), unit)
+    least, most, usual = (10.0, 25e3, "500 to 8000 kg/m^3") if volume else (0.02, 1e3, "0.5 to 80 kg/m^2")
+    yield "part.mass.plate_density", text, density, least, most, f"the plate has {{}} {unit}", usual
+    if volume:
+        thickness = convert(parse(mass["plate_thickness"], "length"), "m")
+        said = "{} times the part's longest side"
+        key = "part.mass.plate_thickness"
+        yield key, mass["plate_thickness"], thickness / size, 0.0, 0.5, said, "below 0.2 times"
+    plate = mass_of(vertices, density * thickness).mass
+    said = f"{{}} times the plate, which weighs {1000.0 * plate:.3g} g"
+    for k, point in enumerate(mass.get("points", ())):
+        given, key = point["mass"], f"part.mass.points[{k}].mass"
+        yield key, given, convert(parse(given, "mass"), "kg") / plate, 0.0, 30.0, said, "up to a few times it"
+
+
+# ----------------------------------------------------------------
+# A scene to start from: every key that a scene may have, with what it means, in the words of the schema.
+
+
+# The scene that it is, as it stands, under another name.
+LIKE = "paper-designed"
+
+# Tables below the first level with a heading of their own.
+HEADED = ("part.mass",)
+
+WIDTH = 100
+
+# Lengths and accelerations of that scene, as its text has them.
+_LENGTHS = re.compile(r'"([+-]?[0-9.]+) in(/s\^2)?"')
+
+HEAD = """\
+# A scene of limitsets: a part, the arm that throws it, and what is asked of them.
+#
+# A quantity is text, a decimal number and a unit: "5.75 in", "146 mm", "158 deg/s".
+# Lines that begin with "#" and a key are optional: take the sign away, and set the value.
+# limitsets check {file}     says what is wrong with it
+# limitsets analyse {file}   says where the throws lead
+"""
+
+
+def starting_text(name: str, file: str, unit: str = "in") -> str:
+    """Write the scene as TOML, its lengths in a unit; it loads as it is.
+
+    Examples
+    --------
+    >>> load(starting_text("mine", "mine.toml")).name
+    'mine'
+    """
+    from limitsets.feeder.scene.schema import scene_table
+
+    given = load(LIKE).as_dict() | {"name": name}
+    lines: list[str] = []
+    for key, field in scene_table(with_effects=True).model_fields.items():
+        inner = _model(field.annotation)
+        if inner is not None:
+            lines += _table(key, inner, given.get(key))
+        elif key in given:
+            lines += [*_line(key, given[key], field), ""]
+        else:
+            lines += [*_quantities(key, field), ""]
+    body = (
+        _LENGTHS.sub(lambda found: _in_unit(found, unit), "\n".join(lines))
+        if unit != "in"
+        else "\n".join(lines)
+    )
+    return HEAD.format(file=file) + "\n" + body.rstrip("\n") + "\n"
+
+
+def _in_unit(found: re.Match[str], unit: str) -> str:
+    """Convert a quantity in inches, to 10 digits."""
+    value = convert(parse(f"{found[1]} in", "length"), unit)
+    return f'"{value:.10g} {unit}{found[2] or ""}"'
+
+
+def new_scene(file: str | Path, unit: str = "in") -> Path:
+    """Write a scene to start from, with comments.
+
+    Parameters
+    ----------
+    file : str or Path
+        Where to: a name that ends in .toml, of a file that is not there yet.
+    unit : str
+        The unit of its lengths.
+
+    Raises
+    ------
+    SceneError
+        It is there, cannot be written, or is no such name; or an unknown unit.
+    """
+    path = Path(file)
+    if path.suffix != ".toml":
+        raise SceneError("the new scene", str(file), "a name that ends in .toml", f"name it {path.name}.toml")
+    if unit not in UNITS["length"]:
+        raise SceneError("the unit of the new scene", unit, ", ".join(UNITS["length"]), "name one of them")
+    if path.exists():
+        raise SceneError("the new scene", str(file), "a file that is not there", "name another one")
+    name = path.stem if can_name(path.stem) else "mine"
+    replace_file(path, starting_text(name, path.name, unit))
+    return path
+
+
+def example_at(path: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], Any]:
+    """Give the example of a key, and the key; of a number in a list those of the list.
+
+    Examples
+    --------
+    >>> example_at(("goal", "flip_order", 1))
+    (('goal', 'flip_order'), [0, 1, 2])
+    """
+    from limitsets.feeder.scene.schema import scene_table
+
+    table: Any = scene_table(with_effects=path[0] == "effects")
+    for k, word in enumerate(path):
+        if isinstance(word, str):
+            field, end = table.model_fields[word], k + 1
+            table = _model(field.annotation)
+            if table is None:
+                break
+    return path[:end], _example(field)
+
+
+def _table(path: str, table: type[Table], given: Mapping[str, Any] | None) -> Iterator[str]:
+    """Write a table under its heading, all of it commented out where it is not given."""
+    off = "" if given is not None else "# "
+    yield f"# {(table.__doc__ or '').strip()}"
+    yield f"{off}[{path}]"
+    below = []
+    for key, field in table.model_fields.items():
+        inner = _model(field.annotation)
+        if f"{path}.{key}" in HEADED and inner is not None:
+            below.append((f"{path}.{key}", inner, None if given is None else given.get(key)))
+            continue
+        on = given is not None and key in given
+        yield from _line(key, given[key] if given is not None and on else _example(field), field, on=on)
+        if inner is not None:
+            yield from (f"#     {word}: {each.description}" for word, each in inner.model_fields.items())
+    yield ""
+    for each in below:
+        yield from _table(*each)
+
+
+def _quantities(key: str, field: FieldInfo) -> Iterator[str]:
+    """Write a table whose keys are names of quantities."""
+    yield f"# {field.description}"
+    yield f"# [{key}]"
+    yield from (f"# {_word(name)} = {_toml(value)}" for name, value in _example(field).items())
+
+
+def _line(key: str, value: Any, field: FieldInfo, *, on: bool = True) -> list[str]:
+    """Write a key with what it means behind it; above it where the line would be long."""
+    line = ("" if on else "# ") + f"{key} = {_toml(value)}"
+    whole = f"{line}  # {field.description}"
+    return [whole] if len(whole) <= WIDTH else [f"#     {field.description}:", line]
+
+
+def _model(annotation: Any) -> type[Table] | None:
+    """Find the table in an annotation: itself, of several, or None."""
+    from limitsets.feeder.scene.schema import Table
+
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _model(part)) is not None), None)
+
+
+def _example(field: FieldInfo) -> Any:
+    """Give the example of a key: its own, that of its type, or one made of those of its table."""
+    for examples in (field.examples, *_examples(field.annotation)):
+        if examples:
+            return examples[0]
+    inner = _model(field.annotation)
+    if inner is None:  # a switch
+        return True
+    made = {key: _example(each) for key, each in inner.model_fields.items()}
+    for instead in ("side" if "beyond" in made else "", "speed" if "name" in made else ""):
+        made.pop(instead, None)  # one of two ways to say it
+    return [made] if _is_list(field.annotation) else made
+
+
+def _examples(annotation: Any) -> Iterator[Any]:
+    """Give the examples that the types in an annotation carry."""
+    for part in get_args(annotation):
+        if (found := getattr(part, "examples", None)) is not None:
+            yield found
+        yield from _examples(part)
+
+
+def _is_list(annotation: Any) -> bool:
+    return get_origin(annotation) is list or any(map(_is_list, get_args(annotation)))
+
+
+def _word(key: str) -> str:
+    return key if key.replace("_", "").replace("-", "").isalnum() else json.dumps(key)
+
+
+def _toml(value: Any) -> str:
+    """Write a value in one line of TOML."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_word(key)} = {_toml(each)}" for key, each in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+# ----------------------------------------------------------------
+
+
+# Without these there is no scene; all other tables can be left out to look at the rest.
+NEEDED = ("name", "part", "arm", "throw")
+
+# On these hangs the shape of all else: no other value may stand for them.
+SHAPES = (("part",), ("arm", "length"))
+
+# What stands for a table that is refused, since others need one.
+INSTEAD = {"throw": {"kappa": "25 in"}, "gravity": {"tilt": "30 deg"}}
+
+# The words of a key: in quotation marks, a number, or plain.
+_WORDS = re.compile(r'"([^"]*)"|\[(\d+)\]|([^.\[\]"]+)')
+
+Words: TypeAlias = tuple[str | int, ...]
+
+
+def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, ...], tuple[Doubt, ...]]:
+    """Find all that is wrong with a scene, and what is improbable in it.
+
+    Words, values and units are looked at all together.  Contradictions are met one after another, each with another
+    value in place of the one before and of what was refused; of vertices that are not convex the hull stands in, and a
+    part whose words are wrong hides them.  A wrong number of a list hides those after it.
+
+    Parameters
+    ----------
+    source : str, Path or mapping
+        As for `limitsets.load`.
+
+    Returns
+    -------
+    (tuple of SceneError, tuple of Doubt)
+        What is wrong, empty for a scene that loads; and what is improbable, where part, arm, throw and gravity are not
+        wrong.
+
+    Examples
+    --------
+    >>> wrong = {"part": {"sides": ["5 in"]}, "arm": {"length": 28}, "throw": {"kapa": "25 in"}}
+    >>> [error.key for error in examined(wrong)[0]][:4]
+    ['throw.kapa', 'arm.length', 'part.mass', 'arm.surface_height']
+    """
+    try:
+        structure, file = structure_of(source)
+        tree, found = respelled(plain(structure, file), file)
+        while inner := respelled(tree, file)[1]:  # in a table whose own name was misspelt
+            tree, found = respelled(tree, file)[0], found + inner
+    except SceneError as error:  # no file, no TOML: there is nothing more to look at
+        return (error,), ()
+    refused = refusals(tree, file)[1]
+    found += refused
+    blamed = {_path_of(error) for error in refused}
+    looked_at = _mended(tree, blamed)
+    if looked_at is None:
+        return tuple(found), ()
+    instead: set[Words] = set()
+    while (wrong := _first(looked_at, file)) is not None:
+        path = _path_of(wrong)
+        # a tolerance of what is blamed already is not given only because something stands in for that
+        about = {path, _words_of(str(path[1]))} if path[0] == "tolerance" and len(path) == 2 else {path}
+        if not any(each[: len(one)] == one for each in about for one in (*blamed, *instead)):
+            found.append(wrong)
+            blamed.add(path)
+            instead |= _hanging_on(wrong)
+        after = _passed(looked_at, wrong, file)
+        if after is None:
+            return tuple(found), ()
+        looked_at = after
+    # the masses by which a part tips over are looked at, what stands in for another value is not
+    tips = {_path_of(error) for error in found if isinstance(error, TipsError)}
+    if any(path[0] in ("part", "arm", "throw", "gravity") for path in blamed - tips):
+        return tuple(found), ()
+    return tuple(found), doubts(Scene.of(looked_at, file))
+
+
+def _path_of(error: SceneError) -> Words:
+    return _words_of(error.key or "")
+
+
+def _words_of(key: str) -> Words:
+    """Take a key apart."""
+    return tuple(part[0] or part[2] or int(part[1]) for part in _WORDS.findall(key))
+
+
+def _hanging_on(error: SceneError) -> set[Words]:
+    """Say of what nothing is told where another shape stands in for the vertices."""
+    if error.key != "part.vertices" or error.value == "clockwise":
+        return set()
+    return {("part",), ("cavity",), ("tray",)}
+
+
+def _mended(tree: Tree, blamed: Iterable[Words]) -> Tree | None:
+    """Put the schema's examples in place of what was refused; None where the shape of part or arm hangs on it."""
+    tree = copy.deepcopy(tree)
+    for path in blamed:
+        if any(path[: len(each)] == each[: len(path)] for each in SHAPES):
+            return None
+        first = str(path[0])
+        if first in INSTEAD:
+            tree[first] = INSTEAD[first]
+        elif first == "tolerance" and len(path) > 1:
+            tree[first].pop(path[1], None)
+        else:
+            path, example = example_at(path)
+            _at(tree, path[:-1])[path[-1]] = example
+    return tree
+
+
+def _first(tree: Tree, file: str | None) -> SceneError | None:
+    """Find the first thing wrong."""
+    try:
+        Scene.of(tree, file)
+    except SceneError as error:
+        return error
+    return None
+
+
+def _passed(tree: Tree, error: SceneError, file: str | None) -> Tree | None:
+    """Give the scene without a contradiction, so that the next one is met; None where there is none to go on with.
+
+    Another value stands in for what is wrong, or nothing; where neither helps, the whole table is left out.
+    """
+    path = _path_of(error)
+    if isinstance(error, TipsError):
+        on = tree.get("effects", {}) | dict.fromkeys(TIPPING, True)
+        return None if on == tree.get("effects") else tree | {"model": {}, "effects": on}
+    usable: list[Tree] = []
+    for stand_in in _shapes(tree, error) if path == ("part", "vertices") else _stand_ins(_at(tree, path)):
+        other = copy.deepcopy(tree)
+        node = _at(other, path[:-1])
+        if stand_in is not None:
+            node[path[-1]] = stand_in
+        elif isinstance(node, dict):
+            del node[path[-1]]
+        else:
+            continue
+        after = _first(other, file)
+        if after is None:  # a further error may be of the stand-in itself, where another one has none
+            return other
+        if not f"{error.key}.".startswith(f"{after.key}."):
+            usable.append(other)
+    if usable:
+        return usable[0]
+    if not path or path[0] in NEEDED:
+        return None
+    return {key: value for key, value in tree.items() if key != path[0]}
+
+
+def _at(tree: Any, path: Words) -> Any:
+    """Return what stands there, None where nothing does."""
+    for word in path:
+        try:
+            tree = tree[word]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return tree
+
+
+def _shapes(tree: Tree, error: SceneError) -> Iterator[Any]:
+    """Give vertices in the place of those that are no convex part: the other way round, or of the convex hull."""
+    given = tree["part"]["vertices"]
+    if error.value == "clockwise":
+        yield given[::-1]
+    else:
+        numbers = [[convert(parse(text, "length"), "m") for text in pair] for pair in given]
+        yield hull_of(given, np.array(numbers))
+
+
+def _stand_ins(value: Any) -> Iterator[Any]:
+    """Give values that may be right where this one is wrong, and None for nothing at all."""
+    if isinstance(value, str):
+        unit = value.lstrip("+-.0123456789eE ")
+        yield from (f"{number} {unit}" for number in (1, 0, 1000))
+    elif isinstance(value, int) and not isinstance(value, bool):
+        yield from (0, 1)
+    if value is not None:
+        yield None

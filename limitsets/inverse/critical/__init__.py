@@ -1,1 +1,0 @@
-"""Critical points with their derivatives, and scenes with given critical points."""

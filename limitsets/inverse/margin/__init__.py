@@ -1,1 +1,0 @@
-"""Scenes with a large margin: a search by floats, whose result `limitsets.robust` proves."""

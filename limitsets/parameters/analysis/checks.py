@@ -1,0 +1,313 @@
+"""Comparison of the answer with a thousand orbits from random starts, which reveal attractors that cells missed.
+
+In cells that are too coarse an attractor has an edge out and is not recognised.  Orbits that stay where no attractor
+was found, or do not end where the label of their cell says, reveal it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches, evaluate
+
+if TYPE_CHECKING:
+    from limitsets.feeder.scene import Scene
+    from limitsets.systems.graph import TransitionGraph
+    from limitsets.systems.sets import Attractor, Basins
+
+
+# ----------------------------------------------------------------
+# Places at which an assumption of the model is broken: a flag beside the answers, never a state of the map.
+
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+Extents = Mapping[int, Sequence[tuple[float, float]]]
+
+SAMPLES = 4096
+
+
+def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
+    """Find the starts from which another vertex than the left one would land first.
+
+    The part has then turned by more than the exterior angle at its left vertex, and the model's formulas speak of a
+    landing that does not take place.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    dict of int to list of (lo, hi)
+        Per side of the part the intervals of `scene.domain`, ascending [length]; an empty list where it never
+        happens, or where the scene simulates the effect `landing`.  Between 4096 samples a narrower interval may be
+        missed.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.analysis import other_vertex_first
+    >>> found = other_vertex_first(ls.load("paper-designed"))
+    >>> [(side, round(lo, 4)) for side, parts in found.items() for lo, _ in parts]
+    [(0, 20.1517), (1, 26.4235)]
+    """
+    from limitsets.feeder.thrower import impact_angles
+    from limitsets.proofs.auditing.judging import where
+
+    if scene.effects.landing:
+        return {side: [] for side in range(len(scene.sides))}
+    found = {}
+    for side in range(len(scene.sides)):
+        corner = float(scene.sides.corner[side])
+        x = np.linspace(float(scene.domain.lo[side, 0]), float(scene.domain.hi[side, 0]), SAMPLES)
+
+        def beyond(at: Array, side: int = side, corner: float = corner) -> NDArray[np.bool_]:
+            return impact_angles(scene.map, at, side) > corner
+
+        found[side] = where(beyond, x)
+    return found
+
+
+def in_limit_sets(flags: Extents, sets: Iterable[Extents]) -> dict[int, list[Interval]]:
+    """Give, per side, where in a limit set a flag is [length]; sides without any are left out.
+
+    Examples
+    --------
+    >>> from limitsets.analysis import in_limit_sets
+    >>> in_limit_sets({0: [(1.0, 3.0)]}, [{0: [(2.0, 5.0)]}, {1: [(0.0, 1.0)]}])
+    {0: [(2.0, 3.0)]}
+    """
+    found: dict[int, list[Interval]] = {}
+    for extents in sets:
+        for side, parts in extents.items():
+            found.setdefault(side, []).extend(
+                (max(a, lo), min(b, hi))
+                for a, b in flags.get(side, ())
+                for lo, hi in parts
+                if max(a, lo) <= min(b, hi)
+            )
+    return {side: sorted(parts) for side, parts in sorted(found.items()) if parts}
+
+
+# ----------------------------------------------------------------
+# The scene's goal, evaluated on the attractors found.
+
+
+@dataclass(frozen=True)
+class GoalOutcome:
+    """A goal and what the analysis says to it.
+
+    Attributes
+    ----------
+    goal : Goal
+        What was asked.
+    holds : bool or None
+        None where this analysis cannot tell.
+    threshold : float or None
+        Where the goal begins or ceases to hold, see `limitsets.goals.Verdict`; None where there is no such number.
+    how : str
+        "sampled": read off sampled cells, no proof.
+    reach : tuple of float
+        The largest x of each limit set, or, where the goal says `from_anywhere`, of all landings [length].
+    """
+
+    goal: Goal
+    holds: bool | None
+    threshold: float | None
+    how: str = "sampled"
+    reach: tuple[float, ...] = ()
+
+    @property
+    def vacuous(self) -> bool:
+        """Whether it holds only because nothing gets to where it is asked."""
+        if not (isinstance(self.goal, OrientedBeyond) and self.holds and self.reach):
+            return False
+        return max(self.reach) <= self.goal.x
+
+
+def _may_leave(graph: TransitionGraph) -> float:
+    """Share of the starts from which some path leaves the arm."""
+    from limitsets.systems.graph.components import reach
+
+    leads_out = reach(graph.ranges, graph.components(), graph.ranges.exits) != 0
+    weight = graph.grid.measure
+    return float(weight[leads_out].sum() / weight.sum())
+
+
+def _after_any_throw(graph: TransitionGraph) -> Extents:
+    """Where a part can rest after one throw or more: the image of the whole domain holds all later images."""
+    from limitsets.systems.maps import along, has_slope, monotone_pieces
+
+    if not has_slope(graph.map):
+        return _seen_after_a_throw(graph)
+    domain = graph.grid.domain
+    found: dict[int, list[tuple[float, float]]] = {}
+    for side, pieces in monotone_pieces(graph.map, domain).items():
+        for piece in pieces:
+            ends, sides, _ = along(graph.map, [piece.lo, piece.hi], side, [piece.branch])
+            to = int(sides[0])
+            lo = max(float(ends.min()), float(domain.lo[to, 0]))
+            hi = min(float(ends.max()), float(domain.hi[to, 0]))
+            if lo <= hi:
+                found.setdefault(to, []).append((lo, hi))
+    return found
+
+
+def _seen_after_a_throw(graph: TransitionGraph) -> Extents:
+    """Find the same from images of the cells' ends, where the map's branches cannot be followed one by one."""
+    from limitsets.systems.maps import images
+
+    found: dict[int, list[tuple[float, float]]] = {}
+    for side, (edges,) in enumerate(graph.grid.edges):
+        there = images(graph.map, edges, side)
+        for to in np.unique(there.side[there.code >= 0]).tolist():
+            x = there.x[(there.code >= 0) & (there.side == to)]
+            found.setdefault(to, []).append((float(x.min()), float(x.max())))
+    return found
+
+
+def goal_outcome(
+    goal: Goal,
+    graph: TransitionGraph,
+    attractors: Sequence[Attractor],
+    basins: Basins,
+    extents: Sequence[Extents],
+) -> GoalOutcome:
+    """Ask a goal.
+
+    Parameters
+    ----------
+    goal : Goal
+        From the scene.
+    graph : TransitionGraph
+        Transitions of the scene's map.
+    attractors : sequence of Attractor
+        What was found.
+    basins : Basins
+        Which starts go where.
+    extents : sequence of mapping
+        Per attractor its best known extents [length].
+
+    Returns
+    -------
+    GoalOutcome
+    """
+    orders = {attractor.flip_order for attractor in attractors}
+    order = next(iter(orders)) if len(orders) == 1 else None
+    leaving = _may_leave(graph) if goal.from_anywhere or not attractors else 0.0
+    wanted = [_after_any_throw(graph)] if goal.from_anywhere else list(extents)
+    outcomes = [
+        evaluate(goal, each, flip_order=order, fractions=basins.attractors, leaving=leaving)
+        for each in wanted or [{}]
+    ]
+    verdict = goal.worst(outcomes)
+    holds = verdict.holds
+    if holds and not any(wanted):
+        holds = None  # nothing stays on the arm: the sentence would hold of nothing
+    if isinstance(goal, Reaches) and holds and not goal.from_anywhere and _may_leave(graph) > 0:
+        holds = None  # some starts leave before they get there
+    threshold = (
+        verdict.threshold if verdict.threshold is not None and math.isfinite(verdict.threshold) else None
+    )
+    reach = tuple(
+        max((hi for parts in each.values() for _, hi in parts), default=-math.inf) for each in wanted
+    )
+    return GoalOutcome(goal, holds, threshold, reach=reach)
+
+
+# ----------------------------------------------------------------
+
+
+# Starts, and throws after which they are looked at: most have come to an attractor by the first.
+STARTS, THROWS = 1000, (100, 1000, 4000)
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where random starts go, beside what the cells say.
+
+    Attributes
+    ----------
+    count, throws : int
+        Starts, by length over all sides, and the most throws that each was followed for.
+    elsewhere : float
+        Share that is still on the arm after them, and in no attractor that was found.
+    contradicted : float
+        Share that ended elsewhere than the label of its cell says.
+    """
+
+    count: int
+    throws: int
+    elsewhere: float
+    contradicted: float
+
+    @property
+    def missed(self) -> float:
+        """Share for which the cells have no answer, or a wrong one."""
+        return self.elsewhere + self.contradicted
+
+    @property
+    def advice(self) -> str | None:
+        """What is missing and what to do about it; None where all starts agree with the cells."""
+        parts = []
+        if self.elsewhere:
+            parts.append(
+                f"{100 * self.elsewhere:.3g} % of {self.count} random starts are still on the arm after {self.throws} "
+                "throws, where no limit set was found: one is missing, or they are slow"
+            )
+        if self.contradicted:
+            parts.append(
+                f"{100 * self.contradicted:.3g} % of {self.count} random starts end elsewhere than their cells say"
+            )
+        return "; ".join(parts) + "; ask for more cells" if parts else None
+
+
+def against_starts(graph: TransitionGraph, attractors: Sequence[Attractor], basins: Basins) -> Starts:
+    """Throw a thousand random starts, the same ones each time, and compare.
+
+    Parameters
+    ----------
+    graph : TransitionGraph
+        Transitions of a scene's map.
+    attractors : sequence of Attractor
+        What was found in it.
+    basins : Basins
+        Their basins.
+
+    Returns
+    -------
+    Starts
+    """
+    from limitsets.systems.maps import advance, codes
+
+    grid, rng = graph.grid, np.random.default_rng(0)
+    length = grid.domain.hi[:, 0] - grid.domain.lo[:, 0]
+    side = rng.choice(grid.sides, STARTS, p=length / length.sum())
+    x = grid.domain.lo[side, 0] + rng.random(STARTS) * length[side]
+    label = basins.labels[_cells(grid, x, side)]
+    end = np.full(STARTS, codes.UNDECIDED)  # as long as a start is on the arm and in no attractor
+    going, thrown = np.arange(STARTS), 0
+    number = np.full(grid.n_cells + 1, codes.UNDECIDED)  # the last entry is for what lies in no cell
+    for k, attractor in enumerate(attractors):
+        number[:-1][attractor.cells.mask] = k
+    for throws in THROWS:
+        x[going], side[going], code, _ = advance(graph.map, x[going], side[going], throws - thrown)
+        end[going] = np.where(code < 0, code, number[_cells(grid, x[going], side[going])])
+        going, thrown = going[end[going] == codes.UNDECIDED], throws
+    wrong = (label != codes.UNDECIDED) & (end != codes.UNDECIDED) & (label != end)
+    return Starts(STARTS, THROWS[-1], going.size / STARTS, float(wrong.mean()))
+
+
+def _cells(grid: Any, x: Any, side: Any) -> Any:
+    found = np.full(x.size, -1)
+    for s in range(grid.sides):
+        found[side == s] = grid.index(x[side == s], s)
+    return found

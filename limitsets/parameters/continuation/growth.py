@@ -1,0 +1,292 @@
+"""Sets of intervals grown from inside: images of short pieces of an orbit, until they fill what the orbit fills.
+
+Cells enclose an attractor from outside, and with it whatever unstable cycle lies in a gap narrower than they are.
+Images of a short interval around a point of the attractor never leave the attractor, so that no gap is closed.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from limitsets.parameters.continuation.path import Place
+from limitsets.systems.maps import advance, along, images
+from limitsets.systems.maps.critical import Array, Flags
+from limitsets.systems.sets.closing import Cycle, Ints
+from limitsets.systems.sets.end_points import BORDER, EPS, IntervalMap, Union, read, same
+
+# Of the extent: half the length of the first pieces, the length at which their images are kept, what counts as none.
+SHORT, LONG, NONE = 1e-9, 1e-3, 1e-14
+MOST_STEPS, MOST_INTERVALS = 3000, 4000
+# Pieces that have not grown tenfold by then do not expand: a quasi-periodic orbit, or the ghost of a cycle.
+EARLY, TENFOLD = 500, 10.0
+
+
+class _Intervals(NamedTuple):
+    """Disjoint closed intervals, ascending by side."""
+
+    side: Ints
+    lo: Array
+    hi: Array
+
+
+class _Pieces:
+    """The monotone pieces of a map as arrays."""
+
+    def __init__(self, forward: IntervalMap, extent: float) -> None:
+        rows = [
+            (side, piece.branch, piece.bottom.x, piece.top.x)
+            for side, pieces in forward.pieces.items()
+            for piece in pieces
+        ]
+        table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+        self.params, self.extent = forward.params, extent
+        self.side, self.branch = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
+        self.bottom, self.top = table[:, 2], table[:, 3]
+        self.lo, self.hi = (np.array(ends) for ends in zip(*forward.bounds, strict=True))
+
+    def image(self, given: _Intervals) -> _Intervals:
+        """F of some intervals; what leaves the domain is dropped."""
+        lo = np.maximum(given.lo[:, None], self.bottom)
+        hi = np.minimum(given.hi[:, None], self.top)
+        # A part that only rounding makes would be thrown elsewhere, far from everything.
+        row, k = np.nonzero((given.side[:, None] == self.side) & (hi - lo > NONE * self.extent))
+        count = row.size
+        if count == 0:
+            return _Intervals(row, lo[row, k], hi[row, k])
+        x = np.concatenate([lo[row, k], hi[row, k]])
+        y, to, _ = along(self.params, x, np.tile(self.side[k], 2), np.tile(self.branch[k], 2)[:, None])
+        to = to[:count]
+        inside = (to >= 0) & (to < self.lo.size)
+        at = np.where(inside, to, 0)
+        low = np.maximum(np.minimum(y[:count], y[count:]), self.lo[at])
+        high = np.minimum(np.maximum(y[:count], y[count:]), self.hi[at])
+        kept = inside & (low <= high)
+        return self.joined(_Intervals(to[kept], low[kept], high[kept]))
+
+    def joined(self, *given: _Intervals) -> _Intervals:
+        """Union; intervals that touch up to rounding are one."""
+        side, lo, hi = (
+            np.concatenate([getattr(each, name) for each in given]) for name in _Intervals._fields
+        )
+        order = np.lexsort((lo, side))
+        side, lo, hi = side[order], lo[order], hi[order]
+        parts = []
+        for s in np.unique(side):
+            here = side == s
+            low, top = lo[here], np.maximum.accumulate(hi[here])
+            begins = np.concatenate([[True], low[1:] > top[:-1] + NONE * self.extent])
+            ends = np.concatenate([np.flatnonzero(begins)[1:] - 1, [low.size - 1]])
+            parts.append((np.full(ends.size, s), low[begins], top[ends]))
+        if not parts:
+            return _Intervals(side, lo, hi)
+        return _Intervals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def _same(one: _Intervals, other: _Intervals, extent: float) -> bool:
+    if one.lo.size != other.lo.size:
+        return False
+    moved = max(np.abs(one.lo - other.lo).max(initial=0.0), np.abs(one.hi - other.hi).max(initial=0.0))
+    return bool((one.side == other.side).all() and moved <= 1e-13 * extent)
+
+
+def grown(
+    forward: IntervalMap, x: Array, side: Ints, extent: float
+) -> dict[int, list[tuple[float, float]]] | None:
+    """Union of all images of short intervals around some points; None where they do not grow, or do not settle."""
+    pieces = _Pieces(forward, extent)
+    lo, hi = np.maximum(x - SHORT * extent, pieces.lo[side]), np.minimum(x + SHORT * extent, pieces.hi[side])
+    found = pieces.joined(_Intervals(side, lo, hi))
+    first = float((found.hi - found.lo).sum())
+    for count in range(MOST_STEPS):
+        length = float((found.hi - found.lo).sum())
+        if length >= LONG * extent:
+            break
+        found = pieces.image(found)
+        if not 0 < found.lo.size <= MOST_INTERVALS or (count == EARLY and length < TENFOLD * first):
+            return None
+    if float((found.hi - found.lo).sum()) < SHORT * extent:
+        return None
+    for _ in range(MOST_STEPS):
+        after = pieces.joined(found, pieces.image(found))
+        if _same(found, after, extent):
+            extents: dict[int, list[tuple[float, float]]] = {}
+            for s, low, high in zip(after.side.tolist(), after.lo.tolist(), after.hi.tolist(), strict=True):
+                extents.setdefault(s, []).append((low, high))
+            return extents
+        if after.lo.size > MOST_INTERVALS:
+            return None
+        found = after
+    return None
+
+
+def carried(
+    forward: IntervalMap,
+    extents: dict[int, list[tuple[float, float]]],
+    domain: object,
+    extent: float,
+    images: int,
+    *,
+    rest: bool,
+) -> tuple[Union, bool]:
+    """Take images of a set until each end comes from a critical orbit or, with `rest`, until no end moves.
+
+    Returns
+    -------
+    union, bool
+        The set with its ends, empty where part of it leaves the domain: then it is no attractor, however long its
+        orbits stay; and whether its ends came to be so.
+    """
+    union, rested = read(extents, domain), 0  # type: ignore[arg-type]  # a Domain
+    for _ in range(images):
+        image, leaves = forward.image(union)
+        if leaves:
+            return {}, False
+        rested = rested + 1 if same(union, image, 1e-12, extent) else 0
+        union = image
+        known = all(end.kind != BORDER for parts in union.values() for part in parts for end in part)
+        if not union or (rested >= 2 if rest else known):
+            return union, bool(union)
+    return union, False
+
+
+# ----------------------------------------------------------------
+# Attracting cycles near the ends of orbits: closest returns, then Newton's method on their itinerary.
+#
+# An orbit that has come near a cycle of slope -1 or 1 creeps; its returns still tell the period, and Newton's method
+# finds the cycle and its multiplier to rounding, on both sides of the bifurcation.
+
+
+MOST_PERIOD = 128
+# Of the extent: a return that may be one of a cycle; how far Newton's method may lead; cycles nearer are one.
+RETURN, FAR, ONE = 1e-4, 0.05, 1e-9
+
+
+class Recorded:
+    """States of many orbits: x and side of shape (n, m + 1), code of shape (n, m)."""
+
+    def __init__(self, x: Array, side: Ints, code: Ints) -> None:
+        self.x, self.side, self.code = x, side, code
+
+    def rows(self, chosen: Flags) -> Recorded:
+        """Give some of the orbits."""
+        return Recorded(self.x[chosen], self.side[chosen], self.code[chosen])
+
+
+def recorded(place: Place, x: Array, side: Ints, steps: int) -> Recorded:
+    """Record orbits step by step; those that leave are left out."""
+    xs, sides, codes = [x], [side], []
+    for _ in range(steps):
+        x, side, code, _ = advance(place.params, xs[-1], sides[-1], 1)
+        xs.append(x)
+        sides.append(side)
+        codes.append(code)
+    found = Recorded(np.stack(xs, axis=1), np.stack(sides, axis=1), np.stack(codes, axis=1))
+    return found.rows((found.code >= 0).all(axis=1) & _on_domain(place, found))
+
+
+def _on_domain(place: Place, found: Recorded) -> Flags:
+    lo, hi = place.domain.lo[found.side, 0], place.domain.hi[found.side, 0]
+    inside: Flags = ((found.x >= lo) & (found.x <= hi)).all(axis=1)
+    return inside
+
+
+def on_itinerary(place: Place, x: Array, side: Ints, words: Ints) -> tuple[Array, Array, Flags]:
+    """Solve F^p(x) = x on forced branches near x: roots, slopes there, and where the method converged."""
+    start, converged = x.copy(), np.zeros(x.size, dtype=bool)
+    slope = np.full(x.size, np.nan)
+    for _ in range(80):
+        k = np.flatnonzero(~converged & np.isfinite(x))
+        if k.size == 0:
+            break
+        y, to, rate = along(place.params, x[k], side[k], words[k])
+        noise = 16.0 * EPS * place.extent * (1.0 + np.abs(rate))
+        slope[k] = rate
+        with np.errstate(divide="ignore", invalid="ignore"):
+            move = (y - x[k]) / (1.0 - rate)
+        done = (np.abs(y - x[k]) <= noise) & (to == side[k])
+        far = ~(np.abs(x[k] + move - start[k]) <= FAR * place.extent)
+        # A last step even where it is done: near slope 1 a small residual is no small error.
+        x[k] = np.where(far, np.where(done, x[k], np.nan), x[k] + move)
+        converged[k] = done
+    return x, slope, converged
+
+
+def _as_cycle(place: Place, x: float, side: int, word: Ints) -> Cycle | None:
+    """Follow one period from a root; None unless the map takes these branches and the cycle attracts."""
+    xs, sides, slopes = np.empty(word.size), np.empty(word.size, dtype=np.int64), np.empty(word.size)
+    for j, branch in enumerate(word.tolist()):
+        xs[j], sides[j] = x, side
+        after, to, slope = along(place.params, [x], side, [branch])
+        x, side, slopes[j] = float(after[0]), int(to[0]), slope[0]
+    multiplier = float(np.prod(slopes))
+    if not abs(multiplier) < 1.0:
+        return None
+    for s in np.unique(sides):
+        if (images(place.params, xs[sides == s], int(s)).code != word[sides == s]).any():
+            return None
+    first = int(np.lexsort((xs, sides))[0])
+    ahead = (np.arange(sides.size) + first) % sides.size
+    rounding = 16.0 * EPS * place.extent * (1.0 + float(np.abs(slopes).max()))
+    return Cycle(xs[ahead], sides[ahead], word[ahead], multiplier, abs(x - float(xs[0])), rounding)
+
+
+def _shortest(place: Place, cycle: Cycle) -> Cycle:
+    """Cycle that this one runs through several times, if that one attracts."""
+    for period in range(1, cycle.period):
+        if cycle.period % period == 0 and cycle.side[period] == cycle.side[0]:
+            if abs(cycle.x[period] - cycle.x[0]) > 1e-3 * place.extent:
+                continue
+            word = cycle.branches[:period]
+            x, _, good = on_itinerary(place, cycle.x[:1].copy(), cycle.side[:1], word[None, :])
+            shorter = _as_cycle(place, float(x[0]), int(cycle.side[0]), word) if good[0] else None
+            if shorter is not None:
+                return shorter
+    return cycle
+
+
+def attracting_cycles(place: Place, found: Recorded) -> tuple[list[Cycle], Flags]:
+    """Find the attracting cycles that orbits have come near; which orbits have come near none."""
+    away = np.abs(found.x[:, 1:] - found.x[:, :1])
+    away[found.side[:, 1:] != found.side[:, :1]] = np.inf
+    near = away <= RETURN * place.extent
+    first = np.where(near.any(axis=1), near.argmax(axis=1) + 1, 0)
+    closest = away.argmin(axis=1) + 1 if away.size else first
+    cycles: list[Cycle] = []
+    left = np.ones(len(found.x), dtype=bool)
+    for periods in (first, 2 * first, np.where(first > 0, closest, 0)):
+        for period in np.unique(periods[left & (periods > 0) & (periods <= MOST_PERIOD)]).tolist():
+            k = np.flatnonzero(left & (periods == period))
+            words = np.ascontiguousarray(found.code[k, :period])
+            x, slope, good = on_itinerary(place, found.x[k, 0].copy(), found.side[k, 0], words)
+            for j in np.flatnonzero(good & (np.abs(slope) < 1.0 + 1e-6)).tolist():
+                side = int(found.side[k[j], 0])
+                if not any(_passes(cycle, float(x[j]), side, place.extent) for cycle in cycles):
+                    cycle = _as_cycle(place, float(x[j]), side, words[j])
+                    if cycle is None:
+                        continue
+                    cycles.append(_shortest(place, cycle))
+                left[k[j]] = False
+    return _told_apart(place, cycles), left
+
+
+def _told_apart(place: Place, cycles: list[Cycle]) -> list[Cycle]:
+    """Cycles of which rounding lets one be told from another: near slope 1 all numbers between two are roots."""
+    kept: list[Cycle] = []
+    for cycle in sorted(cycles, key=lambda each: each.period):
+        twin = False
+        for other in kept:
+            near = other.x[other.side == cycle.side[0]]
+            if cycle.period % other.period or near.size == 0:
+                continue
+            x = np.linspace(cycle.x[0], near[np.abs(near - cycle.x[0]).argmin()], 9)
+            y, _, slope = along(place.params, x, int(cycle.side[0]), cycle.branches)
+            noise = 16.0 * EPS * place.extent * (1.0 + np.abs(slope))
+            twin |= bool((np.abs(y - x) <= noise).all())
+        kept += [] if twin else [cycle]
+    return kept
+
+
+def _passes(cycle: Cycle, x: float, side: int, extent: float) -> bool:
+    return bool((np.abs(cycle.x[cycle.side == side] - x) <= ONE * extent).any())

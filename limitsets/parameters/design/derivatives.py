@@ -1,0 +1,614 @@
+"""First critical points with their derivatives by any quantities of the scene: the implicit function theorem.
+
+At a critical point r the deciding number F(r, q) is zero, so dr/dq = -(dF/dq) / (dF/dr).  F is evaluated on dual
+numbers: from the scene's text through the formulas of `geometry`, and through the impact angle by the same theorem.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from limitsets.base.errors import AnswerError
+from limitsets.base.files import as_table, picked
+from limitsets.feeder.scene import Scene, load
+from limitsets.feeder.scene.numbers import Numbers
+from limitsets.feeder.scene.quantities import base_unit
+from limitsets.feeder.scene.units import convert, parse
+from limitsets.feeder.thrower import impact_angles
+from limitsets.feeder.thrower.flight import Turned
+from limitsets.feeder.thrower.impact import margin, strike
+from limitsets.feeder.thrower.params import FLIGHTS, FLIPS
+from limitsets.systems.cells import Domain
+from limitsets.systems.maps import critical_points
+from limitsets.systems.maps.critical import CriticalPoint, margins
+
+# ----------------------------------------------------------------
+# Dual numbers: a value and its derivatives with respect to several quantities, carried through one computation.
+#
+# In the formulas of `geometry`, which use scalars with ``+ - * /`` and a passed-in ``sqrt``, they give exact
+# derivatives up to rounding, without finite differences.
+
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MultiDual:
+    """A number that knows its derivatives.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    slope : ndarray, shape (k,)
+        Its derivatives with respect to k quantities.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> x, y = MultiDual(3.0, np.array([1.0, 0.0])), MultiDual(2.0, np.array([0.0, 1.0]))
+    >>> (x * y / (x + y)).slope
+    array([0.16, 0.36])
+    """
+
+    value: float
+    slope: Array
+
+    def __float__(self) -> float:
+        return self.value
+
+    def __neg__(self) -> MultiDual:
+        return MultiDual(-self.value, -self.slope)
+
+    def __add__(self, other: MultiDual | float) -> MultiDual:
+        if isinstance(other, MultiDual):
+            return MultiDual(self.value + other.value, self.slope + other.slope)
+        return MultiDual(self.value + other, self.slope)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: MultiDual | float) -> MultiDual:
+        return self + -other
+
+    def __rsub__(self, other: float) -> MultiDual:
+        return -self + other
+
+    def __mul__(self, other: MultiDual | float) -> MultiDual:
+        if isinstance(other, MultiDual):
+            return MultiDual(self.value * other.value, self.value * other.slope + other.value * self.slope)
+        return MultiDual(self.value * other, self.slope * other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: MultiDual | float) -> MultiDual:
+        if isinstance(other, MultiDual):
+            quotient = self.value / other.value
+            return MultiDual(quotient, (self.slope - quotient * other.slope) / other.value)
+        return MultiDual(self.value / other, self.slope / other)
+
+    def __pow__(self, count: int) -> MultiDual:
+        return MultiDual(self.value**count, count * self.value ** (count - 1) * self.slope)
+
+    def __abs__(self) -> MultiDual:
+        return -self if self.value < 0.0 else self
+
+    def __gt__(self, other: float) -> bool:
+        return self.value > other
+
+    def __rtruediv__(self, other: float) -> MultiDual:
+        quotient = other / self.value
+        return MultiDual(quotient, -quotient / self.value * self.slope)
+
+
+def square_root(x: MultiDual) -> MultiDual:
+    """Square root of a number above 0; that of 0 has no derivative."""
+    root = math.sqrt(x.value)
+    return MultiDual(root, x.slope / (2.0 * root))
+
+
+def sine(x: MultiDual) -> MultiDual:
+    """Sine of an angle [rad]."""
+    return MultiDual(math.sin(x.value), math.cos(x.value) * x.slope)
+
+
+def cosine(x: MultiDual) -> MultiDual:
+    """Cosine of an angle [rad]."""
+    return MultiDual(math.cos(x.value), -math.sin(x.value) * x.slope)
+
+
+# ----------------------------------------------------------------
+# The deciding number between jog and flip, on dual numbers (docs/model.md: flight, impact, decision).
+#
+# The formulas of the impact are those of `thrower.impact`.  The impact angle is found by the kernels, refined here, and
+# differentiated by the implicit function theorem, d phi = -df / (df/dphi).
+
+
+# Newton steps on an angle that is right to rounding but for the kernel's last bits.
+STEPS_OF_ANGLE = 3
+# Below this angle phi - sin phi is summed from its series.
+SMALL = 0.5
+
+
+class SideNumbers(NamedTuple):
+    """One side of a part, as `limitsets.parameters.design.derivatives.Seeded` holds it; named as in `params.Side`."""
+
+    a: MultiDual
+    d: MultiDual
+    rho: MultiDual
+    kappa: MultiDual
+    h: MultiDual
+
+    @property
+    def ell(self) -> MultiDual:
+        """Distance of the centre of mass from the left vertex."""
+        return square_root(self.a**2 + self.d**2)
+
+    @property
+    def rho2(self) -> MultiDual:
+        """Squared radius of gyration."""
+        return self.rho**2
+
+    @property
+    def inertia(self) -> MultiDual:
+        """Moment of inertia about the left vertex, per mass."""
+        return self.rho2 + self.a**2 + self.d**2
+
+
+class DecidingNumber(NamedTuple):
+    """What decides.
+
+    Parameters
+    ----------
+    margin : MultiDual
+        Positive where the part flips; energies over m w^2 [length^2].
+    size : float
+        Size of the numbers of which it is the difference.
+    steepness : float
+        df/dphi at the impact, as a share of its two terms: 0 where the vertex only grazes the arm; -1 at small angles.
+    """
+
+    margin: MultiDual
+    size: float
+    steepness: float
+
+
+def decided(flight: str, flip: str, part: SideNumbers, x: MultiDual, phi: float) -> DecidingNumber:
+    """Evaluate what decides for a throw from x that lands at phi.
+
+    Parameters
+    ----------
+    flight, flip : str
+        The models, in a scene's words.
+    part : SideNumbers
+        The side it rests on.
+    x : MultiDual
+        Where it rests [length].
+    phi : float
+        The impact angle to rounding [rad]; not used at small angles.
+    """
+    steepness = -1.0
+    at = None
+    if flight == "exact":
+        angle, steepness = _angle(part, x, phi)
+        at = Turned(angle, sine(angle), 1.0 - cosine(angle), None)
+    omega, barrier = strike(FLIGHTS[flight](), part, x, at)
+    decides: MultiDual = margin(FLIPS[flip](), part.inertia, omega, barrier)
+    kinetic = 0.5 * part.inertia.value * omega.value**2
+    return DecidingNumber(decides, kinetic + abs(barrier.value), steepness)
+
+
+def _short_of_arc(phi: float) -> float:
+    """phi - sin phi, without cancellation."""
+    if phi > SMALL:
+        return phi - math.sin(phi)
+    term, total = phi**3 / 6.0, 0.0
+    for k in range(2, 12):
+        total += term
+        term *= -phi * phi / ((2 * k) * (2 * k + 1))
+    return total
+
+
+def _height(part: SideNumbers, x: MultiDual, phi: float) -> tuple[MultiDual, float, float]:
+    """Height of the left vertex over the arm, its derivative by phi, and the size of that one's terms."""
+    s, v = math.sin(phi), 2.0 * math.sin(0.5 * phi) ** 2
+    reach = x - part.a
+    f = reach * phi + part.a * _short_of_arc(phi) + part.d * v - part.kappa * (0.5 * phi * phi)
+    up = reach.value + part.a.value * v + part.d.value * s
+    down = part.kappa.value * phi
+    return f, up - down, abs(up) + down
+
+
+def _angle(part: SideNumbers, x: MultiDual, phi: float) -> tuple[MultiDual, float]:
+    """Return the impact angle with its derivatives, and how steeply the vertex comes down."""
+    f, slope, size = _height(part, x, phi)
+    for _ in range(STEPS_OF_ANGLE):
+        step = f.value / slope if slope < 0.0 else math.inf
+        if abs(step) > 1e-6 * phi:  # a grazing impact: Newton would leave
+            break
+        phi -= step
+        f, slope, size = _height(part, x, phi)
+    if not slope < 0.0:
+        return MultiDual(phi, f.slope * math.nan), 0.0
+    return MultiDual(phi, -f.slope / slope), slope / size
+
+
+# ----------------------------------------------------------------
+# The first critical point of each side, also beyond the arm's end.
+#
+# A design search passes through scenes whose critical points lie beyond the arm; a value clipped at the arm's end would
+# have no gradient.
+
+
+SAMPLES = 2048
+# Samples below a critical point where the decision is nearly drawn.
+BELOW = 512
+NARROWINGS = 60
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+
+
+def first_points(scene: Scene) -> tuple[CriticalPoint | None, ...]:
+    """Find the first critical point of each side of the minimal model, up to where a throw makes a full turn.
+
+    Returns
+    -------
+    tuple of CriticalPoint or None
+        One per side; None where every throw is decided alike.
+
+    Notes
+    -----
+    No flight that turns less than 2 pi starts beyond a + pi kappa at small angles, or, times 1 + (a + d)/(pi kappa) at
+    most, in the exact model.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> [round(point.x, 5) for point in first_points(ls.load("paper-designed"))]
+    [10.0, 10.0, 20.0]
+    """
+    own, sides = scene.domain, scene.sides
+    turn = sides.a + sides.d + math.pi * scene.kappa
+    domain = Domain(own.lo, np.maximum(own.hi, turn[:, None]), own.anchor)
+    found = critical_points(scene.bare_map, domain, samples=SAMPLES)
+    return tuple(found[side][0] if found[side] else None for side in range(len(sides)))
+
+
+def nearest_miss(scene: Scene, side: int, until: float) -> tuple[float, float] | None:
+    """Find where below a critical point the decision is nearly drawn: an earlier pair of critical points is near.
+
+    Returns
+    -------
+    (float, float) or None
+        x, and the deciding number there; None where it comes nowhere near 0.
+    """
+    a, lo = float(scene.sides.a[side]), float(scene.domain.lo[side, 0])
+    share = np.linspace(0.0, 1.0, BELOW)
+    even, graded = lo + (until - lo) * share, a + (lo - a) * ((until - a) / (lo - a)) ** share
+    x = np.unique(np.clip(np.concatenate([even, graded]), lo, until))
+    values = _abs(scene, x, side)
+    here, higher = values[1:-1], np.maximum(values[:-2], values[2:])
+    # a parabola through the three falls below the lowest by less than the highest stands above it
+    dips = 1 + np.flatnonzero((here < values[:-2]) & (here <= values[2:]) & (here <= higher - here))
+    if dips.size == 0:
+        return None
+    left, right = x[dips - 1], x[dips + 1]
+    for _ in range(NARROWINGS):
+        c, d = right - GOLDEN * (right - left), left + GOLDEN * (right - left)
+        lower = _abs(scene, c, side) < _abs(scene, d, side)
+        left, right = np.where(lower, left, c), np.where(lower, d, right)
+    at = 0.5 * (left + right)
+    least = _abs(scene, at, side)
+    k = int(least.argmin())
+    return float(at[k]), float(least[k])
+
+
+def _abs(scene: Scene, x: npt.NDArray[np.float64], side: int) -> npt.NDArray[np.float64]:
+    return np.abs(margins(scene.bare_map, x, side))
+
+
+# ----------------------------------------------------------------
+# The parameters of a scene as dual numbers, with derivatives with respect to the scene's quantities.
+#
+# From the text of the scene by the reading that floats and spans of rational numbers share
+# (`limitsets.feeder.scene.numbers`).
+
+
+SPEED, KAPPA = "throw.speed", "throw.kappa"
+
+
+class Seeded(NamedTuple):
+    """What the throw map depends on, in the scene's unit.
+
+    Parameters
+    ----------
+    a, d, length : list of MultiDual
+        Per side, in flip order (`limitsets.geometry.RestingSides`).
+    rho, kappa, h : MultiDual
+        Radius of gyration, gravity over squared speed, signed height of the arm's surface.
+    """
+
+    a: list[MultiDual]
+    d: list[MultiDual]
+    length: list[MultiDual]
+    rho: MultiDual
+    kappa: MultiDual
+    h: MultiDual
+
+
+def present(scene: Scene, name: str) -> float:
+    """Return the value of a quantity in the scene's units; a speed that the scene does not know counts as 1.
+
+    A scene given by kappa without gravity has a speed all the same: only its unit is open, and shares of it are not.
+    """
+    return 1.0 if _speed_is_open(scene, name) else scene.value(name)
+
+
+def with_present(scene: Scene, values: Mapping[str, float]) -> Scene:
+    """Return the scene with other values; an open speed s times the present one makes kappa 1/s^2 times its own."""
+    text: dict[str, float | str] = dict(values)
+    if SPEED in values and _speed_is_open(scene, SPEED):
+        text[KAPPA] = scene.kappa / values[SPEED] ** 2
+        del text[SPEED]
+    return scene.with_values(text)
+
+
+def _speed_is_open(scene: Scene, name: str) -> bool:
+    return name == SPEED and scene.gravity is None
+
+
+def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Seeded:
+    """Read a scene's numbers with their derivatives.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    names : sequence of str
+        The quantities to differentiate by, in the scene's units.
+    before : int
+        How many more directions the derivatives have, before those of `names`; zero here.
+
+    Returns
+    -------
+    Seeded
+
+    Raises
+    ------
+    SceneError
+        An unknown quantity, one that this scene does not give, or two that exclude each other.
+    """
+    reader = _Duals(scene, names, before)
+    # the throw does not depend on the corners
+    a, d, length, *_ = zip(*reader.sides(lambda y, _x: y), strict=True)
+    rho, h = reader.shape.radius_of_gyration, reader.number("arm.surface_height")
+    return Seeded(list(a), list(d), list(length), rho, reader.kappa, h)
+
+
+class _Duals(Numbers):
+    """The numbers of one scene, differentiated by some of its quantities."""
+
+    def __init__(self, scene: Scene, names: Sequence[str], before: int) -> None:
+        self.open_speed = SPEED in names and _speed_is_open(scene, SPEED)
+        shown = {name: scene.value(name) for name in names if not (self.open_speed and name == SPEED)}
+        # a speed is written in place of kappa, a tilt in place of an acceleration: then it is what counts
+        self.scene = scene.with_values(shown)
+        super().__init__(self.scene.text, square_root, sine)
+        self.names, self.before = list(names), before
+
+    def seeded(self, value: float, name: str = "") -> MultiDual:
+        """Return a number, the quantity of this name if it is one."""
+        found = MultiDual(value, np.zeros(self.before + len(self.names)))
+        if name in self.names:
+            found.slope[self.before + self.names.index(name)] = 1.0
+        return found
+
+    def constant(self, text: str, dimension: str, key: str = "") -> MultiDual:
+        """Return a text of a dimension."""
+        return self.seeded(convert(parse(text, dimension), base_unit(dimension, self.scene.unit)))
+
+    def number(self, name: str) -> MultiDual:
+        """Return a quantity by its name; kappa by a share of the speed, where nothing else is known of the speed."""
+        found = self.seeded(self.scene.value(name), name)
+        if name == KAPPA and self.open_speed:
+            speed = self.seeded(1.0, SPEED)
+            return found / (speed * speed)
+        return found
+
+
+# ----------------------------------------------------------------
+
+
+# Newton steps from the number that a bisection of the kernels found.
+STEPS = 2
+# Below the square root of rounding two critical points (or a flight and the arm) cannot be told from touching ones.
+TOUCHING = 1e-7
+# A decision this near to being drawn is drawn somewhere else by rounding.
+DRAWN = 1e-12
+# A root is where the decision passes 0; where Newton moves it farther, the decision jumps.
+STRAYED = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalJacobian:
+    """First critical points and their derivatives, to rounding; nothing here is proved.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    names : tuple of str
+        The quantities.
+    values : ndarray, shape (k,)
+        Their values in the scene's units; 1 for a speed that the scene leaves open (given by kappa, without gravity).
+    x : ndarray, shape (n,)
+        First critical point of each side, nan where there is none; may lie beyond the arm's end [length].
+    kinds : tuple of str or None
+        ``"jog->flip"`` or ``"flip->jog"``.
+    matrix : ndarray, shape (n, k)
+        Derivatives of `x` by the quantities, in the scene's units; a row of nan where there are none.
+    reasons : tuple of str or None
+        Per side why there is no derivative.
+    slack : ndarray, shape (3 n,)
+        a, L - a and d of all sides: above 0 as long as every side rests [length].
+    slack_matrix : ndarray, shape (3 n, k)
+        Their derivatives.
+    """
+
+    scene: Scene
+    names: tuple[str, ...]
+    values: Array
+    x: Array
+    kinds: tuple[str | None, ...]
+    matrix: Array
+    reasons: tuple[str | None, ...]
+    slack: Array
+    slack_matrix: Array
+
+    @property
+    def scaled(self) -> Array:
+        """Derivatives by shares of the speed, kappa, gravity and masses; by lengths and angles as they stand."""
+        share = np.array([is_share(name) for name in self.names], dtype=bool)
+        return self.matrix * np.where(share, self.values, 1.0)
+
+    @property
+    def determinant(self) -> float | None:
+        """Determinant of `scaled`, None where it is not square or not known."""
+        whole = self.matrix.shape[0] == self.matrix.shape[1] and bool(np.isfinite(self.matrix).all())
+        return float(np.linalg.det(self.scaled)) if whole else None
+
+    @property
+    def condition(self) -> float | None:
+        """Condition number of `scaled`: its largest singular value over its smallest; None where not known."""
+        return condition_of(self.scaled)
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as plain tables for JSON, null where there is no number."""
+        return as_table(
+            quantities=self.names,
+            critical_points=self.x,
+            **picked(self, "kinds", "matrix"),
+            no_derivative=self.reasons,
+            **picked(self, "determinant", "condition"),
+        )
+
+
+def condition_of(matrix: Array) -> float | None:
+    """Condition number of a matrix without nan; None where it has one, or where it is singular."""
+    if not np.isfinite(matrix).all():
+        return None
+    singular = np.linalg.svd(matrix, compute_uv=False)
+    return float(singular[0] / singular[-1]) if singular[-1] > 0.0 else None
+
+
+def is_share(name: str) -> bool:
+    """Whether a quantity's changes are best measured as shares of it: speed, kappa, gravity, masses."""
+    return name.startswith("throw.") or name.endswith((".mass", ".acceleration"))
+
+
+def require_minimal(scene: Scene) -> None:
+    """Refuse a scene with effects: their decision has no derivatives here."""
+    on = scene.effects.on()
+    if on:
+        raise AnswerError(
+            "the scene's effects",
+            ", ".join(on),
+            "the minimal model",
+            "leave [effects] out: critical points are differentiated and designed in the minimal model",
+        )
+
+
+def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
+    """Differentiate the first critical point of each side by quantities of the scene.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        The scene, or what `limitsets.load` takes.
+    *names : str
+        Quantities (`limitsets.scene.NAMES`); none gives the critical points alone.
+
+    Returns
+    -------
+    CriticalJacobian
+        Where a derivative does not exist `reasons` says why: no critical point, a grazing flight, two critical points
+        that meet (dF/dr = 0), or another one that is about to be the first.
+
+    Raises
+    ------
+    SceneError
+        A quantity that this scene does not give.
+    AnswerError
+        A quantity named twice, or a scene with effects.
+
+    Examples
+    --------
+    >>> found = critical_jacobian("paper-designed", "part.mass.center.along", "part.mass.center.above", "throw.speed")
+    >>> round(found.determinant, 1), round(found.condition, 1)
+    (2152.1, 7.1)
+    """
+    chosen = load(scene)
+    require_minimal(chosen)
+    if len(set(names)) != len(names):
+        raise AnswerError("the quantities", ", ".join(names), "each named once", "leave the repetition out")
+    numbers = numbers_of(chosen, names, before=1)
+    rows = [_Row(chosen, numbers, side, point) for side, point in enumerate(first_points(chosen))]
+    slack = [number for side in zip(*_slacks(numbers), strict=True) for number in side]
+    return CriticalJacobian(
+        chosen,
+        names,
+        np.array([present(chosen, name) for name in names]),
+        np.array([row.x for row in rows]),
+        tuple(row.kind for row in rows),
+        np.array([row.slope for row in rows]).reshape(len(rows), len(names)),
+        tuple(row.reason for row in rows),
+        np.array([float(number) for number in slack]),
+        np.array([number.slope[1:] for number in slack]).reshape(len(slack), len(names)),
+    )
+
+
+def _slacks(numbers: Seeded) -> tuple[Sequence[MultiDual], ...]:
+    right = [length - a for length, a in zip(numbers.length, numbers.a, strict=True)]
+    return numbers.a, right, numbers.d
+
+
+class _Row:
+    """One side: its first critical point, derivatives, or why there are none."""
+
+    def __init__(self, scene: Scene, numbers: Seeded, side: int, point: CriticalPoint | None) -> None:
+        self.scene, self.side = scene, side
+        self.part = SideNumbers(numbers.a[side], numbers.d[side], numbers.rho, numbers.kappa, numbers.h)
+        self.slope = np.full(numbers.h.slope.size - 1, np.nan)
+        self.x: float = np.nan if point is None else point.x
+        self.kind: str | None = None if point is None else point.kind
+        self.reason = "every throw is decided alike" if point is None else self._differentiate(point.x)
+
+    def _decision(self, x: float) -> DecidingNumber:
+        seed = np.zeros(self.slope.size + 1)
+        seed[0] = 1.0
+        phi = float(impact_angles(self.scene.bare_map, [x], self.side)[0])
+        return decided(self.scene.flight, self.scene.flip, self.part, MultiDual(x, seed), phi)
+
+    def _differentiate(self, start: float) -> str | None:
+        x = start
+        found = self._decision(x)
+        for _ in range(STEPS):
+            if abs(found.steepness) < TOUCHING:
+                return "the flight only grazes the arm: another impact is about to be the first"
+            if abs(found.margin.slope[0]) * x < TOUCHING * found.size:
+                return "dF/dr = 0: two critical points meet"
+            step = found.margin.value / found.margin.slope[0]
+            if not abs(step) <= STRAYED * x:
+                return "the decision jumps: the impact, or the way the part turns over, changes there"
+            x -= step
+            found = self._decision(x)
+        miss = nearest_miss(self.scene, self.side, start - 4.0 * STRAYED * start)
+        if miss is not None and miss[1] < DRAWN * self._decision(miss[0]).size:
+            return f"another critical point is about to be the first, at x = {miss[0]:.9g}"
+        self.x = x
+        self.slope = -found.margin.slope[1:] / found.margin.slope[0]
+        return None

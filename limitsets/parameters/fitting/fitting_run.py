@@ -1,0 +1,382 @@
+"""`limitsets.fit`: speed, centre of mass, surface height and radius of gyration from filmed throws."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError, DataError
+from limitsets.base.progress import shown_in_notebooks
+from limitsets.feeder.scene import Scene, load
+from limitsets.feeder.scene.arrays import throw_stack
+from limitsets.feeder.scene.quantities import base_unit, find
+from limitsets.parameters.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
+from limitsets.parameters.fitting.likelihood import (
+    SCATTERS,
+    Likelihood,
+    Question,
+    Rows,
+    as_recorded,
+    further_throws,
+)
+from limitsets.parameters.fitting.misfit import explained, misfit_of
+from limitsets.parameters.fitting.searching import (
+    LEVEL,
+    RADIUS,
+    End,
+    Maximum,
+    Start,
+    largest,
+    profiles,
+    robust_start,
+    spread_of,
+    threshold_of,
+    units_of_change,
+)
+from limitsets.parameters.fitting.throws import Throws, length_of, read_throws, throws_in
+from limitsets.systems.maps.pieces import at_points
+
+# Differences of readings of one place from which an error of measurement is taken.
+READ_TWICE = 10
+# A scatter this small beside the end of its interval is none.
+NOTHING = 1e-3
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+
+@shown_in_notebooks
+@arguments_checked
+def fit(
+    scene: Scene | str | Path,
+    throws: Throws | str | Path,
+    *,
+    error: float | str | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit a scene to filmed throws.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        The machine as far as it is known, in the minimal model; the sides of the part stay as they are.
+    throws : str, Path or Throws
+        A CSV file (`limitsets.fitting.read_throws`), or throws that were read.
+    error : str or float, optional
+        Standard deviation of a measured place, "0.5 mm" or in the scene's unit, where the file has no such column.
+        Where neither is given it is taken from places that were read twice (column `run`), and without these it counts
+        as unknown: the scatter is then an upper bound.
+    progress : callable, optional
+        Called with what is done, how much of it, and of how much.
+
+    Returns
+    -------
+    Fit
+        Values with 95 % intervals, scatter, misrecorded sides, whether the model fits, the scene that has it all.
+
+    Raises
+    ------
+    DataError
+        A file that cannot be read, or throws that cannot be; the first thing wrong, with its row and column.
+    AnswerError
+        A scene with effects.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> import numpy as np
+    >>> from limitsets.fitting import simulated_throws
+    >>> truth = ls.load("paper-designed")
+    >>> film = simulated_throws(truth, np.linspace(8, 23, 48), [0, 1, 2] * 16, error=0.02, speed=0.002, seed=1)
+    >>> found = ls.fit(truth.with_values({"throw.speed": "155 deg/s"}), film)
+    >>> bool(found["throw.speed"].lo < truth.value("throw.speed") < found["throw.speed"].hi)
+    True
+    """
+    begin = time.perf_counter()
+    chosen = load(scene)
+    if chosen.effects.on():
+        raise AnswerError(
+            "the scene's effects", ", ".join(chosen.effects.on()), "the minimal model", "leave [effects] out"
+        )
+    film, refused = _film(throws, chosen)
+    known, errors = _errors(film, error, chosen)
+
+    def tell(step: str, done: int, of: int) -> None:
+        if progress is not None:
+            progress(step, done, of)
+
+    tell("robust least squares", 0, 3)
+    start = None
+    if refused is None:
+        try:
+            start = robust_start(chosen, as_recorded(film, errors, known, len(chosen.sides)))
+        except DataError as error_found:
+            refused = error_found
+    remark = explained(chosen, film, errors, known, start, refused)
+    assert start is not None
+    tell("maximum likelihood", 1, 3)
+    own, best = largest(chosen, start)
+    tell("profiles", 2, 3)
+    threshold = threshold_of(1, len(film), len(start.names))
+    best, ends = profiles(own, best, threshold, start)
+    return _answer(chosen, own, best, ends, start, threshold, remark, begin)
+
+
+def _film(throws: Throws | str | Path, scene: Scene) -> tuple[Throws, DataError | None]:
+    """Return the throws, and what is wrong with their places and sides if something is."""
+    if isinstance(throws, Throws):
+        return throws, None
+    try:
+        return read_throws(throws, scene), None
+    except DataError as refused:
+        return throws_in(throws, scene, anywhere=True), refused
+
+
+def _errors(film: Throws, error: float | str | None, scene: Scene) -> tuple[bool, Array]:
+    """Return whether the errors of measured places are known, and their standard deviations [length]."""
+    column = bool(np.isfinite(film.error).all())
+    if error is not None:
+        if column:
+            remedy = "leave --error or the column out"
+            raise DataError(
+                "the error", "given twice", "an option or a column", remedy, file=film.file or None
+            )
+        return True, np.full(len(film), length_of(error, scene, "the error"))
+    if column:
+        return True, film.error
+    if film.read_twice.size >= READ_TWICE:
+        return True, np.full(len(film), spread_of(film.read_twice) / math.sqrt(2.0))
+    return False, np.zeros(len(film))
+
+
+def _answer(
+    scene: Scene,
+    own: Likelihood,
+    best: Maximum,
+    ends: list[tuple[End, End]],
+    start: Start,
+    threshold: float,
+    remark: str,
+    begin: float,
+) -> Fit:
+    values = own.values(best.at)[0]
+    held, undetermined, quantities = dict(start.held), dict(start.undetermined), []
+    for k, name in enumerate(own.names):
+        lo, hi = (float(own.centre[k] + own.scale[k] * end.at) for end in ends[k])
+        open_ends = sum(end.wall or math.isinf(end.at) for end in ends[k])
+        if name == RADIUS and open_ends == len(ends[k]):
+            others = undetermined.pop(name, "")
+            why = "no decision between jog and flip depends on it closely enough"
+            held[name] = f"the decisions do not tell it apart from {others}" if others else why
+            values[k] = scene.value(name)
+            continue
+        value = float(values[k])
+        if name == RADIUS:  # between a jog and a flip nothing is more likely than the rest
+            value = min(max(scene.value(name), lo), hi) if open_ends else 0.5 * (lo + hi)
+        unit = base_unit(find(name).dimension, scene.unit)
+        quantities.append(Fitted(name, value, lo, hi, unit, not open_ends))
+    scatters = []
+    for k in range(SCATTERS):
+        j = len(own.names) + k
+        lo, hi = (float(own.scale[j] * end.at) for end in ends[j])
+        if math.isinf(lo) and values[j] < NOTHING * hi:
+            values[j] = 0.0
+        scatters.append(Scatter(float(values[j]), max(lo, 0.0), hi, not own.rows.known))
+    found = tuple(quantities)
+    speed, landing = scatters
+    new = fitted_scene(scene, found, speed, landing)
+    told = own.told(values[None])
+    loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
+    misses = own.rows.throws.x_after - told.after[0]
+    sizes = np.sqrt(
+        own.rows.error**2 * (1.0 + told.slope[0] ** 2)
+        + (told.per_log_speed[0] * values[-2]) ** 2
+        + loose[0, 0] ** 2
+    )
+    names = tuple(each.name for each in found)
+    error = own.rows.error
+    if not own.rows.known:  # what the answer may be sharpened to is then told with all scatter as one
+        error = np.full(len(error), landing.value / math.sqrt(2.0))
+    throws = own.rows.throws
+    asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value), throws.corner)
+    more = further_throws(asked, throws.x_before, own.rows.side, error)
+    return Fit(
+        new,
+        scene,
+        own.rows,
+        found,
+        held,
+        undetermined,
+        speed,
+        landing,
+        float(np.mean(own.rows.error)) if own.rows.known else None,
+        *_misread(own.rows, len(scene.sides)),
+        misfit_of(scene, start),
+        remark,
+        misses,
+        sizes,
+        more,
+        time.perf_counter() - begin,
+        own,
+        best,
+        threshold,
+    )
+
+
+def _misread(
+    rows: Rows, sides: int
+) -> tuple[tuple[tuple[int, str, int, int], ...], tuple[float, float, float]]:
+    """Name misrecorded sides, and give their share with its exact interval (Clopper and Pearson)."""
+    from scipy.stats import beta
+
+    throws, after = rows.throws, rows.side_after(sides)
+    lines = [
+        (int(throws.row[k]), "side_before", int(throws.side_before[k]), int(rows.side[k]))
+        for k in np.flatnonzero(rows.misread_before())
+    ]
+    lines += [
+        (int(throws.row[k]), "side_after", int(throws.side_after[k]), int(after[k]))
+        for k in np.flatnonzero(rows.misread_after(sides))
+    ]
+    wrong, count = rows.misread(sides)
+    tail = 0.5 * (1.0 - LEVEL)
+    lo = float(beta.ppf(tail, wrong, count - wrong + 1)) if wrong else 0.0
+    hi = float(beta.ppf(1.0 - tail, wrong + 1, count - wrong))
+    return tuple(sorted(lines)), (wrong / count, lo, hi)
+
+
+# ----------------------------------------------------------------
+# Films that the model itself makes, and how often the intervals of a fit hold on them (parametric bootstrap).
+
+
+def simulated_throws(
+    scene: Scene,
+    x: ArrayLike,
+    side: ArrayLike,
+    *,
+    error: float = 0.0,
+    speed: float = 0.0,
+    landing: float = 0.0,
+    misread: float = 0.0,
+    corner: bool = False,
+    seed: int = 0,
+) -> Throws:
+    """Throw a part once from each place, and film it.
+
+    Parameters
+    ----------
+    scene : Scene
+        The machine, in the minimal model.
+    x, side : array_like, shape (n,)
+        Where the centre of mass of the part really is [length], and on which side the part lies.
+    error : float
+        Standard deviation of each measured place [length].
+    speed, landing : float
+        Of the speed of a throw (share), and of where it lands [length].
+    misread : float
+        Probability that a side after a throw is recorded wrong.
+    corner : bool
+        Whether the film shows the left corner of the side that the part rests on, not the centre of mass.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    Throws
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> film = simulated_throws(ls.load("paper-designed"), [8.0, 21.0], [2, 2])
+    >>> film.x_after.round(6).tolist(), film.side_after.tolist()
+    ([8.262013, 16.552531], [2, 0])
+    """
+    draw = np.random.default_rng(seed)
+    places = np.asarray(x, dtype=np.float64)
+    sides = np.asarray(side, dtype=np.int64)
+    n = places.size
+    # faster by a share: kappa = g / w^2 goes the other way, twice
+    kappa = scene.kappa / (1.0 + speed * draw.standard_normal(n)) ** 2
+    params = throw_stack(scene, {"throw.kappa": kappa}).params
+    jogs, _, decides = (each.diagonal() for each in at_points(params, places, sides, np.zeros(n, np.int64)))
+    flips = at_points(params, places, sides, np.ones(n, np.int64))[0].diagonal()
+    flipped, count = decides > 0.0, len(scene.sides)
+    after = np.where(flipped, flips, jogs) + landing * draw.standard_normal(n)
+    ends = (sides + flipped) % count
+    wrong = draw.random(n) < misread
+    if corner:
+        places, after = places - scene.sides.a[sides], after - scene.sides.a[ends]
+    return Throws(
+        places + error * draw.standard_normal(n),
+        sides,
+        after + error * draw.standard_normal(n),
+        (ends + wrong * draw.integers(1, count, n)) % count,
+        np.full(n, error if error > 0.0 else np.nan),
+        np.zeros(n, dtype=bool),
+        np.arange(2, n + 2),
+        corner=corner,
+    )
+
+
+@dataclass(frozen=True)
+class Bootstrap:
+    """How the intervals of a fit do on films of the fitted machine itself.
+
+    Attributes
+    ----------
+    count : int
+        Films.
+    covered : dict of str to int
+        In how many of them the interval of each quantity holds the fitted value.
+    """
+
+    count: int
+    covered: dict[str, int]
+
+
+def bootstrap(found: Fit, count: int = 200, *, seed: int = 0, progress: Progress | None = None) -> Bootstrap:
+    """Film the fitted machine again and again from the same places, and fit each film.
+
+    Parameters
+    ----------
+    found : Fit
+        A fit.
+    count : int
+        Films; 95 % intervals hold in 179 to 199 of 200.
+    seed : int
+        Of the random numbers.
+    progress : callable, optional
+        Called with what is done, how much of it, and of how much.
+    """
+    rows, own = found.rows, found.likelihood
+    scene = found.given.with_values({each.name: each.value for each in found.quantities})
+    corner = rows.throws.corner
+    read = rows.throws.x_before + (scene.sides.a[rows.side] if corner else 0.0)
+    inside = np.clip(read, None, scene.arm_length)
+    truth = {name: scene.value(name) for name in own.names}
+    covered = dict.fromkeys((each.name for each in found.quantities), 0)
+    for number in range(count):
+        if progress is not None:
+            progress("bootstrap", number, count)
+        film = simulated_throws(
+            scene,
+            inside,
+            rows.side,
+            error=found.error or 0.0,
+            speed=found.speed.value,
+            landing=found.landing.value,
+            corner=corner,
+            seed=seed + number,
+        )
+        again = fit(scene, replace(film, row=rows.throws.row))
+        for each in again.quantities:
+            if each.name in covered:
+                covered[each.name] += each.lo <= truth[each.name] <= each.hi
+    return Bootstrap(count, covered)

@@ -1,0 +1,305 @@
+"""The search for a bracket: how far a goal is proved to hold, and from where on an orbit refutes it.
+
+One quantity at a time.  Time-invariant uncertainty: single scenes come first, which is quick and shows where the goal
+fails.  Then all scenes up to this deviation are proved at once, if two throws with the same parameters settle them; or
+the proof grows outward from the nominal scene in pieces that become narrower towards the failure, each proved as if the
+quantity differed at every throw.  Time-varying disturbance: the range cannot be cut; the search tries sizes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+from limitsets.parameters.margins.deviations import (
+    DeviationScale,
+    Signs,
+    Tolerance,
+    a_little_beyond,
+    halved,
+    short,
+)
+from limitsets.proofs.prover.numbers import RationalInterval
+from limitsets.proofs.prover.parameters import SceneBox
+from limitsets.proofs.prover.query import Outcome, Query, unjoined
+
+Tell = Callable[[float], None]
+"""Called with the share of the bracket that is closed."""
+
+# Steps outward at most, each `FACTOR` times as far; trials of pieces in one direction.
+STEPS, FACTOR, TRIALS = 24, 3, 200
+
+# What to do about a bracket that does not close.
+NARROWER = "it would need finer cells than are tried here: ask for a wider bracket, or another x"
+
+# From this share of the way to where the goal breaks, pieces are tried with the finest cells.
+NEAR = Fraction(3, 4)
+
+# What is smaller than this share of a small deviation counts as none.
+NONE = Fraction(1, 1000)
+
+
+@dataclass(eq=False)
+class Bracket:
+    """What the search found.
+
+    Attributes
+    ----------
+    proved : Fraction
+        Largest size proved, 0 if the scene as it is or nothing is.
+    refuted : Fraction or None
+        Smallest size refuted.
+    pieces : list of Outcome
+        What proves it.
+    against : Outcome or None
+        What refutes it.
+    reason : str
+        Why the bracket is not closed, or does not end.
+    sign : int
+        The direction in which it is refuted.
+    """
+
+    proved: Fraction = Fraction(0)
+    refuted: Fraction | None = None
+    pieces: list[Outcome] = field(default_factory=list)
+    against: Outcome | None = None
+    reason: str = ""
+    sign: int = 1
+
+    def closed(self, width: Fraction) -> bool:
+        """Whether it is narrower than a share of its upper end."""
+        return self.refuted is not None and self.refuted - self.proved <= width * self.refuted
+
+
+class Ray:
+    """Sizes in one direction of a tolerance, each asked as a single scene, and what became of them."""
+
+    def __init__(self, query: Query, tolerance: Tolerance, signs: Signs) -> None:
+        self.query, self.tolerance, self.signs = query, tolerance, signs
+        self.found = Bracket()
+        self.end: Fraction | None = None
+
+    def _at(self, size: Fraction) -> tuple[SceneBox | None, dict[str, str]]:
+        return self.tolerance.corner(size, self.signs), self.tolerance.noise(size)
+
+    def proves(self, size: Fraction, finest: int = 3) -> bool:
+        """Whether the goals are proved at a size."""
+        one = self.query.prove(*self._at(size), finest)
+        if one.verdict != "proved":
+            self.found.reason = one.reason
+        elif size > self.found.proved:
+            self.found.proved, self.found.pieces = size, [one]
+        return one.verdict == "proved"
+
+    def refutes(self, size: Fraction) -> bool:
+        """Whether an orbit violates a goal at a size."""
+        one = self.query.refute(*self._at(size))
+        if one.verdict == "refuted":
+            self.found.refuted = size
+            self.found.against = replace(one, within=self.tolerance.texts(size))
+        return one.verdict == "refuted"
+
+    def ask(self, size: Fraction) -> str:
+        """Ask for the verdict at a size; `end` is where it was neither proved nor refuted last."""
+        one = self.query.prove(*self._at(size), finest=0)
+        if one.verdict not in ("proved", "impossible"):
+            if self.refutes(size):
+                return "refuted"
+            one = self.query.prove(*self._at(size))
+        if one.verdict == "proved":
+            self.found.proved = max(self.found.proved, size)
+        else:
+            self.end, self.found.reason = size, one.reason
+        return one.verdict
+
+    @property
+    def gap(self) -> bool:
+        """Whether nothing is known of some scene before those that are refuted."""
+        return self.found.refuted is not None and self.end is not None and self.end < self.found.refuted
+
+
+def _reach(query: Query, scale: DeviationScale, sign: int, width: Fraction, known: Fraction | None) -> Ray:
+    """Go outward from the scene as it is until single scenes are refuted or cannot be, then halve."""
+    ray, step = Ray(query, Tolerance.alone(scale), (sign,)), scale.least
+    found = ray.found
+    for _ in range(STEPS):
+        size = step if scale.most is None else min(step, (step / FACTOR + scale.most) / 2)
+        if known is not None and found.proved >= known:
+            return ray
+        if ray.ask(size) != "proved":
+            break
+        step *= FACTOR
+    else:
+        return ray
+    least = NONE * scale.least
+    # beyond a gap what is refuted is nearly as near as can be
+    halved(found.proved, size, lambda s: ray.ask(s) == "proved", width, least, stop=lambda: ray.gap)
+    if found.refuted is not None and ray.end is not None:
+        # lower what is refuted towards what is undecided, and raise what is proved
+        halved(ray.end, found.refuted, lambda s: ray.ask(s) != "refuted", width)
+        ray.end = None
+    return ray
+
+
+def _grow(
+    query: Query, scale: DeviationScale, sign: int, target: Fraction, wall: Fraction, tell: Tell
+) -> tuple[Fraction, list[Outcome], str]:
+    """Prove from the scene as it is outward, in pieces; how far, the pieces, and what stops it."""
+    low, pieces, reason = Fraction(0), list[Outcome](), ""
+    share = Fraction(2, 5)
+    step = share * wall
+    for _ in range(TRIALS):
+        if low >= target:
+            return low, pieces, ""
+        step = step if scale.widest is None else min(step, scale.widest)
+        high = min(target, short(low + step, up=True))
+        # far from the wall narrower pieces do as well as finer cells, and to fail with these is what takes time
+        finest = 3 if low > NEAR * wall else 1
+        found = query.prove(scale.piece(scale.between(sign * low, sign * high)), finest=finest)
+        if found.verdict == "proved":
+            pieces.append(found)
+            low, share = high, min(share * Fraction(9, 8), Fraction(3))
+            step = share * (wall - high)
+            tell(float(low / target))
+        else:
+            reason, share = found.reason, share * Fraction(2, 3)
+            step = share * (wall - low)
+            if step < min((wall - target) / 8, target / 1000):
+                break
+    return low, pieces, reason
+
+
+def bracket_fixed(query: Query, scale: DeviationScale, width: Fraction, tell: Tell) -> Bracket:
+    """Bracket the margin of a quantity that is fixed but unknown."""
+    ways: dict[int, Ray] = {}
+    for sign in (-1, 1):
+        known = min(
+            (way.found.refuted for way in ways.values() if way.found.refuted is not None), default=None
+        )
+        ways[sign] = _reach(query, scale, sign, width / 4, known)
+    found = Bracket()
+    for sign, way in ways.items():
+        bad = way.found.refuted
+        if bad is not None and (found.refuted is None or bad < found.refuted):
+            found.refuted, found.against, found.sign = bad, way.found.against, sign
+    ends = [way for way in ways.values() if way.end is not None]
+    if found.refuted is not None:
+        goal = found.refuted * (1 - width * Fraction(6, 10))
+        goal = min([goal, *(way.found.proved for way in ends)])
+    else:
+        goal = min(way.found.proved for way in ends or ways.values())
+    first = next((way for way in ends if way.found.proved == goal), None)
+    if first is not None and first.end is not None:
+        found.reason = f"from {scale.text(first.end)} on: {first.found.reason}"
+    found = _fixed_proof(query, scale, found, short(goal), tell)
+    _come_back(query, scale, found, width)
+    found.reason = "" if found.closed(width) else found.reason
+    return found
+
+
+def _fixed_proof(query: Query, scale: DeviationScale, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:
+    """Prove it all at once, or grow the proof in both directions."""
+    if goal <= NONE * scale.least:
+        return found
+    # all at once first: two throws with the same parameters may settle it
+    whole = query.prove(scale.piece(scale.between(-goal, goal)), finest=1)
+    if whole.verdict == "proved":
+        found.pieces, found.proved = [whole], goal
+        return found
+    wall = found.refuted or goal * Fraction(101, 100)
+    for sign in (-1, 1):
+        near = found.against is not None and sign == found.sign
+        far, pieces, reason = _grow(query, scale, sign, goal, wall if near else 3 * wall, tell)
+        found.pieces += pieces
+        if far < goal:
+            stuck = f"{reason}; {NARROWER}" if reason else f"from there on it is in more than {TRIALS} pieces"
+            goal, found.reason = far, stuck
+            _fails_beyond(Ray(query, Tolerance.alone(scale), (sign,)), sign, far, found)
+            if not far:
+                break
+    found.proved = goal
+    return found
+
+
+def _come_back(query: Query, scale: DeviationScale, found: Bracket, width: Fraction) -> None:
+    """Come back to the size up to which all pieces together are one claim, as a certificate has to make it.
+
+    Each piece is proved for its own starts; where these differ too much, no claim is left for all of them.
+    """
+    pieces, missing = found.pieces, unjoined(found.pieces) if found.pieces else ""
+    if not missing:
+        return
+
+    def joins(size: Fraction) -> bool:
+        nonlocal missing
+        within = _within(query, scale, pieces, size)
+        why = unjoined(within)
+        if not why:
+            found.proved, found.pieces = size, within
+        missing = why or missing
+        return not why
+
+    top = found.proved
+    if joins(top):
+        return
+    found.proved, found.pieces = Fraction(0), []
+    _, bad = halved(Fraction(0), top, joins, min(width, Fraction(1, 50)), NONE * scale.least)
+    found.reason = f"from {scale.text(bad)} on: {missing}"
+
+
+def _within(query: Query, scale: DeviationScale, pieces: Sequence[Outcome], size: Fraction) -> list[Outcome]:
+    """Cut pieces back to a size: those that reach beyond are proved anew, for more starts."""
+    whole, kept = scale.between(-size, size), []
+    for piece in pieces:
+        own = piece.piece.spans[scale.key] if piece.piece is not None else whole
+        lo, hi = max(own.lo, whole.lo), min(own.hi, whole.hi)
+        if (lo, hi) == (own.lo, own.hi):
+            kept.append(piece)
+        elif lo < hi:
+            kept.append(query.prove(scale.piece(RationalInterval(lo, hi))))
+    return kept
+
+
+def _fails_beyond(ray: Ray, sign: int, far: Fraction, found: Bracket) -> None:
+    """Where a proof stops growing, look for a scene that fails: a goal may fail at a size and hold at larger ones."""
+    for beyond in a_little_beyond(far, Fraction(1, 400), 10):
+        size = short(beyond, up=True)
+        if found.refuted is not None and size >= found.refuted:
+            return
+        if ray.refutes(size):
+            found.refuted, found.against, found.sign = size, ray.found.against, sign
+            return
+
+
+def bracket_per_throw(query: Query, scale: DeviationScale, width: Fraction, tell: Tell) -> Bracket:
+    """Bracket the margin of a quantity that is another one at every throw."""
+    ray, size, most = Ray(query, Tolerance.alone(scale), ()), scale.least, scale.most
+    found = ray.found
+    for _ in range(STEPS):
+        if not ray.proves(size, 1):
+            break
+        nearer = FACTOR * size
+        size = nearer if most is None or nearer < most else (size + most) / 2
+    _, size = halved(found.proved, size, lambda s: ray.proves(s, 1), Fraction(1, 40), NONE * scale.least)
+    tell(0.3)
+    for beyond in a_little_beyond(size, Fraction(1, 100), 8):
+        if (most is None or short(beyond) < most) and ray.refutes(short(beyond)):
+            break
+    tell(0.5)
+    if found.refuted is not None and not found.closed(width):
+        ray.proves(short(found.refuted * (1 - width * Fraction(9, 10))), 3)
+    low = high = None  # nothing is known between them
+    while found.refuted is not None and not found.closed(width) and found.refuted > NONE * scale.least:
+        middle = short(((high or found.proved) + found.refuted) / 2)
+        if found.refuted - (high or found.proved) > width / 4 * found.refuted:
+            if ray.refutes(middle) or ray.proves(middle, 3):
+                continue
+            low, high = low or middle, middle
+        elif low is not None and low - found.proved > width / 4 * low:
+            middle = short((found.proved + low) / 2)
+            low = low if ray.proves(middle, 3) else middle
+        else:
+            break
+    found.reason = "" if found.closed(width) else found.reason
+    return found

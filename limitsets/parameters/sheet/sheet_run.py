@@ -1,0 +1,407 @@
+"""Run all parts of a tolerance sheet one after the other."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
+from limitsets.base.progress import GOES_ON, shown_in_notebooks
+from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, by_side
+from limitsets.feeder.scattering import Scattering
+from limitsets.feeder.scene import Scene, load
+from limitsets.feeder.scene.laid import LaidLike
+from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
+from limitsets.parameters.margins.deviations import (
+    DeviationScale,
+    Tolerance,
+    deviation_scale,
+    deviation_scales,
+    nominal_of,
+)
+from limitsets.parameters.margins.joint import joint_margin
+from limitsets.parameters.margins.margin_result import failure, reach_of
+from limitsets.parameters.margins.single import GoalLike, MarginsBeyond, goals_of, margin
+from limitsets.parameters.noise.statistics import (
+    CELLS,
+    Levels,
+    NoiseStatistics,
+    noise_levels,
+    noise_statistics,
+)
+from limitsets.parameters.sheet.entries import Checkpoint, Entry, written
+from limitsets.parameters.sheet.summary import PARTS, Robustness, curve, noise_of, still
+from limitsets.proofs.prover.query import Query
+
+if TYPE_CHECKING:
+    from limitsets.proofs.auditing import Audit
+
+
+NO_TOLERANCE = (
+    "the scene has no [tolerance]; give it one, a deviation for each quantity that deviates together with others: "
+    '"throw.speed" = "1 %"'
+)
+NO_NOISE = (
+    'no noise is given; add scatter = { speed = "0.5 %" } to [world], '
+    "or pass it: --scatter throw.speed='0.5 %'"
+)
+NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reaches"
+
+# For the proofs, and of what is left the share for the joint margin.
+SECONDS, FOR_JOINT = 12.0, 0.5
+
+Progress = Callable[[str, int, int], None]
+
+
+class _SheetRun:
+    """One sheet while it is put together."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        goals: tuple[Goal, ...],
+        todo: Sequence[DeviationScale],
+        tolerance: dict[str, str],
+        checkpoint: Checkpoint,
+        progress: Progress,
+        seconds: float,
+        executor: Executor | None,
+    ) -> None:
+        self.seconds, self.executor = seconds, executor
+        self.end: float | None = None
+        self.scene, self.goals, self.todo, self.tolerance = scene, goals, todo, tolerance
+        self.checkpoint, self.progress = checkpoint, progress
+        self.left_out: dict[str, str] = {}
+        self.done, self.steps = 0, 1
+
+    def tell(self, step: str, share: float = 0.0) -> None:
+        """Say what is being done."""
+        self.progress(step if not share else f"{step}, {100 * share:.0f} %", self.done, self.steps)
+
+    @contextmanager
+    def step(self, words: str) -> Iterator[None]:
+        """One of the steps: said when it begins, counted when it is done."""
+        self.tell(words)
+        yield
+        self.done += 1
+
+    def left(self) -> float:
+        """Seconds that are left for the joint margin and the curve; they count from the first question on."""
+        if self.end is None:
+            self.end = time.perf_counter() + self.seconds
+        return max(self.end - time.perf_counter(), 0.0)
+
+    def singles(self, width: float, verdict: str) -> list[Entry]:
+        """Find the margins of single quantities, those that no earlier run left."""
+        known = [self.checkpoint.find(one.quantity, one.reading, one.unit) for one in self.todo]
+        todo = [one for one, entry in zip(self.todo, known, strict=True) if entry is None]
+        first = next((entry for entry in known if entry is not None), None)
+        answers = iter(self._answers(todo, width, verdict, first))
+        found: list[Entry] = []
+        for one, entry in zip(self.todo, known, strict=True):
+            with self.step(f"margin of {one.quantity}, {one.reading}"):
+                answer = entry or next(answers)
+                if isinstance(answer, str):
+                    self.left_out[f"margin of {one.quantity}, {one.reading}"] = answer
+                else:
+                    found.append(entry or self.checkpoint.keep(answer))
+        return found
+
+    def _answers(
+        self, todo: Sequence[DeviationScale], width: float, verdict: str, first: Entry | None
+    ) -> Iterator[Entry | str]:
+        """Ask for margins, one after the other, or on the executor; it is not handed goals that are code.
+
+        Of one whose search ends with an error, say which.
+        """
+        folder, recheck = self.checkpoint.folder, self.checkpoint.recheck
+        ask = partial(_single, self.scene, self.goals, width, folder, recheck)
+        tried = partial(_tried, ask)
+        if verdict != "proved" and todo:  # no deviation is small enough, whatever the quantity
+            first = first or ask(todo[0], self.tell)
+            yield from (_same(first, one, self.scene) for one in todo)
+        elif (
+            self.executor is None or len(todo) < 2 or any(isinstance(goal, Predicate) for goal in self.goals)
+        ):
+            yield from (tried(one, self.tell) for one in todo)
+        else:
+            yield from self.executor.map(tried, todo)
+
+    def joint(self, width: float) -> Entry | None:
+        """Find the factor on the tolerance."""
+        label = "margin of all together"
+        with self.step(label):
+            entry = self.checkpoint.find("joint", "tolerance", "")
+            if entry is not None:
+                return entry
+            quiet: dict[str, Any] = {"width": width, "tell": lambda share: self.tell(label, share)}
+            quiet["seconds"] = FOR_JOINT * self.left()
+            try:
+                return self.checkpoint.add(joint_margin(self.scene, self.goals, self.tolerance, **quiet))
+            except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
+                self.left_out["joint"] = failure(error)
+                return None
+
+    def curve(self, side: int) -> MarginsBeyond | None:
+        """Find margins against X; None where the part gets farther out on another side."""
+        told: dict[str, Any] = {"tell": self.tell, "keep": self.checkpoint.add_curve, "seconds": self.left()}
+        told["executor"] = self.executor
+        told["laid"] = {int(on): pairs for on, pairs in by_side(self.goals[0].laid).items()} or None
+        with self.step("margins against X"):
+            try:
+                found, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
+            except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
+                self.left_out["curve"] = str(error) if isinstance(error, AnswerError) else failure(error)
+                return None
+        if left:
+            words = f"there was no time for {left} more places; the same command goes on with them"
+            self.left_out["rest of the curve"] = words
+        return found
+
+    def audit(self) -> Audit:
+        """Ask which assumptions of the model the scene breaks."""
+        from limitsets.proofs.auditing import audit
+
+        with self.step("assumptions"):
+            return audit(self.scene)
+
+    def chance(
+        self, scene: Scene, noise: Scattering, place: tuple[float, int], cells: int
+    ) -> tuple[NoiseStatistics, Levels]:
+        """Find what noise does, at its level and at others."""
+
+        def told(_: str, done: int, of: int) -> None:
+            self.tell("noise", done / of)
+
+        with self.step("noise"):
+            found = noise_statistics(scene, noise, goal=place, cells=cells, progress=told)
+        with self.step("noise at other levels"):
+            levels = noise_levels(scene, noise, goal=place, cells=max(cells // 2, 1))
+        return found, levels
+
+
+def _single(
+    scene: Scene,
+    goals: tuple[Goal, ...],
+    width: float,
+    folder: Path | None,
+    recheck: bool,
+    one: DeviationScale,
+    tell: Callable[[str], None] | None = None,
+) -> Entry:
+    """Find the margin of one quantity and write its files; called in other processes, too."""
+    told = None if tell is None else lambda step, _, __: tell(step)
+    (found,) = margin(scene, one.quantity, reading=one.reading, goal=goals, width=width, progress=told)
+    return written(found, folder, recheck)
+
+
+def _tried(ask: Callable[..., Entry], *about: Any) -> Entry | str:
+    """Ask for a margin; where that ends with an error, say which, so that the others are not lost."""
+    try:
+        return ask(*about)
+    except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
+        return failure(error)
+
+
+def _same(entry: Entry, one: DeviationScale, scene: Scene) -> Entry:
+    """Return the margin of a quantity where the scene as it is fails or is not proved: that of any other."""
+    nominal, unit = nominal_of(scene, one.quantity)
+    own: dict[str, Any] = {"quantity": one.quantity, "reading": one.reading, "unit": one.unit}
+    return replace(entry, nominal=nominal, nominal_unit=unit, seconds=0.0, **own)
+
+
+def _place(goals: Sequence[Goal]) -> tuple[float, int] | None:
+    """Return x and side of the rests that count as fed."""
+    return next(((goal.x, goal.side) for goal in goals if isinstance(goal, OrientedBeyond | Reaches)), None)
+
+
+def _goals(
+    scene: Scene, goal: GoalLike | Sequence[GoalLike] | None, laid: LaidLike | None
+) -> tuple[Goal, ...]:
+    if goal is None and scene.goal is None:
+        x, last = 0.7 * scene.arm_length, len(scene.sides) - 1
+        example = f'oriented_beyond = {{ x = "{x:.4g} {scene.unit}", side = {last} }}'
+        remedy = f"say what has to hold: add [goal] with, for instance, {example}"
+        raise AnswerError("the goal", None, "a scene with [goal]", remedy, key="goal", file=scene.file)
+    return goals_of(scene, goal, laid)
+
+
+def _todo(scene: Scene, quantities: Sequence[str], reading: str | None) -> list[DeviationScale]:
+    """List what is asked of single quantities; refuse what the scene does not give."""
+    every = deviation_scales(scene, reading)
+    chosen: list[DeviationScale] = []
+    for name in dict.fromkeys(quantities):
+        least = deviation_scale(scene, name, reading)
+        chosen += [one for one in every if one.quantity == name] or [least]
+    return chosen or list(every)
+
+
+@shown_in_notebooks
+@arguments_checked
+def robustness(
+    scene: Scene | str | Path,
+    *quantities: str,
+    goal: GoalLike | Sequence[GoalLike] | None = None,
+    laid: LaidLike | None = None,
+    reading: str | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    scatter: Scattering | None = None,
+    width: float = 0.01,
+    cells: int = CELLS,
+    leave_out: Sequence[str] = (),
+    seconds: float = SECONDS,
+    folder: str | Path | None = None,
+    recheck: bool = True,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Robustness:
+    """Say how far a scene may drift before its goal fails, and what noise does to it.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, or what `limitsets.load` takes.
+    *quantities : str
+        Names of quantities; default all that the scene gives.
+    goal : Goal, callable, or a sequence of them, optional
+        What has to hold, all of it; default the scene's goal.
+    laid : mapping of int to sequence of (float, float), optional
+        By side the ranges of x where parts are laid down, as for `limitsets.certify`: the goal's starts are these.
+        Default: the whole arm.  The noise keeps the whole arm.
+    reading : str, optional
+        "fixed" or "per-throw"; default both, of each quantity those that it has.
+    tolerance : mapping of str to str, optional
+        Deviations that the joint margin is a factor on, ``{"throw.speed": "1 %"}``; default the scene's.
+    scatter : Scattering, optional
+        Noise at every throw with its laws; default that of the scene's world, normal unless the scene says "bounded".
+    width : float
+        How close the two ends of a bracket have to be, as a share of the upper one.
+    cells : int
+        Cells per side for the noise.
+    leave_out : sequence of str
+        Which of "margins", "joint", "curve", "noise" and "audit" not to do.
+    seconds : float
+        Shared by the proof of the joint margin and those of the curve: what they prove by then counts.  The margins of
+        single quantities, the noise and the audit take what they take.
+    folder : str or Path, optional
+        Margins are written there as they are found, with their certificates, and found again by the next run.
+    recheck : bool
+        Whether certificates are checked before they get their names.
+    executor : Executor, optional
+        Where the margins of single quantities and those against X are searched for; default, here.  Goals that are
+        functions stay here.
+    progress : callable, optional
+        Called with what is done, how much of it, and of how much.
+
+    Returns
+    -------
+    Robustness
+        Margins are proved and refuted, statistics of noise computed, an audit as it says.
+
+    Raises
+    ------
+    AnswerError
+        No goal, a scene of which nothing can be proved, a quantity that it does not give.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> found = ls.robustness("paper-designed", "throw.speed", reading="fixed", leave_out=["curve", "audit"])
+    >>> found.entries[0].proved < 0.733 < found.entries[0].refuted, found.entries[0].unit
+    (True, '%')
+    """
+    begin = time.perf_counter()
+    if not seconds >= 0.0:
+        raise AnswerError("the seconds", seconds, "0 or more", "allow for some time")
+    for part in leave_out:
+        if part not in PARTS:
+            raise AnswerError("what to leave out", part, ", ".join(PARTS), "correct the word")
+    given = load(scene)
+    goals, quiet = _goals(given, goal, laid), still(given)
+    query = Query.of(quiet, goals)
+    query.box(None, {})  # refuses a scene of which nothing can be proved
+    todo = _todo(query.scene, quantities, reading)
+    vector = dict(tolerance if tolerance is not None else given.text.get("tolerance", {}))
+    if vector:
+        Tolerance.of(query.scene, vector)  # refuses what the scene does not give
+    noise, law = noise_of(given, scatter)
+    checkpoint = Checkpoint(
+        None if folder is None else Path(folder),
+        quiet,
+        goals,
+        vector,
+        width,
+        seconds=seconds,
+        recheck=recheck,
+    )
+    told = progress or (lambda step, done, of: None)
+    sheet = _SheetRun(quiet, goals, todo, vector, checkpoint, told, seconds, executor)
+    try:
+        return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
+    except KeyboardInterrupt as error:
+        if folder is not None:
+            error.add_note(GOES_ON)
+        raise
+
+
+def _filled(
+    sheet: _SheetRun,
+    given: Scene,
+    noise: Scattering | None,
+    law: str,
+    width: float,
+    cells: int,
+    leave_out: frozenset[str],
+    begin: float,
+) -> Robustness:
+    """Ask part by part; of those that there is nothing of, say why."""
+    scene, goals, place = sheet.scene, sheet.goals, _place(sheet.goals)
+    missing = sheet.left_out
+    missing |= {part: "it was not asked for" for part in PARTS if part in leave_out}
+    if not sheet.tolerance:
+        missing.setdefault("joint", NO_TOLERANCE)
+    if noise is None:
+        missing.setdefault("noise", NO_NOISE)
+    if place is None:
+        missing |= {part: NO_PLACE for part in ("curve", "noise") if part not in leave_out}
+    sheet.steps = (len(sheet.todo) if "margins" not in missing else 0) + 1
+    sheet.steps += sum(part not in missing for part in ("joint", "curve", "audit")) + 2 * (
+        "noise" not in missing
+    )
+    with sheet.step("the goal in the scene as it is"):
+        query = Query.of(scene, goals)
+        nominal = query.prove()
+        verdict = nominal.verdict if nominal.verdict == "proved" else query.refute().verdict
+    entries = [] if "margins" in missing else sheet.singles(width, verdict)
+    joint = None if "joint" in missing else sheet.joint(width)
+    entries += [] if joint is None else [joint]
+    against = None if "curve" in missing or place is None else sheet.curve(place[1])
+    found, levels = None, None
+    if "noise" not in missing and noise is not None and place is not None:
+        found, levels = sheet.chance(given, noise, place, cells)
+    flagged = None if "audit" in missing else sheet.audit()
+    return Robustness(
+        scene,
+        goals,
+        verdict if scene == given else f"{verdict} {WITHOUT_SCATTER}",
+        reach_of([nominal]) if verdict == "proved" else None,
+        tuple(entries),
+        sheet.tolerance,
+        against,
+        found,
+        levels,
+        law,
+        flagged,
+        missing,
+        width,
+        sheet.checkpoint.digests,
+        sheet.checkpoint.again,
+        time.perf_counter() - begin,
+    )

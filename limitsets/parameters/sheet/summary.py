@@ -1,0 +1,380 @@
+"""The robustness of a scene as one answer: margins, the best X, noise, and the parts left out with their reasons."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limitsets.base.errors import AnswerError
+from limitsets.base.files import as_table, picked
+from limitsets.base.tables import Table, Tabled, joined
+from limitsets.feeder.goals import Goal
+from limitsets.feeder.scattering import LAWS, Scattering, scattering_of
+from limitsets.feeder.scene import Scene, load
+from limitsets.feeder.scene.laid import LaidLike
+from limitsets.feeder.scene.left_out import WITHOUT_SCATTER, Model
+from limitsets.feeder.scene.quantities import deviation, find
+from limitsets.feeder.scene.units import exact_factor
+from limitsets.parameters.margins.margin_result import NOT_FOUND, Margin, void_of
+from limitsets.parameters.margins.single import MarginsBeyond, margins_beyond, places_beyond
+from limitsets.parameters.noise.statistics import Levels, NoiseStatistics
+from limitsets.parameters.sheet.entries import Entry
+
+if TYPE_CHECKING:
+    from limitsets.proofs.auditing import Audit
+
+
+# ----------------------------------------------------------------
+# The margin curve, place by place: the middle first, as many X as time permits, each stored as soon as it is
+# found.
+
+
+# Places; how close their brackets are; most and least seconds for the proof of one joint margin, and seconds in all.
+PLACES, COARSE, EACH, LEAST, SECONDS = 7, 0.1, 15.0, 1.0, 20.0
+
+
+def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
+    """Read what `MarginsBeyond.to_json` wrote, without the proofs."""
+    names, units = tuple(table["quantities"]), tuple(table["units"])
+    # null becomes nan
+    x, proved, refuted = (np.array(table[key], dtype=np.float64) for key in ("x", "proved", "refuted"))
+    return MarginsBeyond(scene, table["side"], x, names, units, proved, refuted, ())
+
+
+def _joined(one: MarginsBeyond | None, other: MarginsBeyond) -> MarginsBeyond:
+    """Put the places of both together, ascending, without the proofs."""
+    if one is None:
+        return other
+    order = np.argsort(np.concatenate([one.x, other.x]))
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(one, name), getattr(other, name)])[order]
+        for name in ("x", "proved", "refuted")
+    }
+    return replace(one, **columns, margins=())
+
+
+class _Here(Executor):
+    """Computes in this process."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Compute at once."""
+        done: Future[Any] = Future()
+        done.set_result(fn(*args, **kwargs))
+        return done
+
+
+def _place(
+    scene: Scene, side: int, names: tuple[str, ...], words: Mapping[str, Any], x: float, seconds: float
+) -> MarginsBeyond:
+    """Ask about one place; without the proofs, which would go from process to process."""
+    return replace(margins_beyond(scene, side, names, x=[x], seconds=seconds, **words), margins=())
+
+
+def curve(
+    scene: Scene,
+    side: int,
+    tolerance: Mapping[str, str],
+    known: Mapping[str, Any] | None,
+    *,
+    laid: LaidLike | None = None,
+    seconds: float = SECONDS,
+    executor: Executor | None = None,
+    tell: Callable[[str, float], None],
+    keep: Callable[[dict[str, Any]], None],
+) -> tuple[MarginsBeyond, int]:
+    """Bracket margins of "beyond X only this side, and almost every orbit comes there" at some X.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    side : int
+        The side wanted.
+    tolerance : mapping of str to str
+        Of the joint margin; if it is empty, the margin is that of throw.speed.
+    known : mapping or None
+        What an earlier run kept.
+    laid : mapping of int to sequence of (float, float), optional
+        Where parts are laid down; default the whole arm.
+    seconds : float
+        Shared by the proofs of all places; no place is begun for which less is left than the dearest took, but the
+        middle one always is.
+    executor : Executor, optional
+        Where places are asked about, as many at once as it has workers; default, here.
+    tell, keep : callable
+        Called with what is done and its share, and with what is found so far.
+
+    Returns
+    -------
+    MarginsBeyond
+        Without the proofs.
+    int
+        Places that there was no time for.
+
+    Raises
+    ------
+    AnswerError
+        The limit set gets farther on another side than on this one.
+    """
+    end = time.perf_counter() + seconds
+    names = ("joint",) if tolerance else ("throw.speed",)
+    words = {"tolerance": tolerance, "laid": laid, "width": COARSE}
+    places = places_beyond(scene, side, PLACES)
+    places = places[np.argsort(np.abs(places - places.mean()), kind="stable")]
+    found = None if known is None or known["side"] != side else curve_read(known, scene)
+    done = set() if found is None else {round(x, 9) for x in found.x.tolist()}
+    waiting = [x for x in places.tolist() if round(x, 9) not in done]
+    pool = executor or _Here()
+    # concurrent.futures has no public word for it; of an executor of another kind it is not known
+    at_once = getattr(pool, "_max_workers", 1)
+    begun: dict[Future[MarginsBeyond], float] = {}
+    dearest = 0.0
+    while True:
+        while waiting and len(begun) < at_once:
+            now = time.perf_counter()
+            dearest = max([dearest, *(now - since for since in begun.values())])
+            # what would not end in time is left to a later run
+            if (found is not None or begun) and end - now < dearest:
+                break
+            x, each = waiting[0], at_once * (end - now) / len(waiting)
+            tell(f"margin beyond x = {x:.4g}", 1.0 - len(waiting) / PLACES)
+            one = pool.submit(_place, scene, side, names, words, x, min(EACH, max(each, LEAST)))
+            begun[one] = now
+            del waiting[0]
+        if not begun:
+            break
+        for one in wait(begun, return_when=FIRST_COMPLETED).done:
+            dearest = max(dearest, time.perf_counter() - begun.pop(one))
+            found = _joined(found, one.result())
+            keep(found.to_json())
+    assert found is not None
+    return found, len(waiting)
+
+
+# ----------------------------------------------------------------
+# Input of the noise of a tolerance sheet: from the scene's world, or from texts; and the scene without noise.
+
+
+FIELDS = {"throw.speed": "speed", "gravity.tilt": "tilt", "landing.x": "landing"}
+
+
+def still(scene: Scene) -> Scene:
+    """Return a scene without its scatter: in a margin, what is not asked about does not deviate."""
+    if scene.effects.spread is None:
+        return scene
+    tree = scene.as_dict()
+    tree["effects"].pop("spread")
+    return replace(load(tree), file=scene.file)
+
+
+def noise_of(scene: Scene, given: Scattering | None) -> tuple[Scattering | None, str]:
+    """Choose the noise: what is given, else the scatter of the scene's world; and say where it is from."""
+    if given is not None:
+        return (given, "as it was asked for") if given.given() else (None, "")
+    if scene.world.scatter is None:
+        return None, ""
+    if scene.effects.spread is not None:
+        return scattering_of(scene), "the scene's, [world] scatter with [effects] spread"
+    normal = replace(scene, effects=scene.effects.also(spread="gaussian"))
+    words = "the scene's, [world] scatter, taken as standard deviations of normal laws; "
+    return scattering_of(normal), words + 'spread = "bounded" in [effects] would make them bounds'
+
+
+def scattering_from(scene: Scene, texts: Mapping[str, str], law: str = "gaussian") -> Scattering:
+    """Read noise from texts.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    texts : mapping of str to str
+        By quantity, ``{"throw.speed": "0.5 %", "landing.x": "0.02 in"}``.
+    law : str
+        Of `limitsets.feeder.scattering.LAWS`.
+
+    Raises
+    ------
+    AnswerError
+        Noise of another quantity than throw.speed, gravity.tilt and landing.x, or another law.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> scattering_from(ls.load("paper-designed"), {"throw.speed": "0.5 %"}).words()
+    {'speed': 'Gaussian(sigma=0.005)'}
+    """
+    if law not in LAWS:
+        raise AnswerError("the law of the noise", law, " or ".join(LAWS), "correct the word")
+    found: dict[str, Any] = {}
+    for name, text in texts.items():
+        find(name)
+        if name not in FIELDS:
+            remedy = "what is fixed but unknown is a tolerance: it has a margin"
+            raise AnswerError("the noise", name, f"noise of {', '.join(FIELDS)}", remedy)
+        given = deviation(text, name, scene.unit, key=name)
+        size = given.value
+        if name == "throw.speed" and not given.relative:
+            size /= scene.value(name)
+        if name == "gravity.tilt" and given.relative:
+            size *= scene.value(name)
+        found[FIELDS[name]] = LAWS[law](size)
+    return Scattering(**found)
+
+
+# ----------------------------------------------------------------
+
+
+PARTS = ("margins", "joint", "curve", "noise", "audit")
+"""What an answer is put together from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robustness(Tabled):
+    """How far a scene may drift, and what chance does to it.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene that was asked, its scatter left out.
+    goals : tuple of Goal
+        What has to hold, all of it.
+    verdict : str
+        Of the goals in the scene as it is: "proved", "refuted" or "undecided"; of a scene that scatters its throws
+        followed by "of the scene without its scatter".
+    reach : float or None
+        Where the attracting cells end in which the goals are proved of the scene as it is.
+    entries : tuple of Entry
+        One per quantity and reading; the last is joint, where there is a tolerance.  Proved and refuted.
+    tolerance : dict of str to str
+        The vector that the joint factor is on.
+    curve : MarginsBeyond or None
+        Margins against X, of "beyond X only this side, and almost every orbit comes there".  Proved and refuted.
+    noise : NoiseStatistics or None
+        What chance does.  Computed between cells, not proved.
+    levels : Levels or None
+        Its numbers at other levels of the noise.
+    law : str
+        How the law of the noise was come by.
+    audit : Audit or None
+        Assumptions of the model that the scene breaks.
+    left_out : dict of str to str
+        Which of `PARTS`, or which margin, there is nothing of, and why.
+    width : float
+        How close brackets had to be.
+    digests : dict of str to str
+        Of all that margins depend on, single ones and the joint one.
+    again : int
+        How many margins were found by an earlier run.
+    seconds : float
+        Time it took.
+    """
+
+    scene: Scene
+    goals: tuple[Goal, ...]
+    verdict: str
+    reach: float | None
+    entries: tuple[Entry, ...]
+    tolerance: dict[str, str]
+    curve: MarginsBeyond | None
+    noise: NoiseStatistics | None
+    levels: Levels | None
+    law: str
+    audit: Audit | None
+    left_out: dict[str, str]
+    width: float
+    digests: dict[str, str]
+    again: int
+    seconds: float
+
+    @property
+    def decided(self) -> str:
+        """The first word of the verdict: that on `scene`, whether or not the scene that was asked scatters."""
+        return self.verdict.removesuffix(f" {WITHOUT_SCATTER}")
+
+    @property
+    def model(self) -> Model:
+        """Of which model the proofs are, which facts of the scene that leaves out, and what the audit found."""
+        of = Model.of(self.scene)
+        if self.audit is None:
+            return of
+        found = (each for each in self.audit.on("limit-set") if each.called_for and not each.simulated)
+        return replace(of, broken=tuple(each.effect for each in found))
+
+    @property
+    def singles(self) -> tuple[Entry, ...]:
+        """The margins of single quantities."""
+        return tuple(entry for entry in self.entries if entry.quantity != "joint")
+
+    @property
+    def joint(self) -> Entry | None:
+        """The factor on the tolerance."""
+        return next((entry for entry in self.entries if entry.quantity == "joint"), None)
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Those of `left_out` whose search ended with an error."""
+        return tuple(part for part, why in self.left_out.items() if why.startswith(NOT_FOUND))
+
+    def margins(self) -> tuple[Margin, ...]:
+        """Give the entries as margins without their proofs, as figures take them."""
+        return tuple(self._margin(entry) for entry in self.entries)
+
+    def _margin(self, entry: Entry) -> Margin:
+        joint = entry.quantity == "joint"
+        nominal = entry.nominal
+        # in the unit of the deviation
+        if nominal is not None and entry.unit not in ("%", entry.nominal_unit):
+            nominal = float(Fraction(repr(nominal)) * exact_factor(entry.nominal_unit, entry.unit))
+        return Margin(
+            entry.quantity,
+            entry.reading,
+            self.goals,
+            entry.proved,
+            entry.refuted,
+            entry.unit,
+            nominal,
+            entry.reason,
+            entry.closed,
+            entry.seconds,
+            self.scene,
+            self.tolerance if joint else {},
+            {},
+            {},
+            (),
+            None,
+            entry.direction,
+        )
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        margins = joined(self.margins()) if self.entries else Table(("quantity",), (), "No margins")
+        shown = [margins]
+        if self.curve is not None:
+            shown += self.curve.tables()
+        if self.noise is not None:
+            shown += self.noise.tables()
+        return tuple(shown)
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as plain tables for JSON: null, never nan."""
+        return as_table(
+            complete=True,
+            digests=self.digests,
+            scene=self.scene.as_dict(),
+            holds={"proved": True, "refuted": False}.get(self.verdict),
+            vacuous=bool(void_of(self.goals, self.reach, self.scene.unit)),
+            margins=self.entries,
+            tolerance=self.tolerance or None,
+            curve=self.curve,
+            noise=None if self.noise is None else self.noise.to_json() | {"law": self.law},
+            noise_levels=self.levels,
+            assumptions=self.audit,
+            model=self.model,
+            **picked(self, "left_out", "width", "seconds"),
+        )

@@ -1,0 +1,406 @@
+"""Brackets of the probabilities of absorption, of quantiles and means, for a scene whose throws scatter.
+
+Within n throws both bounds come from n steps from V_0 = 1 on the target.  The mean from below is that of min(T, n);
+from above it is a finite V >= 1 + K V off the absorbing states: with V_(n+1) <= V_n + c for c < 1,
+V_n / (1 - c) is one.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base.errors import AnswerError
+from limitsets.base.files import as_table, picked
+from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.tables import Column, Table, Tabled
+from limitsets.feeder.scattering import Scattering, scattering_of, starts_from
+from limitsets.numbers.interval import guard
+from limitsets.proofs.chances.averages import Nodes, mean_matrix, rounding_of
+from limitsets.proofs.chances.chain import EXITS, Chain, Place, chain_of
+from limitsets.proofs.prover.parameters import parameter_box
+
+if TYPE_CHECKING:
+    from limitsets.feeder.scene import Scene
+
+
+# ----------------------------------------------------------------
+# What is proved of where a noisy chain ends, and when.
+
+
+Array = NDArray[np.float64]
+
+# Any absorbing set or exit.
+ANY = "any"
+# A certificate claims a little more than was found, and the checker's cells are finer: see `writing`.
+ALLOWANCE, FINER = 1e-6, 2
+
+
+@dataclass(frozen=True, eq=False)
+class AbsorptionBrackets(Tabled):
+    """Proved brackets of where a noisy chain ends, and when; T is the throw of the first absorption.
+
+    Attributes
+    ----------
+    source : Scene
+        The scene.
+    scene, unit : str
+        Name of the scene, unit of lengths.
+    scatter : Scattering
+        The laws of what differs at every throw.
+    absorbing : dict of str to tuple of (int, float, float)
+        By name side, from x, to x of the places that absorb [length]; the exits ("exits") do too.
+    starts : tuple of (int, float, float)
+        Side, from x, to x: starts are equally likely per length on all of these [length].
+    nodes : Nodes
+        The cells: functions are affine between neighbouring nodes of a side.
+    strata : dict of str to ndarray
+        By quantity the ends of the strata into which its law is cut.
+    within : dict of str to ndarray, shape (2, throws + 1)
+        By name bounds of the probability of having ended there after 0, 1, ... throws; "any" is that of T <= n.
+    values : dict of str to ndarray, shape (2, n_nodes)
+        By name the bounds at the nodes after the last throw, for starts there.
+    mean : (float, float)
+        Bounds of the mean of T; the upper one is infinite where none was found.
+    seconds : float
+        Time it took.
+    how : str
+        "proved".
+    """
+
+    source: Scene
+    scene: str
+    unit: str
+    scatter: Scattering
+    absorbing: dict[str, tuple[Place, ...]]
+    starts: tuple[Place, ...]
+    nodes: Nodes
+    strata: dict[str, Array]
+    within: dict[str, Array]
+    values: dict[str, Array]
+    mean: tuple[float, float]
+    seconds: float
+    how: str = "proved"
+
+    def quantile(self, share: float, name: str = ANY) -> tuple[int | None, int | None]:
+        """Bound the number of throws within which `share` of the starts end there; None beyond the throws counted.
+
+        Parameters
+        ----------
+        share : float
+            From 0 to 1.
+        name : str
+            Of the places; all of them by default.
+        """
+        low, high = self.within[name]
+        first, last = np.flatnonzero(high >= share), np.flatnonzero(low >= share)
+        return (int(first[0]) if first.size else None), (int(last[0]) if last.size else None)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        last = self.within[ANY].shape[1] - 1
+        rows = [(name, last, (low[-1], high[-1])) for name, (low, high) in self.within.items()]
+        columns = ("ends at", "within throws", Column("probability", show=".6f", ends=True))
+        return (Table(columns, rows, f"{self.scene}: brackets of probabilities", self.how),)
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the brackets as JSON takes them."""
+        return as_table(
+            **picked(self, "scene", "unit", "how", "absorbing", "starts", "seconds"),
+            scatter=self.scatter.words(),
+            cells=int(np.isfinite(self.nodes.width).sum()),
+            within={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.within.items()},
+            mean={"lo": self.mean[0], "hi": self.mean[1] if math.isfinite(self.mean[1]) else None},
+            quantiles={
+                str(share): dict(zip(("lo", "hi"), self.quantile(share), strict=True))
+                for share in (0.5, 0.95, 0.99)
+            },
+        )
+
+    def save(
+        self, path: str | Path, *, allowance: float = ALLOWANCE, finer: int = FINER, recheck: bool = True
+    ) -> Path:
+        """Write the brackets as a certificate, which gets its name once the checker has made the steps anew.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, NAME.proof.zip; an older one is replaced whole.
+        allowance : float
+            What is claimed is wider by this at both ends; bounds of the mean by as many throws times their number.
+        finer : int
+            Into how many each cell is cut for the checker, whose way to bound a throw is a little less narrow.
+        recheck : bool
+            Whether to check it first: from seconds to as long as the proof.
+
+        Raises
+        ------
+        AnswerError
+            Laws that the checker does not know: it knows a uniform one of the landing place, and of the speed a
+            uniform one or none.
+        DeniedError
+            The checker's own brackets are wider than what is claimed; the file is kept as NAME.denied.zip.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import limitsets as ls
+        >>> from limitsets.robust import Scattering, Uniform, absorption_brackets
+        >>> noise = Scattering(landing=Uniform(0.1))
+        >>> found = absorption_brackets("paper-initial", noise, right=(20, 2), cells=300, throws=3, mean=False)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     ls.recheck(found.save(f"{folder}/initial.proof.zip")).verdict
+        'proved'
+        """
+        from limitsets.proofs.chances.chain import write
+
+        return write(
+            path,
+            self.source,
+            self.scatter,
+            (self.starts, self.absorbing),
+            self.nodes,
+            self.within,
+            self.mean,
+            allowance=allowance,
+            finer=finer,
+            recheck=recheck,
+        )
+
+
+# ----------------------------------------------------------------
+
+
+CELLS, THROWS = 4000, 200
+# The mean from above: once no state is left with a larger probability, throws without end are bounded.
+LEFT, MOST_THROWS = 1e-4, 3000
+# A bound of the mean above this grows without end: the cells are too coarse, or nothing absorbs.
+HOPELESS = 1e6
+
+
+def _start_row(nodes: Nodes, starts: Sequence[Place]) -> Any:
+    """Return the row that makes the mean over the starts of values at nodes."""
+    side, lo, hi = (np.array(column) for column in zip(*starts, strict=True))
+    length = (hi - lo).astype(np.float64)
+    row = np.zeros(side.size, dtype=np.int64)
+    return mean_matrix(
+        1, nodes, row, length / length.sum(), side.astype(np.int64), lo.astype(float), hi.astype(float)
+    )
+
+
+def _mean_above(row: Any, values: Array) -> float:
+    return float((row @ values)[0]) + rounding_of(row) * float(np.abs(values).max())
+
+
+def _at_most(nodes: Nodes, values: Array, most: float) -> Array:
+    """Lower a bound far above what no value exceeds: there and at the next nodes it is that, so at all between."""
+    far = values > most + 0.5
+    if not far.any():
+        return values
+    joined = np.isfinite(nodes.width)
+    near = far.copy()
+    near[1:] |= far[:-1] & joined[:-1]
+    near[:-1] |= far[1:] & joined[:-1]
+    return np.where(far, most, np.where(near, np.maximum(values, most), values))
+
+
+def within_brackets(
+    chain: Chain,
+    value: Mapping[str, float],
+    row: Any,
+    throws: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple[Array, Array]:
+    """Bound the probability of having ended, after 0 to `throws` throws, at places of value 1 (others have 0).
+
+    Returns
+    -------
+    (within, values)
+        Bounds for the starts, shape (2, throws + 1), and at the nodes after the last throw, shape (2, n).
+    """
+    fixed = chain.fixed(value), chain.fixed({name: -number for name, number in value.items()})
+    bound = [chain.first(each) for each in fixed]
+    found = np.empty((2, throws + 1))
+    for n in range(throws + 1):
+        if n:
+            bound = [
+                _at_most(chain.nodes, chain.above(values, each), most)
+                for values, each, most in zip(bound, fixed, (1.0, 0.0), strict=True)
+            ]
+        found[:, n] = -_mean_above(row, bound[1]), _mean_above(row, bound[0])
+        if progress is not None:
+            progress(n, throws)
+    # Having ended is for ever: a bound from below holds later, one from above holds earlier.
+    low = np.maximum.accumulate(np.clip(found[0], 0.0, 1.0))
+    high = np.minimum.accumulate(np.clip(found[1], 0.0, 1.0)[::-1])[::-1]
+    return np.stack([low, high]), np.stack([-bound[1], bound[0]])
+
+
+def mean_brackets(chain: Chain, row: Any) -> tuple[float, float]:
+    """Bound the mean number of throws until absorption."""
+    none = chain.fixed(dict.fromkeys(chain.absorbs, 0.0))
+    above = below = chain.first(none)
+    low, high = 0.0, math.inf
+    for _ in range(MOST_THROWS):
+        below, before = chain.above(below, none, -1.0), below
+        low = max(low, -_mean_above(row, below))
+        if not float((before - below).max()) > LEFT:
+            break
+    for _ in range(MOST_THROWS):
+        after = chain.above(above, none, 1.0)
+        change, above = float((after - above)[chain.free].max()), after
+        if change < LEFT:
+            # K of c V is c times K of V, so V / (1 - c) >= 1 + K V / (1 - c).
+            return low, _mean_above(row, above) / (1.0 - change) * (1.0 + 1e-12)
+        if not float(above.max()) < HOPELESS:
+            break
+    return low, high
+
+
+@shown_in_notebooks
+def absorption_brackets(
+    scene: Scene | str,
+    scatter: Scattering | None = None,
+    *,
+    right: tuple[float, int] | None = None,
+    wrong: float | None = None,
+    absorbing: Mapping[str, Sequence[Place]] | None = None,
+    starts: Sequence[Place] | None = None,
+    cells: int = CELLS,
+    throws: int = THROWS,
+    mean: bool = True,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> AbsorptionBrackets:
+    """Prove brackets of the probabilities with which parts end at places, and of how many throws that takes.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        A scene in the minimal model, or the name of one.
+    scatter : Scattering, optional
+        Uniform or Gaussian deviations of speed and landing place, independent of each other and of other throws; by
+        default that of the scene.
+    right : (float, int), optional
+        x and side: a part at rest at x or beyond, on this side, has ended "right" [length].
+    wrong : float, optional
+        x: at rest there or beyond, on any other side, it has ended "wrong"; needs `right` [length].
+    absorbing : mapping of str to sequence of (int, float, float), optional
+        Further places where parts end: by name side, from x, to x [length].
+    starts : sequence of (int, float, float), optional
+        Side, from x, to x: equally likely per length on all of them.  By default on every side from a twentieth of the
+        arm beyond a_i to x of `right` [length].
+    cells : int
+        Cells per side; the brackets narrow with their square.
+    throws : int
+        n up to which probabilities within n throws are bounded.
+    mean : bool
+        Bound the mean of T too: some hundreds of throws more.
+    progress : callable, optional
+        Told (stage, done, all).
+
+    Returns
+    -------
+    AbsorptionBrackets
+
+    Raises
+    ------
+    AnswerError
+        Places or starts that are none, a law or an effect of which nothing is proved, or so small a kappa that the
+        impact may not be unique.
+
+    Examples
+    --------
+    >>> from limitsets.robust import Scattering, Uniform, absorption_brackets
+    >>> noise = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
+    >>> found = absorption_brackets("paper-designed", noise, right=(20.5, 2), cells=500, throws=5, mean=False)
+    >>> low, high = found.within["right"][:, 5]
+    >>> bool(low < 0.222 < high < low + 0.05)
+    True
+    """
+    from limitsets.feeder.scene import load
+
+    begun = time.perf_counter()
+    guard()
+    read = load(scene) if isinstance(scene, str) else scene
+    noise = scattering_of(read) if scatter is None else scatter
+    places = _places(read, right, wrong, absorbing)
+    begin = tuple(_default_starts(read, right) if starts is None else starts)
+    _require(read, "a start", begin)
+    tell = progress or (lambda stage, done, total: None)
+    tell("cells", 0, 1)
+    chain = chain_of(parameter_box(read), noise, places, cells)
+    tell("cells", 1, 1)
+    row = _start_row(chain.nodes, begin)
+    within, values = {}, {}
+    for name in (ANY, *chain.absorbs):
+        value = {each: float(name in (ANY, each)) for each in chain.absorbs}
+        within[name], values[name] = within_brackets(chain, value, row, throws, partial(tell, name))
+    tell("mean", 0, 1)
+    means = mean_brackets(chain, row) if mean else (0.0, math.inf)
+    tell("mean", 1, 1)
+    return AbsorptionBrackets(
+        read,
+        read.name,
+        read.unit,
+        noise,
+        {name: tuple(each) for name, each in places.items()},
+        begin,
+        chain.nodes,
+        {"speed": chain.speed.borders, "landing": chain.landing_law.borders},
+        within,
+        values,
+        means,
+        time.perf_counter() - begun,
+    )
+
+
+def _places(
+    scene: Scene,
+    right: tuple[float, int] | None,
+    wrong: float | None,
+    absorbing: Mapping[str, Sequence[Place]] | None,
+) -> dict[str, list[Place]]:
+    """Collect the absorbing places by name."""
+    found: dict[str, list[Place]] = {}
+    if right is not None:
+        found["right"] = [(int(right[1]), float(right[0]), math.inf)]
+    if wrong is not None:
+        if right is None:
+            raise AnswerError(
+                "the places that are wrong", wrong, "x, with `right`", "say which side is right"
+            )
+        found["wrong"] = [(k, float(wrong), math.inf) for k in range(len(scene.sides)) if k != int(right[1])]
+    for name, places in (absorbing or {}).items():
+        if name in (*found, ANY, EXITS):
+            raise AnswerError("the name of absorbing places", name, "one that is not taken", "choose another")
+        found[name] = [(int(side), float(lo), float(hi)) for side, lo, hi in places]
+    for name, each in found.items():
+        _require(scene, f'a place that is "{name}"', each)
+    return found
+
+
+def _require(scene: Scene, thing: str, places: Sequence[Place]) -> None:
+    for place in places:
+        side, lo, hi = place
+        if not (
+            side in range(len(scene.sides)) and float(scene.sides.a[side]) < lo < min(hi, scene.arm_length)
+        ):
+            allowed = "(side, from x, to x) with the first x on the arm and below the second"
+            raise AnswerError(thing, place, allowed, "correct it")
+    if not places:
+        raise AnswerError(thing, "none", "(side, from x, to x)", "give one")
+
+
+def _default_starts(scene: Scene, right: tuple[float, int] | None) -> list[Place]:
+    if right is None:
+        raise AnswerError("the starts", "none", "(side, from x, to x)", "pass starts=[...], or `right`")
+    x = float(right[0])
+    return [(k, float(lo), x) for k, lo in enumerate(starts_from(scene)) if lo < x]

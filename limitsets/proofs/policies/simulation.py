@@ -1,0 +1,336 @@
+"""A policy thrown many times: random starts, noise anywhere in its bounds and at them, errors of the sensor too."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
+from limitsets.proofs.policies.policy import NONE
+from limitsets.proofs.policies.synthesis import Synthesis
+from limitsets.proofs.prover.parameters import ParameterBox, parameter_box
+from limitsets.systems.graph.images.enclosed import DECIDED, BoxImages
+from limitsets.systems.maps import images
+
+# ----------------------------------------------------------------
+# What no policy can do: the same game on finitely many starts, whose images are enclosed.
+#
+# Cells are outer images, on which a policy may fail that would work.  Here a belief is a set of single starts that saw
+# the same throws and answers.  A start of which an answer, a decision or the goal region is not certain is taken out,
+# which makes the game easier; so what is not won within n throws is won by no policy, on those starts or any that hold
+# them.
+
+
+BEAT = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Impossible:
+    """What was shown of the starts.
+
+    Attributes
+    ----------
+    throws : int
+        No policy of so many throws serves all of the starts; -1 if nothing was shown.
+    starts : tuple of (float, int)
+        x and side [length].
+    decided : bool
+        False where the time was used up, or where the starts were won, within one throw more than `throws`.
+    beliefs : int
+        Sets of starts looked at.
+    """
+
+    throws: int
+    starts: tuple[tuple[float, int], ...]
+    decided: bool
+    beliefs: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Where the starts are now: brackets of x, and the side of each."""
+
+    lo: NDArray[np.float64]
+    hi: NDArray[np.float64]
+    side: NDArray[np.int64]
+
+    def some(self, which: NDArray[np.bool_]) -> _Parts:
+        return _Parts(self.lo[which], self.hi[which], self.side[which])
+
+
+class _SpentError(Exception):
+    """Time is used up."""
+
+
+class _Enclosed:
+    def __init__(self, found: Synthesis, boxes: Sequence[ParameterBox], until: float) -> None:
+        self.found, self.boxes, self.until, self.seen = found, boxes, until, 0
+
+    def may_be_won(self, parts: _Parts) -> NDArray[np.bool_]:
+        x, side = self.found.goal
+        won: NDArray[np.bool_] = (parts.hi >= x) & (parts.side == side)
+        return won
+
+    def thrown(self, parts: _Parts, box: ParameterBox) -> _Parts | None:
+        """Throw all; None where one is certainly lost."""
+        lo, hi, side = parts.lo.copy(), parts.hi.copy(), parts.side.copy()
+        sure = np.zeros(side.size, dtype=bool)
+        for own in np.unique(side).tolist():
+            some = np.flatnonzero(parts.side == own)
+            boxes = BoxImages(
+                box.lo,
+                box.hi,
+                own,
+                (np.ascontiguousarray(parts.lo[some]),),
+                (np.ascontiguousarray(parts.hi[some]),),
+            )
+            lo[some], hi[some] = boxes.slots[0][0][0], boxes.slots[0][1][0]
+            side[some], sure[some] = boxes.to[0], boxes.count == DECIDED
+        bare_lo, bare_hi = box.bare
+        a_lo, a_hi = bare_lo.a[side], bare_hi.a[side]
+        gone = (hi <= a_lo) | (lo > bare_hi.arm_length)
+        stays = (lo > a_hi) & (hi <= bare_lo.arm_length)
+        x, wanted = self.found.goal
+        if self.found.mode == "catch":
+            gone |= (lo >= x) & (side != wanted)
+            stays &= (hi < x) | ((lo >= x) & (side == wanted))
+        if (sure & gone).any():
+            return None
+        return _Parts(lo, hi, side).some(sure & stays)
+
+    def heard(self, parts: _Parts) -> list[_Parts]:
+        """Give the parts of which each answer may certainly come, those that are caught left out."""
+        if self.found.mode == "catch":
+            parts = parts.some(~self.may_be_won(parts))
+        sensor = self.found.sensor
+        if isinstance(sensor, SideSensor):
+            on = parts.side == sensor.side
+            return [parts.some(on), parts.some(~on)]
+        if isinstance(sensor, BeyondSensor):
+            low = np.nextafter(sensor.x - sensor.error, np.inf)
+            high = np.nextafter(sensor.x + sensor.error, -np.inf)
+            if not sensor.error:
+                low = high = sensor.x
+            return [parts.some(parts.lo > low), parts.some(parts.hi <= high)]
+        return [parts]
+
+    def won(self, parts: _Parts, left: int) -> bool:
+        """Whether a policy of so many throws may serve all of them, after an answer."""
+        inside = self.may_be_won(parts)
+        if inside.all():  # of none too
+            return True
+        if left == 0:
+            return False
+        self.seen += 1
+        if self.seen % BEAT == 0 and time.monotonic() > self.until:
+            raise _SpentError
+        for box in self.boxes:
+            after = self.thrown(parts, box)
+            if after is None:
+                continue
+            heard = sorted(self.heard(after), key=lambda each: -each.side.size)
+            if all(self.won(each, left - 1) for each in heard):
+                return True
+        return False
+
+
+def not_within(
+    found: Synthesis,
+    starts: Sequence[tuple[float, int]],
+    throws: int | None = None,
+    *,
+    seconds: float = 60.0,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Impossible:
+    """Show that no policy of so many throws serves some starts; without noise, which makes it no easier.
+
+    Parameters
+    ----------
+    found : Synthesis
+        The question: throws, sensor, mode and goal.
+    starts : sequence of (float, int)
+        x and side of each start, all of them in the starts of the question [length].
+    throws : int, optional
+        The most throws; default: one more than the search on cells got to.
+    seconds : float
+        The most time [s].
+    progress : callable, optional
+        Told the step, its number and how many there are.
+
+    Returns
+    -------
+    Impossible
+
+    Raises
+    ------
+    AnswerError
+        For a start that is not one of the question.
+    """
+    for x, side in starts:
+        if not (0 <= side < found.grid.sides and found.starts.holds([x], side)[0]):
+            raise AnswerError("the start", (x, side), "one of the starts of the question", "choose another")
+    scene = found.scene
+    assert scene.feedback is not None
+    boxes = [parameter_box(scene.with_values({each.quantity: each.text})) for each in scene.feedback.throws]
+    most = found.found.throws + 1 if throws is None else throws
+    places = np.array([at for at, _ in starts], dtype=np.float64)
+    begin = _Parts(places, places.copy(), np.array([side for _, side in starts], dtype=np.int64))
+    run, shown, decided = _Enclosed(found, boxes, time.monotonic() + seconds), -1, True
+    try:
+        for left in range(most + 1):
+            if progress is not None:
+                progress(f"enclosed starts, {left} throws", left, most + 1)
+            if all(run.won(each, left) for each in run.heard(begin)):
+                decided = False
+                break
+            shown = left
+    except _SpentError:
+        decided = False
+    return Impossible(shown, tuple((float(at), int(side)) for at, side in starts), decided, run.seen)
+
+
+# ----------------------------------------------------------------
+
+
+Floats = NDArray[np.float64]
+
+# Kappas drawn for each throw, the two ends of its noise among them.
+KAPPAS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """What became of the parts.
+
+    Attributes
+    ----------
+    parts : int
+        How many were started.
+    reached : int
+        Those that came to the goal region, and where the controller stops, were known to be there.
+    failures : dict of str to int
+        What happened to the others.
+    throws : ndarray of int, shape (most throws + 1,)
+        How many of those that came took 0, 1, ... throws.
+    """
+
+    parts: int
+    reached: int
+    failures: dict[str, int]
+    throws: NDArray[np.int64]
+
+    @property
+    def mean(self) -> float:
+        """Mean number of throws of those that came."""
+        return float(np.average(np.arange(self.throws.size), weights=self.throws)) if self.reached else np.nan
+
+
+def simulate(found: Synthesis, parts: int = 10_000, seed: int = 0) -> Simulated:
+    """Run a policy with throws of the map itself.
+
+    Parameters
+    ----------
+    found : Synthesis
+        A policy that was found.
+    parts : int
+        How many parts to start, equally likely per length of the starts.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    Simulated
+
+    Raises
+    ------
+    AnswerError
+        Where there is no policy.
+    """
+    policy = found.found.policy
+    if policy is None:
+        remedy = "more throws, other throws, another sensor or fewer starts may do it"
+        raise AnswerError("the policy", found.found.verdict, "one that was found", remedy)
+    random = np.random.default_rng(seed)
+    x, side = _drawn(found, parts, random)
+    state = policy.first[_heard(found, x, side, random)]
+    took, ends = np.zeros(parts, np.int64), np.full(parts, "", dtype=object)
+    moving = np.ones(parts, dtype=bool)
+    for made in range(int(policy.left.max()) + 1):
+        unknown = moving & (state == NONE)
+        ends[unknown] = "an answer that cannot come"
+        stops = moving & ~unknown & (policy.throw[state] == NONE)
+        ends[stops & ~_inside(found, x, side)] = "stopped elsewhere"
+        moving &= ~(unknown | stops)
+        if not moving.any():
+            break
+        took[moving] = made + 1
+        for throw, box in enumerate(found.throws.values()):
+            now = np.flatnonzero(moving & (policy.throw[state] == throw))
+            x[now], side[now], code = _thrown(box, x[now], side[now], random)
+            ends[now[code < 0]] = "left the arm"
+            moving[now[code < 0]] = False
+        if found.mode == "catch":
+            fallen = moving & (x >= found.goal[0])
+            ends[fallen & (side != found.goal[1])] = "caught on a wrong side"
+            moving &= ~fallen
+        state = np.where(moving, policy.after[state, _heard(found, x, side, random)], state)
+    ends[moving] = "more throws than promised"
+    good = ends == ""
+    kinds, counts = np.unique(ends[~good].astype(str), return_counts=True)
+    return Simulated(
+        parts,
+        int(good.sum()),
+        dict(zip(kinds.tolist(), counts.tolist(), strict=True)),
+        np.bincount(took[good], minlength=int(policy.left.max()) + 1),
+    )
+
+
+def _drawn(found: Synthesis, parts: int, random: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
+    """Draw starts, equally likely per length."""
+    spans = [(side, lo, hi) for side, pairs in found.starts.extents().items() for lo, hi in pairs]
+    length = np.array([hi - lo for _, lo, hi in spans])
+    which = random.choice(len(spans), size=parts, p=length / length.sum())
+    at = np.array([(lo, hi) for _, lo, hi in spans])[which]
+    side = np.array([side for side, _, _ in spans])[which]
+    return random.uniform(at[:, 0], at[:, 1]), side.astype(np.int64)
+
+
+def _inside(found: Synthesis, x: Floats, side: NDArray[np.int64]) -> NDArray[np.bool_]:
+    inside: NDArray[np.bool_] = (x >= found.goal[0]) & (side == found.goal[1])
+    return inside
+
+
+def _heard(found: Synthesis, x: Floats, side: NDArray[np.int64], random: np.random.Generator) -> Any:
+    """Read the sensor: the numbers of the answers."""
+    if found.sensor is None:
+        return np.zeros(x.size, np.int64)
+    yes = found.sensor.read(x, side, random.uniform(-1.0, 1.0, x.size))
+    words = list(found.game.answers)
+    return np.where(yes, words.index("yes"), words.index("no"))
+
+
+def _thrown(
+    box: Any, x: Floats, side: NDArray[np.int64], random: np.random.Generator
+) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+    """Throw parts, each with a kappa of the box; where they come to rest, and the codes."""
+    low, high = box.bare[0].kappa, box.bare[1].kappa
+    kappas: Sequence[float] = [box.middle_kappa]
+    if box.kappa_varies:
+        kappas = [low, high, *random.uniform(low, high, KAPPAS - 2).tolist()]
+    drawn = random.integers(len(kappas), size=x.size)
+    after, to, code = x.copy(), side.copy(), np.zeros(x.size, np.int64)
+    for k, kappa in enumerate(kappas):
+        for own in np.unique(side[drawn == k]).tolist():
+            some = (drawn == k) & (side == own)
+            landed = images(box.at_kappa(kappa), x[some], own)
+            after[some], to[some], code[some] = landed.x, landed.side, landed.code
+    if box.landing:
+        offset = box.landing * np.clip(random.uniform(-1.25, 1.25, x.size), -1.0, 1.0)
+        after = after + offset
+    return after, to, code

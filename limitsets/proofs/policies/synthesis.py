@@ -1,0 +1,392 @@
+"""One bit of feedback: which throw on which answer brings the part to a wanted side and place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
+from limitsets.base.files import as_table, picked
+from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.tables import Table, Tabled, facts
+from limitsets.feeder.scene import Scene, load
+from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene.surroundings import BeyondSensor, Sensor, exact_text
+from limitsets.feeder.scene.units import spelled_plainly
+from limitsets.proofs.policies.board import Board, Progress, Starts, board_of
+from limitsets.proofs.policies.policy import NONE, NOT_DECIDED, SOLVED, Found, Policy, search
+from limitsets.proofs.prover.certificate import brackets, pack, tidy
+from limitsets.proofs.prover.cover import Cover, targets
+from limitsets.systems.cells import CellSet, Grid
+
+# ----------------------------------------------------------------
+# The certificate of a policy: all that a recheck needs, and nothing that it has to trust.
+#
+# The file is laid out as every certificate (docs/certificates.md).  Its scene names the throws and the sensor; places
+# that cells are cut at stand as the floats that they are, written in full.
+
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def write(
+    path: str | Path,
+    board: Board,
+    sensor: Sensor | None,
+    policy: Policy,
+    *,
+    recheck: bool,
+    workers: int | None,
+) -> Path:
+    """Write it, replacing an older file whole."""
+    if any(box.effects for box in board.throws.values()):
+        raise AnswerError(
+            "the certificate",
+            "with effects",
+            "the minimal model, and noise",
+            "nothing rechecks other maps; the policy stands in .found and .to_json()",
+        )
+    model = {"flight": board.scene.flight, "flip": board.scene.flip}
+    x, side = board.goal
+    spans = [[side, lo.hex(), hi.hex()] for side, parts in board.starts.extents().items() for lo, hi in parts]
+    section = {
+        "scene": _scene(board, sensor) | {"model": model},
+        "mode": board.mode,
+        "goal": {"x": f"{exact_text(x)} {board.scene.unit}", "side": side},
+        "starts": spans,
+        "within": max((int(policy.left[k]) for k in policy.first if k != NONE), default=0),
+        "first": policy.to_json()["first"],
+    }
+    try:
+        producer = {"limitsets": version("limitsets")}
+    except PackageNotFoundError:  # sources that are not installed
+        producer = {}
+    header = {
+        "map": model,
+        "noise": spelled_plainly(board.noise) if board.noise else None,
+        "tolerance": None,
+        "boxes": [],
+        "claims": [{"claim": "policy", "section": spelled_plainly(section)}],
+        "producer": producer,
+    }
+    held = _of_policy(policy) | _of_throws(board, policy)
+    pack(path, header, held, board.scene.unit, {"policy": "proved"} if recheck else None, workers)
+    return Path(path)
+
+
+def _scene(board: Board, sensor: Sensor | None) -> dict[str, Any]:
+    """Write the scene with the sensor that is asked; its own goal may be another one and is left out."""
+    scene = board.scene
+    text: dict[str, Any] = tidy(
+        {word: each for word, each in scene.text.items() if word not in ("effects", "goal")}
+    )
+    text["feedback"].pop("sensor", None)
+    if sensor is not None:
+        text["feedback"]["sensor"] = dict(sensor.as_text(scene.unit))
+    if board.mode == "catch" and scene.cavity is not None:
+        text["cavity"]["position"] = f"{exact_text(board.goal[0])} {scene.unit}"
+    if scene.effects.spread:
+        text["effects"] = {"spread": scene.effects.spread}
+    return text
+
+
+def _of_policy(policy: Policy) -> Arrays:
+    """Write the table: what is thrown in each state, what comes after, and where the part may lie (ranges of cells)."""
+    edge = np.zeros((policy.states, 1), dtype=bool)
+    steps = np.diff(np.concatenate([edge, policy.belief, edge], axis=1).astype(np.int8), axis=1)
+    state, first = np.nonzero(steps == 1)
+    _, past = np.nonzero(steps == -1)
+    return {
+        "throw": policy.throw.astype(np.int32),
+        "left": policy.left.astype(np.int32),
+        "after": policy.after.astype(np.int32).squeeze(axis=1 if len(policy.answers) == 1 else ()),
+        "belief": np.stack([state, first, past - 1], axis=1).astype(np.int32),
+    }
+
+
+def _of_throws(board: Board, policy: Policy) -> Arrays:
+    """Write the cells, and where each throw leads from those in which it is made; -1 and 0 for the others."""
+    held: Arrays = {f"edges.{side}": edges for side, (edges,) in enumerate(board.starts.grid.edges)}
+    for number, cover in enumerate(board.covers.values()):
+        made = policy.belief[policy.throw == number].any(axis=0)
+        for name, value in _images(cover).items():
+            none = -1 if name != "phi" else 0.0
+            held[f"{number}.{name}"] = np.where(made[:, None], value, none).astype(value.dtype)
+    return held
+
+
+def _images(cover: Cover) -> Arrays:
+    return {"jog": targets(cover, 0), "flip": targets(cover, 1), "phi": brackets(cover)}
+
+
+# ----------------------------------------------------------------
+
+
+class Limits(NamedTuple):
+    """How long a search may go on: throws, seconds, beliefs."""
+
+    throws: int
+    seconds: float
+    beliefs: int
+
+
+@dataclass(frozen=True, eq=False)
+class Synthesis(Board, Tabled):
+    """What one bit of feedback was found to do, and the game in which: its sensor included.
+
+    Attributes
+    ----------
+    sensor : Sensor or None
+        What is asked; None: nothing.
+    limits : Limits
+        How long the search could go on.
+    found : Found
+        How the search ended.
+    """
+
+    sensor: Sensor | None
+    limits: Limits
+    found: Found
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is a policy."""
+        return self.found.verdict == SOLVED
+
+    @property
+    def grid(self) -> Grid:
+        """The cells."""
+        return self.starts.grid
+
+    @property
+    def question(self) -> str:
+        """What the sensor is asked, a clause."""
+        return "nothing is asked" if self.sensor is None else self.sensor.question(self.scene.unit)
+
+    @property
+    def model(self) -> Model:
+        """Of which model the policy is, and which facts of the scene that leaves out."""
+        return Model.of(self.scene, self.noise)
+
+    def asking(self, sensor: Sensor | None) -> Synthesis:
+        """Play with another sensor on the same cells, whose images are not computed again."""
+        return _play(self, sensor, self.limits)
+
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of a policy that was found; it gets its name once `limitsets.recheck` has confirmed it.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
+
+        Raises
+        ------
+        AnswerError
+            There is no policy, or it is one of throws with effects, which no recheck knows.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip.
+        """
+        if self.found.policy is None:
+            raise AnswerError(
+                "the certificate", self.found.verdict, "of a policy that was found", "see .found"
+            )
+        return write(path, self, self.sensor, self.found.policy, recheck=recheck, workers=workers)
+
+    def denied(self, why: str) -> Synthesis:
+        """Return what is left of it where the checker denies its certificate: nothing is decided."""
+        reason = f"the checker denies it: {why}"
+        return replace(
+            self, found=replace(self.found, verdict=NOT_DECIDED, throws=-1, policy=None, reason=reason)
+        )
+
+    def beliefs(self) -> list[dict[int, list[tuple[float, float]]]]:
+        """Give per state of the policy where the part may lie: intervals by side [length]."""
+        policy = self.found.policy
+        return [] if policy is None else [CellSet(self.grid, mask).extents() for mask in policy.belief]
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        policy = self.found.policy
+        caption = f"{self.scene.name}: {self.question}"
+        of = self.model.sentence
+        verdict = facts(caption, picked(self.found, "verdict", "throws", "beliefs"), of)
+        if policy is None:
+            return (verdict,)
+        return (
+            replace(policy.tables()[0], caption=caption, how=f"proved for the starts and noise named; {of}"),
+            verdict,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Give its tables for JSON."""
+        policy = None
+        if self.found.policy is not None:
+            policy = self.found.policy.to_json()
+            for state, belief in zip(policy["states"], self.beliefs(), strict=True):
+                state["belief"] = as_table(belief=belief)["belief"]
+        return as_table(
+            scene=self.scene.as_dict(),
+            unit=self.scene.unit,
+            throws=[
+                {"name": name, "kappa": [box.bare[0].kappa, box.bare[1].kappa]}
+                for name, box in self.throws.items()
+            ],
+            sensor=self.sensor,
+            question=self.question,
+            mode=self.mode,
+            goal={"x": self.goal[0], "side": self.goal[1]},
+            starts={"are": self.starts_are, "extents": self.starts.extents()},
+            noise=self.noise,
+            cells=self.grid.n_cells,
+            model=self.model,
+            verdict=self.found.verdict,
+            within=self.found.throws,
+            policy=policy,
+            beliefs=self.found.beliefs,
+            seconds=self.found.seconds,
+            reason=self.found.reason,
+        )
+
+
+def _play(board: Board, sensor: Sensor | None, limits: Limits, progress: Progress = None) -> Synthesis:
+    own = {each.name: getattr(board, each.name) for each in fields(Board)}
+    game = board.game.asking(None if sensor is None else sensor.answers(board.starts.grid))
+    found = search(game, board.starts.mask, **limits._asdict(), progress=progress)
+    return Synthesis(**{**own, "game": game}, sensor=sensor, limits=limits, found=found)
+
+
+@shown_in_notebooks
+@arguments_checked
+def feedback(
+    scene: Scene | str,
+    sensor: Sensor | str | None = None,
+    *,
+    mode: str = "stop",
+    goal: tuple[float, int] | None = None,
+    starts: Starts = None,
+    throws: int = 30,
+    cells: int = 1024,
+    noise: Mapping[str, str] | None = None,
+    seconds: float = 60.0,
+    beliefs: int = 400_000,
+    cuts: Sequence[float] = (),
+    progress: Progress = None,
+) -> Synthesis:
+    """Look for a policy: which throw on which answer of a sensor of one bit.
+
+    The sensor is read whenever the part lies at rest, before the first throw too.  A policy holds for every start in
+    the cells named and every sequence of the noise.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        A scene with the table ``[feedback]``.
+    sensor : Sensor or "none", optional
+        Instead of the scene's; "none" asks nothing.
+    mode : {"stop", "catch"}
+        "stop": the controller stops where it knows that the part is in the goal region.  "catch": a part that comes to
+        rest at the goal's x or beyond falls in; on another side than the goal's it is lost.
+    goal : (float, int), optional
+        x and side of the goal region [length]; default those of the scene's goal.
+    starts : float or mapping of int to (float, float), optional
+        Every start from this x on, or from one x to another by side [length].  Default: the limit sets of the scene's
+        own throw, so far as parts there are not yet caught.
+    throws : int
+        The most throws.
+    cells : int
+        Cells per side.
+    noise : mapping of str to str, optional
+        What differs at every throw: ``{"throw.speed": "0.3 %"}``, besides what the scene scatters.
+    seconds : float
+        The most time for the search [s].
+    beliefs : int
+        The most beliefs to remember.
+    cuts : sequence of float
+        Further borders of cells [length], such as the places of sensors that `Synthesis.asking` will try.
+    progress : callable, optional
+        Told the step, its number and how many there are.
+
+    Returns
+    -------
+    Synthesis
+
+    Raises
+    ------
+    AnswerError
+        For a scene without throws to choose from, a goal without a place, an unknown mode, or starts that are none.
+
+    Source: docs/feedback.md.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> scene = ls.load("paper-designed").as_dict()
+    >>> scene["feedback"] = {
+    ...     "sensor": {"beyond": "20 in"},
+    ...     "throws": [{"name": "own", "kappa": "25.3778518 in"}],
+    ... }
+    >>> found = ls.feedback(ls.load(scene), starts={2: (16.0, 16.5)}, cells=256)
+    >>> found.found.verdict, found.found.throws
+    ('solved', 2)
+    """
+    chosen = load(scene)
+    asked = _sensor_of(chosen, sensor)
+    own = asked.cuts if isinstance(asked, BeyondSensor) else ()
+    board = board_of(chosen, mode, goal, starts, cells, noise, (*cuts, *own), progress)
+    return _play(board, asked, Limits(throws, seconds, beliefs), progress)
+
+
+def places(
+    scene: Scene | str, at: Sequence[float], *, error: float = 0.0, progress: Progress = None, **options: Any
+) -> tuple[Synthesis, ...]:
+    """Try the sensor "is the part beyond x?" at several places; the images of the cells are computed once.
+
+    Parameters
+    ----------
+    at : sequence of float
+        The places [length].
+    error : float
+        The sensor's error [length].
+    scene, progress, **options
+        As in `feedback`; the time is that for each place.
+
+    Returns
+    -------
+    tuple of Synthesis
+        One for each place.
+    """
+    sensors = [BeyondSensor(x, error) for x in at]
+    found: list[Synthesis] = []
+    for k, sensor in enumerate(sensors):
+        if progress is not None:
+            progress("places of the sensor", k, len(at))
+        if found:
+            found.append(found[0].asking(sensor))
+        else:
+            cuts = [cut for each in sensors for cut in each.cuts]
+            found.append(feedback(scene, sensor, **{**options, "cuts": cuts}))
+    return tuple(found)
+
+
+def _sensor_of(scene: Scene, sensor: Sensor | str | None) -> Sensor | None:
+    if isinstance(sensor, str):
+        if sensor != "none":
+            raise AnswerError("the sensor", sensor, 'a Sensor or "none"', "correct it")
+        return None
+    own = sensor if sensor is not None or scene.feedback is None else scene.feedback.sensor
+    if own is None and scene.feedback is not None:
+        remedy = 'add it to the scene, choose one, or pass "none"'
+        raise AnswerError("the sensor", "none", "[feedback] sensor", remedy)
+    return own

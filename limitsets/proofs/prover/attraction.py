@@ -1,0 +1,222 @@
+"""Attraction: every start on the arm enters the attracting cells and stays there.
+
+An integer rank falls strictly along every image off the attracting cells, and attracting cells lead to attracting cells
+of the same component only; neither needs the map to be continuous.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.proofs.prover.basin import ROUNDING, Basin, NearHinge, basin, near_hinge, shares_of
+from limitsets.proofs.prover.cover import Cover
+from limitsets.systems.cells import CellSet
+from limitsets.systems.graph.components import attracting_of
+
+BELOW = "with the arm's surface above the joint, starts nearer to it than the fixed point of the jog go there"
+
+
+@dataclass(frozen=True, eq=False)
+class Attraction:
+    """What is proved of where starts end.
+
+    Attributes
+    ----------
+    cover : Cover
+        Cells and images.
+    component : ndarray of int32, shape (n_cells,)
+        Number of the attracting component of each cell, -1 off them.
+    joint : tuple of NearHinge
+        The starts below the cells.
+    proved : bool
+        Whether every start on (a_i, arm.length] of every side enters the attracting cells.
+    reason : str
+        What is missing and where, empty if nothing.
+    unresolved : CellSet
+        Recurrent cells that do not attract.
+    """
+
+    cover: Cover
+    component: NDArray[np.int32]
+    joint: tuple[NearHinge, ...]
+    proved: bool
+    reason: str
+    unresolved: CellSet
+
+    @property
+    def cells(self) -> CellSet:
+        """The attracting cells."""
+        return CellSet(self.cover.grid, self.component >= 0)
+
+    @property
+    def missing(self) -> str:
+        """What is missing for every start on the arm, those next to the joint included; empty if nothing."""
+        return self.reason or (BELOW if self.cover.points else "")
+
+    @cached_property
+    def basin(self) -> Basin:
+        """The starts that are proved to come to the attracting cells."""
+        return basin(self.cover, self.component, self.joint)
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Shares of the arm where only the starts in the attracting cells are claimed."""
+        lo, hi = self.cover.box.bare
+        total = float((hi.arm_length - lo.a)[self.cover.box.rests].sum())
+        inside = sum(high - low for parts in self.cells.extents().values() for low, high in parts) / total
+        share = max(0.0, inside - ROUNDING)
+        others = self.basin.leaves + self.basin.creeps
+        return self.basin.shares | {"share": share, "open": max(0.0, 1.0 - share - others) + ROUNDING}
+
+    def shares_from(self, section: Mapping[str, Any]) -> tuple[dict[str, float], bool]:
+        """Shares of the arm for the starts of a goal's section, and whether it counts as proved of them.
+
+        The section may be that of several boxes of parameters: its starts begin where those of the last of them do,
+        and only what lies before the first of their fixed points, or is lost in all of them, is explained.
+        """
+        arm, near = self.cover.box.bare[0], section.get("near_joint")
+        ends = {side: each["fixed_point"][0] for side, each in (near or {}).items() if "fixed_point" in each}
+        ends |= section.get("lost", {})
+        sides = [str(side) for side in range(arm.a.size)]
+        start = np.array([float.fromhex(section["starts"]["from"].get(side, "inf")) for side in sides])
+        explained = np.array(
+            [
+                float.fromhex(ends[side]) if side in ends else foot
+                for side, foot in zip(sides, arm.a, strict=True)
+            ]
+        )
+        shut = self.basin.rank < 0
+        *shares, whole = shares_of(self.cover, self.joint, shut, near is not None, start, explained)
+        return dict(zip(self.basin.shares, shares, strict=True)), whole
+
+    @property
+    def max_rank(self) -> int:
+        """Throws after which every start in the cells is in attracting ones, at most, where attraction is proved."""
+        return int(self.basin.rank.max())
+
+
+def attraction(found: Cover) -> Attraction:
+    """Find the attracting cells and prove that everything enters them.
+
+    Parameters
+    ----------
+    found : Cover
+        Cells and enclosed images.
+
+    Returns
+    -------
+    Attraction
+        With the reason where it is not proved.
+    """
+    graph = found.graph
+    parts, sets = graph.components(), graph.recurrent_components()
+    good = attracting_of(graph.ranges, parts, sets)  # a survey's order is quadratic in their number
+    component = np.full(graph.n_cells, -1, dtype=np.int32)
+    for number, cells in enumerate(k for k, attracts in zip(sets, good, strict=True) if attracts):
+        component[cells] = number
+    lost = [cells for cells, attracts in zip(sets, good, strict=True) if not attracts]
+    unresolved = CellSet.of(found.grid, np.concatenate([np.zeros(0, np.int64), *lost]))
+    joint = near_hinge(found)
+    return Attraction(
+        found,
+        component,
+        joint,
+        *_verdict(found, component, unresolved, joint),
+        unresolved,
+    )
+
+
+def _verdict(
+    found: Cover, component: NDArray[np.int32], unresolved: CellSet, joint: tuple[NearHinge, ...]
+) -> tuple[bool, str]:
+    """Whether attraction is proved, and the first thing that is missing."""
+    lost = np.concatenate([images.lost for images in found.images])
+    if lost.any():
+        return False, f"nothing is proved of the image of {found.place(int(np.flatnonzero(lost)[0]))}"
+    if found.box.landing > 0.0:
+        return False, f"near the joint: {next(near.reason for near in joint if not near.empty)}"
+    leaving = np.flatnonzero(found.graph.ranges.exits)
+    if leaving.size:
+        return False, f"the image of {found.place(int(leaving[0]))} may leave the cells"
+    if len(unresolved):
+        return (
+            False,
+            f"{len(unresolved)} recurrent cells do not attract: first {found.place(unresolved.numbers()[0])}",
+        )
+    if not (component >= 0).any():
+        return False, "there are no attracting cells"
+    for side, near in enumerate(joint):
+        if not near.proved:
+            return False, f"near the joint on side {side}: {near.reason}"
+    return True, ""
+
+
+def near_section(found: Attraction) -> dict[str, dict[str, Any]]:
+    """Write what a recheck needs of the starts below the cells: by side the factor, the bracket of a fixed point."""
+    section: dict[str, dict[str, Any]] = {}
+    for side, near in enumerate(found.joint):
+        if near.empty:
+            continue
+        section[str(side)] = {"q": near.q.hex()}
+        if near.fixed_point is not None:
+            section[str(side)]["fixed_point"] = [end.hex() for end in near.fixed_point]
+    return section
+
+
+# ----------------------------------------------------------------
+# Trapping: every attracting component is mapped into its own interior.
+#
+# Then the component is an isolating neighbourhood of an attractor that persists under small changes of the map.  The
+# interior is relative to (a_i, arm.length], where a part can rest: a component may reach the arm's end, but no image
+# may lie beyond it.
+
+
+def _held(lo: float, hi: float, intervals: list[tuple[float, float]], end: float, arm: float) -> bool:
+    """Whether [lo, hi] lies in the interior of one of the intervals, relative to x <= arm."""
+    return any(bottom < lo and (hi < top or (top >= end and hi <= arm)) for bottom, top in intervals)
+
+
+def trapping(found: Attraction) -> str:
+    """Prove that the images of each attracting component lie in the interior of its cells.
+
+    Parameters
+    ----------
+    found : Attraction
+        Cells, components and enclosed images.
+
+    Returns
+    -------
+    str
+        What is missing and where; empty if it is proved.
+
+    Notes
+    -----
+    Comparisons of the enclosures' ends with the cells' borders only, both exact.  Source: docs/model.md, attraction.
+    """
+    grid, arm = found.cover.grid, float(found.cover.box.lo.arm_length)
+    if not (found.component >= 0).any():
+        return "there are no attracting cells"
+    for number in range(int(found.component.max()) + 1):
+        inside = CellSet(grid, found.component == number)
+        extents = inside.extents()
+        for side, images in enumerate(found.cover.images):
+            mine = inside.mask[grid.of_side(side)]
+            edges = grid.edges[side][0]
+            cells = [*((int(k), "nothing is proved of") for k in np.flatnonzero(mine & images.lost))]
+            for (to, _), (lo, hi) in images.hulls.items():
+                end = float(grid.edges[to][0][-1])
+                cells += [
+                    (int(k), "not interior to the component is")
+                    for k in np.flatnonzero(mine & (lo <= hi))
+                    if not _held(float(lo[k]), float(hi[k]), extents.get(to, []), end, arm)
+                ]
+            if cells:
+                k, what = cells[0]
+                return f"{what} the image of side {side}, x in [{edges[k]:.6g}, {edges[k + 1]:.6g}]"
+    return ""

@@ -1,0 +1,380 @@
+"""Writing a certificate: all data that a recheck needs, none that it has to trust.
+
+One zip, stored: `header.json` (claims, the map's formulas for people, the scene as written, hashes) and `arrays.npz`
+(per box of parameters: cell borders, target cells per branch, branch, rank, component, brackets of the impact angle).
+The format is described in docs/certificates.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import math
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
+from limitsets.base.files import replaced
+from limitsets.base.progress import bar, in_notebook
+from limitsets.feeder.scene.units import spelled_plainly
+from limitsets.feeder.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
+from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.cover import Cover, targets
+
+if TYPE_CHECKING:
+    from limitsets.checker import Report
+
+
+# ----------------------------------------------------------------
+# `limitsets.recheck`: the checker, called from Python; every writer of certificates calls it too.
+#
+# The checker alone needs python-flint, so it is imported where it is called.
+
+
+class DeniedError(AnswerError):
+    """The checker does not confirm a certificate that was just written.
+
+    Attributes
+    ----------
+    file : str
+        Where it is kept, NAME.denied.zip.
+    claims : dict of str to str
+        The claims that are not confirmed, and why.
+    """
+
+    claims: dict[str, str]
+
+    @classmethod
+    def of(cls, file: Path, claims: dict[str, str]) -> DeniedError:
+        """Name the first claim that is not confirmed."""
+        name, why = next(iter(claims.items()))
+        remedy = "report it; the claim is undecided"
+        error = cls(
+            f"the certificate's claim {name}",
+            f"denied: {why}",
+            "what the checker confirms",
+            remedy,
+            file=str(file),
+        )
+        error.claims = claims
+        return error
+
+
+def require_confirmed(file: Path, kept: Path, verdicts: Mapping[str, str], workers: int | None = 1) -> float:
+    """Recheck a certificate before it gets its name; the seconds that it took.
+
+    Parameters
+    ----------
+    file : Path
+        The draft.
+    kept : Path
+        Where its writer keeps it if it is denied.
+    verdicts : mapping of str to str
+        What has to become of each claim: "proved", "proved-on-cells" or "refuted".
+    workers : int, optional
+        As in `recheck`.
+
+    Raises
+    ------
+    DeniedError
+        The checker comes to another verdict.
+    """
+    report = recheck(file, workers=workers)
+    states = {claim: (state, why) for claim, state, why in report.claims}
+    denied = {
+        claim: why or f"it is {state}, not {verdicts[claim]}"
+        for claim, (state, why) in states.items()
+        if state != verdicts[claim]
+    }
+    if report.verdict == "bad file":
+        denied = dict.fromkeys(verdicts, report.reason)
+    if denied:
+        raise DeniedError.of(kept, denied)
+    return report.seconds
+
+
+@arguments_checked
+def recheck(
+    path: str | Path, *, workers: int | None = 1, progress: Callable[[int, int], None] | None = None
+) -> Report:
+    """Check a certificate anew, in other arithmetic and by other code than those that made it.
+
+    Parameters
+    ----------
+    path : str or Path
+        What `Proof.save` wrote, or what a stranger sent: it is data, nothing in it is run.
+    workers : int, optional
+        Processes to share the work among, None for all processors.  More than one starts the calling script anew in
+        each of them, so it needs ``if __name__ == "__main__":``.
+    progress : callable, optional
+        Called now and then with the number of cells done and of all.
+
+    Returns
+    -------
+    Report
+        Its `verdict` is "proved", "proved-on-cells" (a goal, of the starts in some cells only), "refuted" (an orbit
+        that violates the goal is confirmed), "failed" or "bad file"; `reason` says what fails first; `statement`,
+        `parameters` and `relied_on` say what was claimed, of which scenes, and what that rests on; `starts` and
+        `share`, for which starts the goal is proved and what share of the arm they are.
+
+    Raises
+    ------
+    AnswerError
+        python-flint is not installed.
+
+    Examples
+    --------
+    >>> import tempfile, limitsets as ls
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = ls.certify("paper-designed").save(Path(folder) / "designed.proof.zip")
+    ...     ls.recheck(file).verdict
+    'proved'
+    """
+    if find_spec("flint") is None:
+        raise AnswerError(
+            "the arithmetic of the recheck",
+            "not installed",
+            "python-flint",
+            "pip install python-flint",
+        )
+    from limitsets.checker import recheck as check
+
+    if progress is None and in_notebook():
+        with bar() as tell:
+            return check(path, workers, lambda done, of: tell("cells checked", done - 1, of))
+    return check(path, workers, progress)
+
+
+# ----------------------------------------------------------------
+
+
+FORMAT, VERSION = "limitsets-proof", 2
+
+# Brackets of the impact are widened by this share of the angle, so that another arithmetic can confirm them.
+SLACK = 2.0**-34
+
+FLIGHTS = {Exact: "exact", SmallAngle: "small-angle", SmallAngle2: "small-angle-2"}
+FLIPS = {Signed: "signed", Energy: "energy"}
+FORMULAS = [
+    "f(phi) = R phi - a sin phi + d (1 - cos phi) - kappa/2 phi^2, impact at its smallest positive root",
+    "X = a cos phi - d sin phi, H = a sin phi + d cos phi, M = rho^2 + a^2 + d^2",
+    "omega = (rho^2 + X (R - kappa phi) + H (h + d)) / M, K = M omega^2 / 2, V = kappa (sqrt(a^2 + d^2) - H)",
+    "signed: flip iff sgn(omega) K - sgn(X) V > 0; energy: flip iff K - sgn(X) V > 0",
+    "jog: R' = R - h phi + a (1 - cos phi) - d (phi - sin phi); flip: R' less a + L_next - a_next, next side",
+    "small-angle: phi = 2 (R - a)/kappa; small-angle-2: phi = 2 (R - a)/(kappa - d); both:",
+    "omega = (rho^2 - a R + 2 a^2 + d^2 + d h)/M, V = kappa (sqrt(a^2 + d^2) - d) - 2 a (R - a), sgn(X) = 1",
+    "jog: R' = R - h phi",
+]
+
+
+def brackets(found: Cover) -> NDArray[np.float64]:
+    """Brackets of the impact angle, shape (n_cells, 2), widened by the slack."""
+    phi = np.concatenate([images.witness for images in found.images], axis=1).T
+    slack = SLACK * np.abs(phi)
+    return np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1)
+
+
+def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
+    """Arrays of one box of parameters."""
+    found = proof.cover
+    jog, flip = targets(found, 0), targets(found, 1)
+    jogs, flips = jog[:, 0] >= 0, flip[:, 0] >= 0
+    arrays: dict[str, NDArray[Any]] = {
+        "jog": jog,
+        "flip": flip,
+        "branch": np.where(jogs & flips, 2, np.where(flips, 1, 0)).astype(np.int8),
+        "rank": proof.basin.rank,
+        "component": proof.component,
+        "phi": brackets(found),
+    }
+    _say_nothing(arrays, found)
+    for side, (edges,) in enumerate(found.grid.edges):
+        arrays[f"edges.{side}"] = edges
+    return {prefix + name: np.ascontiguousarray(value) for name, value in arrays.items()}
+
+
+def _say_nothing(arrays: dict[str, NDArray[Any]], found: Cover) -> None:
+    """Of cells of which nothing is proved: they land within a turn if at all, and may go anywhere."""
+    offset, sides = found.grid.offset, found.grid.sides
+    for side, images in enumerate(found.images):
+        cells, after = offset[side] + np.flatnonzero(images.lost), (side + 1) % sides
+        arrays["jog"][cells] = offset[side], offset[side + 1] - 1
+        arrays["flip"][cells] = offset[after], offset[after + 1] - 1
+        arrays["branch"][cells] = 2
+        arrays["phi"][cells] = SLACK, 2.0 * math.pi
+
+
+def _model(found: Cover) -> dict[str, str]:
+    first = found.box.bare[0]
+    return {"flight": FLIGHTS[type(first.flight)], "flip": FLIPS[type(first.flip)]}
+
+
+def _parameters(found: Cover) -> dict[str, Any]:
+    lo, hi = found.box.lo, found.box.hi
+
+    def scalar(name: str) -> list[str]:
+        return [float(getattr(lo, name)).hex(), float(getattr(hi, name)).hex()]
+
+    def per_side(name: str) -> list[list[str]]:
+        return [
+            [float(a).hex(), float(b).hex()]
+            for a, b in zip(getattr(lo, name), getattr(hi, name), strict=True)
+        ]
+
+    return {
+        **{name: per_side(name) for name in ("a", "d", "length")},
+        **{name: scalar(name) for name in ("kappa", "surface_height", "arm_length", "radius_of_gyration")},
+    }
+
+
+def tidy(table: Any) -> Any:
+    """Write the texts of a scene with single blanks, as a certificate has them."""
+    if isinstance(table, Mapping):
+        return {key: tidy(value) for key, value in table.items()}
+    if isinstance(table, list):
+        return [tidy(value) for value in table]
+    return " ".join(table.split()) if isinstance(table, str) else table
+
+
+def write(
+    path: str | Path,
+    proofs: Sequence[Attraction],
+    claims: Sequence[Mapping[str, Any]],
+    *,
+    noise: Mapping[str, str] | None,
+    tolerance: Mapping[str, str] | None,
+    unit: str,
+    producer: Mapping[str, str],
+    recheck: bool = True,
+    workers: int | None = 1,
+) -> float | None:
+    """Write a certificate, replacing an older file whole; it gets its name once the checker has confirmed it.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    proofs : sequence of Attraction
+        One per box of parameters.
+    claims : sequence of mapping
+        ``{"claim": ..., "section": {...}}`` each, and the ``verdict`` where it is not "proved".
+    noise, tolerance : mapping or None
+        What the parameters were allowed to do.
+    unit : str
+        Unit of length.
+    producer : mapping
+        Versions, for information.
+    recheck : bool
+        Whether to check it first.
+    workers : int, optional
+        Processes that check it, None for all processors.
+
+    Returns
+    -------
+    float or None
+        Seconds that the check took.
+
+    Raises
+    ------
+    DeniedError
+        The checker does not confirm it: it is kept as NAME.denied.zip.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    boxes = []
+    for number, proof in enumerate(proofs):
+        arrays |= arrays_of(proof, f"{number}.")
+        found = proof.cover
+        # what is left of the effects here is a spread; a scene may leave the model to its defaults
+        scene = {word: tidy(table) for word, table in found.box.scene.items() if word != "effects"}
+        scene["model"] = _model(found)
+        if found.box.scene.get("effects", {}).get("spread"):
+            scene["effects"] = {"spread": found.box.scene["effects"]["spread"]}
+        boxes.append({"scene": scene, "parameters": _parameters(found), "prefix": f"{number}."})
+    header = {
+        "map": _model(proofs[0].cover),
+        "noise": spelled_plainly(noise) if noise else None,
+        "tolerance": spelled_plainly(tolerance) if tolerance else None,
+        "boxes": spelled_plainly(boxes),
+        "claims": spelled_plainly([{"claim": each["claim"], "section": each["section"]} for each in claims]),
+        "producer": dict(producer),
+    }
+    verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
+    return pack(path, header, arrays, unit, verdicts if recheck else None, workers)
+
+
+def pack(
+    path: str | Path,
+    header: Mapping[str, Any],
+    arrays: Mapping[str, NDArray[Any]],
+    unit: str,
+    verdicts: Mapping[str, str] | None,
+    workers: int | None = 1,
+) -> float | None:
+    """Write header and arrays, replacing an older file whole.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    header : mapping
+        What it says besides format, state and arrays; of the map flight and flip.
+    arrays : mapping of str to ndarray
+        By name.
+    unit : str
+        Unit of length.
+    verdicts : mapping of str to str, optional
+        What the checker has to find of each claim before the file gets its name; without it nothing is checked.
+    workers : int, optional
+        Processes that check it, None for all processors.
+
+    Returns
+    -------
+    float or None
+        Seconds that the check took.
+
+    Raises
+    ------
+    DeniedError
+        The checker does not confirm it: it is kept as NAME.denied.zip.
+    """
+    whole = {
+        "format": FORMAT,
+        "version": VERSION,
+        **header,
+        "map": {"name": "throw", "version": 1, **header["map"], "formulas": FORMULAS},
+        "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
+        "arrays": {
+            name: {
+                "sha256": hashlib.sha256(value.tobytes()).hexdigest(),
+                "dtype": value.dtype.str,
+                "shape": list(value.shape),
+            }
+            for name, value in arrays.items()
+        },
+    }
+    packed = io.BytesIO()
+    np.savez(packed, **arrays)  # type: ignore[arg-type]  # arrays by name
+    target, seconds, denied = Path(path), None, None
+    with replaced(target.parent) as draft:
+        written = draft / target.name
+        with zipfile.ZipFile(written, "w", zipfile.ZIP_STORED) as file:
+            file.writestr("header.json", json.dumps(whole, indent=1))
+            file.writestr("arrays.npz", packed.getvalue())
+        if verdicts is not None:
+            kept = target.with_name(target.name.removesuffix(".zip").removesuffix(".proof") + ".denied.zip")
+            try:
+                seconds = require_confirmed(written, kept, verdicts, workers)
+            except DeniedError as error:
+                denied = error
+                written.rename(draft / kept.name)
+    if denied is not None:
+        raise denied
+    return seconds

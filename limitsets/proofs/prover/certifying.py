@@ -1,0 +1,438 @@
+"""Prove claims about a scene: refine the cells until each claim is proved, refuted, or out of reach."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, overload
+
+from limitsets.base.arguments import arguments_checked_as
+from limitsets.base.errors import AnswerError, shown
+from limitsets.base.progress import shown_in_notebooks
+from limitsets.feeder.scene import Scene, load
+from limitsets.feeder.scene.laid import LaidLike, laid_goals
+from limitsets.feeder.scene.quantities import deviation, find
+from limitsets.feeder.scene.units import parse
+from limitsets.proofs.prover.attraction import Attraction, attraction, near_section, trapping
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.end_points import proved_ends
+from limitsets.proofs.prover.goals import cuts, prove, prove_or_refute
+from limitsets.proofs.prover.goals.violating_orbits import start_that_leaves
+from limitsets.proofs.prover.of_map import ProofOfMap, certify_map
+from limitsets.proofs.prover.orbits import proved_cycles
+from limitsets.proofs.prover.parameters import (
+    ParameterBox,
+    SceneBox,
+    joined,
+    parameter_box,
+    scattered,
+    whole,
+)
+from limitsets.proofs.prover.proof import Claim, Proof
+from limitsets.proofs.prover.query import weakest_of
+from limitsets.proofs.prover.thinning import least_slope
+from limitsets.systems.cells import Grid
+
+# Cells per side, tried in turn until everything asked for is proved or refuted.
+LADDER = (2048, 8192, 32768, 131072)
+
+# Pieces into which a tolerance may be cut, and cells that may be tried on them, before it is given up.
+MOST_PIECES, MOST_CELLS = 1024, 4_000_000
+
+# Of the pieces so many, the widest, are searched for an orbit that refutes the goal, besides the corners.
+MOST_SEARCHED = 8
+
+Progress = Callable[[str, int, int], None]
+
+
+def _attracts_all(found: Attraction, scene: Scene) -> Claim:
+    if not found.proved:
+        noisy = found.cover.box.landing > 0.0 and not found.cover.points
+        orbit = start_that_leaves(found) if noisy or found.cover.graph.ranges.exits.any() else ()
+        if orbit:
+            once = {"once": True}
+            return Claim("attracts-all", "refuted", found.reason, {}, orbit, final=True, recurs=once)
+        if noisy:
+            return Claim("attracts-all", "undecided", found.reason, {}, final=True)
+        return _not_attracted(found, scene)
+    section = {"near_joint": near_section(found), "max_rank": found.max_rank}
+    return Claim("attracts-all", "proved", "", section)
+
+
+def _not_attracted(found: Attraction, scene: Scene) -> Claim:
+    """Say why attraction is not proved: first what no finer cells can change."""
+    box = found.cover.box
+    if box.lo.surface_height <= 0.0 <= box.hi.surface_height:
+        reason = "the arm's surface is not proved to be below the joint nor above it"
+        return Claim("attracts-all", "undecided", f"{reason}; {found.reason}", {}, final=True)
+    for side, point in enumerate(found.cover.points):
+        if point.reason:
+            # of a narrower piece of a tolerance it may be found
+            alone = box.scene == dict(scene.text)
+            return Claim("attracts-all", "undecided", f"side {side}: {point.reason}", {}, final=alone)
+    for side, near in enumerate(found.joint):
+        if found.cover.points and not near.proved:
+            reason = f"side {side}, up to x = {near.x:.6g}: {near.reason}"
+            return Claim("attracts-all", "undecided", f"{reason}; {found.reason}", {})
+    least = min((near.q for near in found.joint if found.cover.points), default=math.inf)
+    gain = f"{least - 1.0:.1g} of its distance"
+    slow = f"; beyond the jog's fixed point a throw gains {gain} only, too little for such cells"
+    few = len(found.unresolved) and least - 1.0 < 0.01
+    return Claim("attracts-all", "undecided", found.reason + (slow if few else ""), {})
+
+
+def _invariant(found: Attraction, _: Scene) -> Claim:
+    # an attracting component is one that no image leaves; there has to be one
+    if not (found.component >= 0).any():
+        return Claim("invariant", "undecided", "there are no attracting cells", {})
+    return Claim("invariant", "proved", "", {})
+
+
+def _expanding(found: Attraction, _: Scene) -> Claim:
+    if not (found.component >= 0).any():
+        return Claim("expanding", "undecided", "there are no attracting cells", {})
+    slope, place = least_slope(found.cover, found.cells)
+    if not slope > 1.0:
+        return Claim("expanding", "undecided", f"slope {slope:.6g} at {place}", {})
+    # less by a little, so that other arithmetic can confirm it
+    stated = 1.0 + (slope - 1.0) * (1.0 - 2.0**-10)
+    return Claim("expanding", "proved", "", {"least_slope": stated.hex()})
+
+
+def _goal(found: Attraction, scene: Scene, *, search: bool = True) -> Claim:
+    """Prove the goal; where it is not proved, search for what refutes it if asked to."""
+    goal = scene.goal
+    if goal is None:
+        raise AnswerError(
+            "the goal", None, "a scene with [goal]", "give the scene one, or leave this claim out"
+        )
+    answer = (prove_or_refute if search else prove)(found, scene, goal)
+    return Claim(
+        "goal",
+        answer.verdict,
+        answer.reason,
+        dict(answer.section),
+        answer.counterexample,
+        final=answer.final,
+        starts=answer.starts,
+        shares=dict(answer.shares),
+        note=answer.note,
+        recurs=dict(answer.recurs),
+    )
+
+
+def _require_one_scene(claim: str, found: Attraction, scene: Scene) -> None:
+    """Refuse a tolerance: numbers that hold for every scene in it would be those of none."""
+    if found.cover.box.scene != dict(scene.text):
+        raise AnswerError("the claim", claim, "a claim about one scene", "ask for it without a tolerance")
+
+
+def _of_effects(claim: str) -> Claim:
+    reason = (
+        f"{claim.replace('-', ' ')} with effects beyond the minimal model cannot be proved in this version"
+    )
+    return Claim(claim, "undecided", reason, {}, final=True)
+
+
+def _end_points(found: Attraction, scene: Scene) -> Claim:
+    _require_one_scene("end-points", found, scene)
+    if found.cover.box.effects:
+        return _of_effects("end-points")
+    if found.cover.box.landing > 0.0:
+        reason = "end points with noise of landing.x cannot be proved in this version"
+        return Claim("end-points", "undecided", reason, {}, final=True)
+    ends = proved_ends(found)
+    if ends.reason:
+        return Claim("end-points", "undecided", ends.reason, {})
+    return Claim("end-points", "proved", "", ends.section())
+
+
+def _cycles(found: Attraction, scene: Scene) -> Claim:
+    _require_one_scene("cycles", found, scene)
+    if found.cover.box.effects:
+        return _of_effects("cycles")
+    orbits = proved_cycles(found)
+    if not orbits.cycles:
+        reason = orbits.missing[0] if orbits.missing else f"none is found of period up to {orbits.up_to}"
+        return Claim("cycles", "undecided", reason, {})
+    return Claim("cycles", "proved", "", orbits.section())
+
+
+def _trapping(found: Attraction, _: Scene) -> Claim:
+    reason = trapping(found)
+    return Claim("trapping", "undecided" if reason else "proved", reason, {})
+
+
+PROVERS: dict[str, Callable[[Attraction, Scene], Claim]] = {
+    "attracts-all": _attracts_all,
+    "cycles": _cycles,
+    "end-points": _end_points,
+    "expanding": _expanding,
+    "goal": _goal,
+    "invariant": _invariant,
+    "trapping": _trapping,
+}
+CLAIMS = tuple(PROVERS)
+"""What can be claimed in this version."""
+
+
+def _chosen(scene: Scene, claims: Sequence[str] | None) -> tuple[str, ...]:
+    if claims is None:
+        if scene.goal is not None and scene.goal.laid:
+            return ("goal",)  # attracts-all is about the whole arm
+        return ("attracts-all",) if scene.goal is None else ("attracts-all", "goal")
+    for claim in claims:
+        if claim not in CLAIMS:
+            raise AnswerError("the claim", claim, ", ".join(CLAIMS), "correct the word")
+    return tuple(dict.fromkeys(claims))
+
+
+def spelled_deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[str, str]:
+    """Check deviations, and write them as a certificate has them: a decimal number, a space, a unit."""
+    found = {}
+    for name, text in (given or {}).items():
+        deviation(text, name, scene.unit, zero=True, key=name)
+        number, unit = parse(text, "share" if text.rstrip().endswith("%") else find(name).dimension)
+        number = number.lstrip("+")
+        found[name] = f"{'0' if number.startswith('.') else ''}{number} {unit}"
+    return found
+
+
+@overload
+def certify(
+    scene: Scene | str | Path,
+    grid: Sequence[str] | None = None,
+    claims: Sequence[str] | None = None,
+    *,
+    noise: Mapping[str, str] | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    laid: LaidLike | None = None,
+    progress: Progress | None = None,
+) -> Proof: ...
+@overload
+def certify(
+    scene: tuple[Any, ...],
+    grid: Grid | None = None,
+    claims: Sequence[str] | None = None,
+    *,
+    upper: Any = None,
+    progress: Progress | None = None,
+) -> ProofOfMap: ...
+def certify(
+    scene: Any,
+    grid: Any = None,
+    claims: Sequence[str] | None = None,
+    *,
+    noise: Mapping[str, str] | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    laid: LaidLike | None = None,
+    upper: Any = None,
+    progress: Progress | None = None,
+) -> Proof | ProofOfMap:
+    """Prove claims about a scene, ``certify(scene, claims)``, or about any map, ``certify(map, grid, claims)``.
+
+    Parameters
+    ----------
+    scene : Scene, str, Path, or a map's parameters
+        A scene, what `limitsets.load` takes, or the parameters of a registered map.
+    grid : Grid
+        Of a map alone: the cells; finer ones prove more.  Behind a scene the claims may stand here.
+    claims : sequence of str, optional
+        Of a map any of `limitsets.proofs.prover.of_map.CLAIMS_OF_MAP`, by default attracts-all.  Of a scene any of
+        "attracts-all" (every start on the arm enters the attracting cells and stays; with the arm's surface above
+        the joint, every start beyond the jog's unstable fixed point, and those before it tend to the joint),
+        "invariant", "expanding" (every slope on the attracting cells exceeds 1), "trapping" (the attracting cells are
+        mapped into their interior), "end-points" (those of the limit set, in brackets), "cycles" (periodic orbits
+        exist, and attract or repel) and "goal".  Default: attracts-all, and the goal if there is one.
+    noise : mapping of str to str, optional
+        Of a scene alone: ``{"throw.speed": "0.3 %"}``: what may differ at every throw; the claims are then proved for
+        every sequence of throws.  A scene whose effects have spread = "bounded" adds its scatter.
+    tolerance : mapping of str to str, optional
+        Of a scene alone: ``{"throw.speed": "0.7 %"}``: what is fixed but unknown; the claims are then proved for every
+        such value.
+    laid : mapping of int to sequence of (float, float), optional
+        Of a scene alone: by side the ranges of x where parts are laid down, numbers in the scene's unit or texts with a
+        unit, ``{0: [(8.0, 20.0)]}``: the goal's starts are these.  The goal alone is then claimed by default.
+    upper : NamedTuple, optional
+        Of a map alone: the upper corner of a box of parameters, whose lower corner is `scene`; the claims are then
+        proved for every map between.
+    progress : callable, optional
+        Called with what is tried, how much of it is done, and of how much, before each attempt.
+
+    Returns
+    -------
+    Proof or ProofOfMap
+        With the verdict, and the reason where something is not proved.
+
+    Raises
+    ------
+    AnswerError
+        For a word that is no claim, an argument for maps beside a scene or for scenes beside a map, an effect of which
+        nothing can be proved, noise that cannot be enclosed, or a thread that does not round to nearest.
+    MapError
+        For a class in place of its values, and for a map that cannot be enclosed or that contradicts itself.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> proof = ls.certify("paper-designed")
+    >>> [(claim.claim, claim.verdict, claim.starts) for claim in proof.claims]
+    [('attracts-all', 'proved', None), ('goal', 'proved', 'every')]
+    >>> proof = ls.certify(ls.maps.Logistic(2.5), ls.grid([(0.1, 0.9)], cells=512), ["attracts-all"])
+    >>> proof.claims[0].verdict
+    'proved'
+    """
+    if isinstance(scene, tuple | type):
+        _require_none({"noise": noise, "tolerance": tolerance, "laid": laid}, "beside a map")
+        return certify_map(scene, grid, claims, upper=upper, progress=progress)
+    twice = isinstance(grid, Grid) or claims is not None  # else the claims stand in its place
+    _require_none({"upper": upper, "grid": grid if twice else None}, "beside a scene")
+    return certify_scene(
+        scene,
+        claims if grid is None else grid,
+        noise=noise,
+        tolerance=tolerance,
+        laid=laid,
+        progress=progress,
+    )
+
+
+def _require_none(given: Mapping[str, Any], beside: str) -> None:
+    """Refuse arguments of the other kind of proof."""
+    for name, value in given.items():
+        if value is not None:
+            remedy = "leave it out; a scene has tolerance=, a map upper="
+            raise AnswerError(f"the argument {name} of certify", shown(value), f"none {beside}", remedy)
+
+
+@shown_in_notebooks
+@arguments_checked_as("certify")
+def certify_scene(
+    scene: Scene | str | Path,
+    claims: Sequence[str] | None = None,
+    *,
+    noise: Mapping[str, str] | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    laid: LaidLike | None = None,
+    progress: Progress | None = None,
+) -> Proof:
+    """Prove claims about a scene, by the arguments of `certify`."""
+    loaded, _ = laid_goals(load(scene), laid)
+    wanted = _chosen(loaded, claims)
+    noise = joined(spelled_deviations(loaded, noise), spelled_deviations(loaded, scattered(loaded)))
+    tolerance = spelled_deviations(loaded, tolerance)
+    begin = time.perf_counter()
+    if tolerance:
+        found, answers = _pieces(loaded, wanted, whole(loaded, tolerance), noise, progress)
+    else:
+        one, answers = _attempt(loaded, wanted, parameter_box(loaded, noise=noise), LADDER, progress)
+        found = (one,)
+    seconds = time.perf_counter() - begin
+    return Proof(loaded, noise, tolerance, found, answers, seconds)
+
+
+def _attempt(
+    scene: Scene,
+    wanted: tuple[str, ...],
+    box: ParameterBox,
+    ladder: Sequence[int],
+    progress: Progress | None,
+    *,
+    search: bool = True,
+) -> tuple[Attraction, tuple[Claim, ...]]:
+    """Refine the cells until every claim is proved or refuted for one box of parameters, or the ladder ends.
+
+    What refutes the goal is searched for with the first cells and with the last: it hardly depends on them.
+    """
+    wanted_cuts = cuts(() if scene.goal is None else (scene.goal,), box.lo.a.size)
+    for step, cells in enumerate(ladder):
+        if progress is not None:
+            progress(f"{cells} cells a side", step, len(ladder))
+        found = attraction(cover(box, cells, wanted_cuts))
+        now = search and step in (0, len(ladder) - 1)
+        answers = tuple(
+            _goal(found, scene, search=now) if word == "goal" else PROVERS[word](found, scene)
+            for word in wanted
+        )
+        if all(answer.verdict in ("proved", "refuted") or answer.final for answer in answers):
+            break
+    return found, answers
+
+
+def _pieces(
+    scene: Scene,
+    wanted: tuple[str, ...],
+    piece: SceneBox,
+    noise: Mapping[str, str] | None,
+    progress: Progress | None,
+) -> tuple[tuple[Attraction, ...], tuple[Claim, ...]]:
+    """Prove the claims on a box of quantities; or refute the goal at one of its corners."""
+    settled: dict[str, Claim] = {}
+    found: tuple[Attraction, ...] = ()
+    for corner in piece.corners() if "goal" in wanted else ():
+        box = parameter_box(scene, tree=corner.tree(), noise=noise)
+        one, (answer,) = _attempt(scene, ("goal",), box, LADDER, progress)
+        found = (one,)
+        if answer.verdict == "refuted":
+            settled["goal"] = replace(answer, fixed=corner.texts())
+            break
+    left = tuple(word for word in wanted if word not in settled)
+    while left:
+        found, answers = _halved(scene, left, piece, noise, progress)
+        settled |= {answer.claim: answer for answer in answers}
+        left = tuple(word for word in wanted if word not in settled)
+    return found, tuple(settled[word] for word in wanted)
+
+
+def _halved(
+    scene: Scene,
+    wanted: tuple[str, ...],
+    piece: SceneBox,
+    noise: Mapping[str, str] | None,
+    progress: Progress | None,
+) -> tuple[tuple[Attraction, ...], tuple[Claim, ...]]:
+    """Prove all of the claims, halving the box of quantities as needed; or give up some of them, with the reason."""
+    scales = {name: max(span.hi - span.lo, Fraction(1, 10**30)) for name, span in piece.spans.items()}
+    waiting, tried, looked = [(piece, LADDER[0])], 0, 0
+    proved: list[tuple[Attraction, tuple[Claim, ...]]] = []
+    while waiting:
+        if progress is not None:
+            progress("pieces of the tolerance", len(proved), len(proved) + len(waiting))
+        part, cells = waiting.pop()
+        box = parameter_box(scene, tree=part.tree(), noise=noise)
+        one, answers = _attempt(scene, wanted, box, (cells,), None, search=looked < MOST_SEARCHED)
+        tried, looked = tried + one.cover.grid.n_cells, looked + 1
+        missing = tuple(each for each in answers if not _settled(each))
+        refuted = tuple(replace(each, fixed=part.texts()) for each in missing if each.verdict == "refuted")
+        if (
+            noise
+        ):  # the search chose kappa from the noise about every value in the piece: more than is allowed
+            refuted = ()
+        if refuted:
+            return (one,), refuted
+        if not missing:
+            proved.append((one, answers))
+        elif (
+            any(each.final for each in missing)
+            or len(proved) + len(waiting) >= MOST_PIECES
+            or tried > MOST_CELLS
+        ):
+            where = ", ".join(f"{name} from {lo} to {hi}" for name, (lo, hi) in part.texts().items())
+            return (one,), tuple(
+                Claim(each.claim, "undecided", f"for {where}: {each.reason}", {}) for each in missing
+            )
+        else:
+            # a narrower box of parameters is worth finer cells
+            waiting += [(half, min(cells * 6 // 5, LADDER[-1])) for half in part.halves(scales)]
+    found = tuple(one for one, _ in proved)
+    joined = tuple(weakest_of([answers[k] for _, answers in proved], found) for k in range(len(wanted)))
+    return found, joined
+
+
+def _settled(claim: Claim) -> bool:
+    """Whether narrower pieces cannot bring a better verdict: where starts leave a goal holds on cells at best."""
+    return claim.verdict == "proved" or (claim.written and claim.shares["leaves"] > 0.0)

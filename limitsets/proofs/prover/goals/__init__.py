@@ -1,0 +1,194 @@
+"""Proofs of the scene's goal: one file per kind of goal, and one line here.
+
+A file gives a `Kind`: how the goal is proved of the attracting cells, how it is refuted, how a proved one reads, and
+the borders that the cells need.  For which starts it is proved is added here, for all kinds alike, from the basin.
+`limitsets/feeder/goals/` declares the goals and reads them off samples; what each means is said there and in
+docs/certificates.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from limitsets.feeder.goals import Goal, laid_words, unknown_goal
+from limitsets.feeder.scene import Scene
+from limitsets.proofs.prover.attraction import Attraction, near_section
+from limitsets.proofs.prover.goals import (
+    attracts_all,
+    flip_order,
+    oriented_beyond,
+    predicate,
+    reaches,
+    stays_on_arm,
+)
+from limitsets.proofs.prover.goals.kind import Answer, Kind, undecided
+from limitsets.proofs.prover.goals.laid_starts import hexed, laid_only, narrowed, prove_laid, starts_in
+from limitsets.proofs.prover.goals.reaches import not_null
+from limitsets.proofs.prover.goals.violating_orbits import State
+
+__all__ = [
+    "KINDS",
+    "Answer",
+    "Kind",
+    "State",
+    "cuts",
+    "hexed",
+    "prove",
+    "prove_or_refute",
+    "rechecked",
+    "sentence",
+]
+
+# A goal of whose starts so small a share is open, while others leave, is not asked again with finer cells.
+LITTLE = 1e-3
+
+WHOLE = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
+
+KINDS: dict[str, Kind] = {
+    "attracts_all": attracts_all.KIND,
+    "flip_order": flip_order.KIND,
+    "oriented_beyond": oriented_beyond.KIND,
+    "predicate": predicate.KIND,
+    "reaches": reaches.KIND,
+    "stays_on_arm": stays_on_arm.KIND,
+}
+"""What proves each goal, by its word."""
+
+
+def _nothing(found: Attraction, scene: Scene, goal: Goal) -> Answer:
+    return undecided(f"nothing proves {goal.kind} in this version", final=True)
+
+
+# Of a goal that is declared without a proof.
+NONE = Kind(_nothing, _nothing, lambda _: "", lambda _: ())
+
+
+def _kind(goal: Goal) -> Kind:
+    return KINDS.get(goal.kind, NONE)
+
+
+def rechecked(goal: Goal) -> bool:
+    """Whether the checker knows a goal, so that a certificate of it can be written."""
+    return _kind(goal).rechecked
+
+
+def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
+    """Prove a goal, and say for which starts; or say what is missing.
+
+    Parameters
+    ----------
+    found : Attraction
+        What is proved of where starts end.
+    scene : Scene
+        The scene.
+    goal : Goal
+        What is asked.
+
+    Returns
+    -------
+    Answer
+        "proved" for every start, almost every start, or the starts from some x on, or for all where parts are laid
+        down; "proved-on-cells" where the goal is proved for the starts in some cells only; else "undecided".
+
+    Raises
+    ------
+    AnswerError
+        For what is no goal of `limitsets.goals`.
+    """
+    if not isinstance(goal, Goal):  # whatever it calls itself
+        raise unknown_goal(goal)
+    kind = _kind(goal)
+    if goal.laid:
+        return prove_laid(found, scene, goal, kind)
+    answer = kind.prove(found, scene, goal)
+    if answer.verdict != "proved":
+        return answer
+    if goal.from_anywhere and not goal.of_every_start:  # of every start, as its kind proves it
+        starts = "almost-every" if kind.almost(goal) else "every"
+        return answer._replace(section={**answer.section, "starts": starts}, starts=starts, shares=WHOLE)
+    return _for_starts(found, answer, almost=kind.almost(goal))
+
+
+def prove_or_refute(found: Attraction, scene: Scene, goal: Goal) -> Answer:
+    """Prove a goal, as `prove`; where it is not proved, search for what refutes it."""
+    answer = prove(found, scene, goal)
+    if answer.verdict == "proved":
+        return answer
+    if goal.laid:
+        found = narrowed(found, starts_in(found, goal.laid)[0])
+    against = _kind(goal).refute(found, scene, goal)
+    if goal.laid:
+        against = laid_only(against, found, goal.laid)
+    if against.verdict == "refuted":
+        return against._replace(reason=against.reason or answer.reason)
+    return answer
+
+
+def _for_starts(found: Attraction, answer: Answer, *, almost: bool) -> Answer:
+    """Say for which starts a goal holds that is proved of the attracting cells."""
+    basin, starts = found.basin, found.basin.starts
+    shares, missing = basin.shares, basin.missing
+    if almost:
+        starts = "almost-every" if starts == "every" else starts
+        flat = not_null(found) if starts != "cells" else ""
+        if starts == "cells" or flat:
+            starts, missing = "cells", missing or flat
+            shares = found.shares
+    section: dict[str, Any] = {**answer.section, "starts": starts}
+    if isinstance(starts, dict):
+        section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
+        if found.cover.box.landing > 0.0:
+            finite = ((side, float(x)) for side, x in enumerate(basin.explained) if np.isfinite(x))
+            section["lost"] = {str(side): x.hex() for side, x in finite}
+    if basin.thinning:
+        section["thinning"] = basin.thinning
+    if basin.near:
+        section["near_joint"] = near_section(found)
+    if starts != "cells":
+        return answer._replace(section=section, starts=starts, shares=shares)
+    # finer cells do not bring back starts that leave
+    final = basin.leaves > 0.0 and basin.open < LITTLE
+    return answer._replace(
+        verdict="proved-on-cells", reason=missing, section=section, starts=starts, shares=shares, final=final
+    )
+
+
+def cuts(goals: Sequence[Goal], sides: int) -> dict[int, list[float]]:
+    """Borders of cells that some goals need, by side: their places, and the ends of where parts are laid down."""
+    wanted = [float(x) for goal in goals for x in _kind(goal).borders(goal)]
+    laid = [each for goal in goals for each in goal.laid]
+    return {side: wanted + [end for on, *ends in laid if on == side for end in ends] for side in range(sides)}
+
+
+def sentence(section: Mapping[str, Any]) -> str:
+    """Put a proved goal in words for people, from its section of the certificate."""
+    said = KINDS[section["kind"]].sentence(section)
+    starts = section.get("starts")
+    if isinstance(starts, dict) and "from" not in starts:
+        return _of_laid(section, said)
+    if section.get("from_anywhere") or starts is None:
+        return said
+    if starts == "every":
+        return f"{said} Every start on the arm comes to the attracting cells."
+    if starts == "almost-every":
+        return f"{said} Every start on the arm comes to the attracting cells, but for starts of total length zero."
+    if starts == "cells":
+        return f"{said} Only some starts are proved to come to the attracting cells."
+    beyond = ", ".join(f"x > {float.fromhex(x):.6g} on side {side}" for side, x in starts["from"].items())
+    but = ", but for starts of total length zero" if "thinning" in section else ""
+    return f"{said} Every start with {beyond} comes to the attracting cells{but}."
+
+
+def _of_laid(section: Mapping[str, Any], said: str) -> str:
+    """Put a goal of parts that are laid down in words."""
+    ((word, spans),) = section["starts"].items()
+    laid = tuple(
+        (int(side), float.fromhex(lo), float.fromhex(hi)) for side, pairs in spans.items() for lo, hi in pairs
+    )
+    which = "Every start" if word == "within" else "Each start in the cells named"
+    but = ", but for starts of total length zero" if "thinning" in section else ""
+    comes = "" if section.get("from_anywhere") else f" {which} comes to attracting cells{but}."
+    return f"Parts are laid down at {laid_words(laid, '').replace('  ', ' ')}. {said}{comes}"

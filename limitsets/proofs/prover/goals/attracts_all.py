@@ -1,0 +1,52 @@
+"""One attracting component takes every start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from limitsets.feeder.goals import AttractsAll
+from limitsets.feeder.scene import Scene
+from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.goals.kind import Answer, Kind, against, common, once, undecided
+from limitsets.proofs.prover.goals.recurrent_orbits import Refutation
+from limitsets.proofs.prover.goals.violating_orbits import State, start_that_leaves
+
+TWO_BASINS = (
+    "starts nearer to the joint than the fixed point of the jog tend to the joint: there are two basins"
+)
+
+
+def _prove(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
+    several = int(found.component.max(initial=-1)) + 1
+    if several > 1:  # each is mapped into itself, however fine the cells are
+        reason = f"{several} attracting components are each mapped into themselves: none takes every start"
+        return undecided(reason, final=True)
+    missing = common(found, anywhere=False)
+    if missing:
+        return undecided(missing)
+    if found.basin.creeps:
+        return undecided(TWO_BASINS, final=True)
+    starts = found.basin.starts
+    if goal.laid:
+        starts = "almost-every" if found.basin.thinning else "every"
+    if starts != "every" and (goal.from_anywhere or starts != "almost-every"):
+        return undecided(found.missing)
+    return Answer("proved", "", {"kind": goal.kind})
+
+
+def _refute(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
+    if found.basin.creeps:
+        side = int(np.argmax([point.lo for point in found.cover.points]))
+        x = 0.5 * (float(found.cover.box.bare[1].a[side]) + found.cover.points[side].lo)
+        return against(Refutation((State(x, x, side, None),), "almost-every"), TWO_BASINS)
+    return once(start_that_leaves(found, goal.laid), found.missing)
+
+
+def _sentence(_: Mapping[str, Any]) -> str:
+    return "The attracting cells are one component."
+
+
+KIND = Kind(_prove, _refute, _sentence, lambda _: (), rechecked=True)

@@ -1,0 +1,181 @@
+"""Interface and shared parts of the files of this room: answers, borders next to a decimal, backward reachability.
+
+*Backward reachability*: cells all of whose images lie in the wanted cells are one throw away from them; cells all of
+whose images lie in those or in the wanted cells are two throws away; and so on.  Every orbit from such a cell comes to
+the wanted cells, whatever its course and whether or not the map is continuous.  With the edges from the cells wanted
+taken away these are the cells from which neither a recurrent cell nor an exit can be reached, and the throws are the
+longest path.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.feeder.scene import Scene
+from limitsets.proofs.prover.attraction import BELOW, Attraction
+from limitsets.proofs.prover.cover import everywhere, targets
+from limitsets.proofs.prover.goals.recurrent_orbits import Refutation
+from limitsets.proofs.prover.goals.violating_orbits import State
+from limitsets.systems.graph.components import ranks, reach, strong_components
+from limitsets.systems.graph.ranges import RUN, Ranges, build
+
+Mask = NDArray[np.bool_]
+
+
+class Answer(NamedTuple):
+    """What became of a goal; the words are those of `limitsets.proofs.prover.certifying.Claim`."""
+
+    verdict: str
+    reason: str = ""
+    section: Mapping[str, Any] = {}
+    counterexample: tuple[State, ...] = ()
+    final: bool = False
+    starts: Any = None
+    shares: Mapping[str, float] = {}
+    note: str = ""
+    recurs: Mapping[str, Any] = {}
+
+
+class Kind(NamedTuple):
+    """One kind of goal.
+
+    Attributes
+    ----------
+    prove : callable
+        From an `Attraction`, the scene and the goal to an `Answer`, proved or undecided: of the attracting cells, or of
+        every start where the goal says `from_anywhere`.
+    refute : callable
+        As `prove`, to an `Answer` that is refuted or undecided.
+    sentence : callable
+        From the section of a proved goal to a sentence about the attracting cells, or about every start.
+    borders : callable
+        From the goal to the borders of cells that it needs.
+    almost : callable
+        From the goal to whether it speaks of almost every orbit only.
+    rechecked : bool
+        Whether the checker knows the goal, so that a certificate of it can be written.
+    """
+
+    prove: Callable[[Attraction, Scene, Any], Answer]
+    refute: Callable[[Attraction, Scene, Any], Answer]
+    sentence: Callable[[Mapping[str, Any]], str]
+    borders: Callable[[Any], Sequence[float]]
+    almost: Callable[[Any], bool] = lambda _: False
+    rechecked: bool = False
+
+
+def undecided(reason: str, *, final: bool = False) -> Answer:
+    """Answer that nothing is proved."""
+    return Answer("undecided", reason, final=final)
+
+
+def against(refutation: Refutation, reason: str = "") -> Answer:
+    """Answer by a refutation: `starts` of which it is not true; undecided if it is empty."""
+    if not refutation.of:
+        return undecided(reason)
+    states, of, recurs = refutation
+    return Answer("refuted", reason, {}, states, starts=of, recurs=recurs)
+
+
+def once(orbit: tuple[State, ...], reason: str = "") -> Answer:
+    """Answer by one passage, which refutes what is asked of every start on the arm; undecided without one."""
+    return against(Refutation(orbit, "every", {"once": True}) if orbit else Refutation(), reason)
+
+
+def common(found: Attraction, *, anywhere: bool) -> str:
+    """Say what is missing that every goal needs: attracting cells, or that no start leaves; empty if nothing."""
+    if not anywhere:
+        return "" if (found.component >= 0).any() else "there are no attracting cells"
+    if found.cover.points:
+        return BELOW
+    for side, near in enumerate(found.joint):
+        if not near.proved:
+            return f"near the joint on side {side}: {near.reason}"
+    leaving = np.flatnonzero(found.cover.graph.ranges.exits)
+    return f"the image of {found.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
+
+
+def begins(section: Mapping[str, Any]) -> str:
+    """Say where the orbits begin that a goal from anywhere speaks of."""
+    laid = isinstance(section.get("starts"), dict)
+    return "where they are laid down" if laid else "anywhere on the arm"
+
+
+def thrown_into(found: Attraction, bad: Mask) -> str:
+    """Name a cell from which a throw may land in one of some cells; empty if there is none."""
+    number = np.concatenate([[0], np.cumsum(bad)])
+    for ends in everywhere(found.cover):
+        cells = np.flatnonzero(ends[:, 0] >= 0)
+        hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
+        if hit.size:
+            return found.cover.place(int(hit[0]))
+    return ""
+
+
+def place_text(goal: Any, scene: Scene) -> str:
+    """Write the x of a goal as a certificate has it: the scene's own words where it is the scene's own goal."""
+    own = scene.text.get("goal", {}).get(goal.kind)
+    if goal == scene.goal and own is not None:
+        return " ".join(str(own["x"] if isinstance(own, Mapping) else own).split())
+    return f"{goal.x!r} {scene.unit}"
+
+
+def below(x: float) -> float:
+    """Return a float that is not above the decimal that a certificate has for x, which x is next to."""
+    return math.nextafter(x, -math.inf)
+
+
+def above(x: float) -> float:
+    """Return a float that is not below the decimal that a certificate has for x, which x is next to."""
+    return math.nextafter(x, math.inf)
+
+
+def throws_to_reach(
+    found: Attraction, cells: Mask, wanted: Mask, branch: int | None = None
+) -> tuple[int, NDArray[np.int64]]:
+    """Count the throws after which every orbit from the cells has come to those wanted.
+
+    Parameters
+    ----------
+    found : Attraction
+        Cells and images.
+    cells : ndarray of bool, shape (n_cells,)
+        Where orbits begin.
+    wanted : ndarray of bool, shape (n_cells,)
+        Where they have to come; a start there has arrived.
+    branch : int, optional
+        The branch to follow; a throw of another one has arrived.  Default: all.
+
+    Returns
+    -------
+    int
+        Throws, at most.
+    ndarray of int64
+        Cells from which it is not proved.
+    """
+    ranges = found.cover.graph.ranges if branch is None else _of_branch(found, branch)
+    owner = np.repeat(np.arange(cells.size), np.diff(ranges.first))
+    ranges = ranges._replace(box=ranges.box.copy())
+    ranges.box[wanted[owner], RUN] = 0  # what has arrived goes no farther
+    parts = strong_components(ranges)
+    stay = (parts.recurrent[parts.label] | (ranges.exits > 0)) & ~wanted
+    late = reach(ranges, parts, stay.astype(np.uint8)) > 0
+    steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
+    throws = int(steps[cells & ~late].max(initial=0))
+    # of one branch the last throw is one that is not followed
+    return throws + (0 if branch is None else 1), np.flatnonzero(cells & late)
+
+
+def _of_branch(found: Attraction, branch: int) -> Ranges:
+    """Target cells of one branch as ranges, with the exits of all."""
+    grid, ends = found.cover.grid, targets(found.cover, branch)
+    some = ends[:, 0] >= 0
+    side = grid.side_of(ends[some, 0]).astype(np.int32)
+    lo, hi = (((ends[some, k] - grid.offset[side])[:, None]).astype(np.int32) for k in (0, 1))
+    first = np.concatenate([[0], np.cumsum(some)])
+    return build(grid, first, side, lo, hi, found.cover.graph.ranges.exits)

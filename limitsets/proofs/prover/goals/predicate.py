@@ -1,0 +1,89 @@
+"""A predicate of the caller: of every attracting cell, or of every landing from anywhere on the arm.
+
+The caller's code is believed: no certificate can hold it, and nothing rechecks it.  An orbit refutes it where it says
+no at both ends and in the middle of what encloses the orbit's last state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.goals import Predicate
+from limitsets.feeder.scene import Scene
+from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.goals.kind import Answer, Kind, against, common, once, thrown_into, undecided
+from limitsets.proofs.prover.goals.recurrent_orbits import recurrent_violation
+from limitsets.proofs.prover.goals.violating_orbits import State, one_throw
+
+
+def _good(goal: Predicate, lo: NDArray[np.float64], hi: NDArray[np.float64], side: int) -> NDArray[np.bool_]:
+    """Ask the caller, and refuse what is no answer."""
+    said = np.asarray(goal.holds(lo, hi, side))
+    if said.dtype != np.bool_ or said.shape != lo.shape:
+        allowed = f"an array of bool of shape {lo.shape}"
+        raise AnswerError(
+            f"what {goal.name} returns", f"{said.dtype} of shape {said.shape}", allowed, "correct it"
+        )
+    return said
+
+
+def _bad_cells(found: Attraction, goal: Predicate) -> NDArray[np.bool_]:
+    grid = found.cover.grid
+    parts = [_good(goal, edges[:-1], edges[1:], side) for side, (edges,) in enumerate(grid.edges)]
+    return ~np.concatenate(parts)
+
+
+def _missing(found: Attraction, goal: Predicate) -> str:
+    """Say where it is not proved; empty if it is."""
+    bad = _bad_cells(found, goal)
+    if not goal.from_anywhere:
+        wrong = np.flatnonzero(bad & (found.component >= 0))
+        return f"{goal.name}: not on {found.cover.place(int(wrong[0]))}" if wrong.size else ""
+    start = thrown_into(found, bad)
+    if start:
+        return f"{goal.name}: not where a throw from {start} may land"
+    foot = found.cover.box.bare[0].a
+    for side, near in enumerate(found.joint):
+        if near.empty:
+            continue
+        landing = np.array([foot[side]]), np.array([near.reach])
+        if near.rolls or not _good(goal, *landing, side).all():
+            return f"{goal.name}: not where a throw from near the joint on side {side} may land"
+    return ""
+
+
+def _prove(found: Attraction, _: Scene, goal: Predicate) -> Answer:
+    missing = common(found, anywhere=goal.from_anywhere)
+    reason = missing or _missing(found, goal)
+    return undecided(reason) if reason else Answer("proved", "", {"kind": goal.kind, "name": goal.name})
+
+
+def _refute(found: Attraction, scene: Scene, goal: Predicate) -> Answer:
+    def wrong(x: Any, side: Any) -> NDArray[np.bool_]:
+        bad = np.zeros(x.shape, dtype=bool)
+        for s in np.unique(side).tolist():
+            mine = side == s
+            bad[mine] = ~_good(goal, x[mine], x[mine], s)
+        return bad
+
+    if not goal.from_anywhere:
+        return against(recurrent_violation(found, scene, wrong, goal.laid))
+    orbit = one_throw(found, wrong, laid=goal.laid)
+    return once(orbit if orbit and _throughout(goal, orbit[-1]) else ())
+
+
+def _throughout(goal: Predicate, last: State) -> bool:
+    x = np.array([last.lo, 0.5 * (last.lo + last.hi), last.hi])
+    return not _good(goal, x, x, last.side).any()
+
+
+def _sentence(section: Mapping[str, Any]) -> str:
+    return f"In the attracting cells: {section['name']}, as its code says."
+
+
+KIND = Kind(_prove, _refute, _sentence, lambda goal: goal.cuts)

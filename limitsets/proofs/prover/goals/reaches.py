@@ -1,0 +1,149 @@
+"""Orbits come to rest on a side at x or beyond: every one, or all but a set of starts of length zero."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from limitsets.feeder.goals import Reaches
+from limitsets.feeder.scene import Scene
+from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.goals.kind import (
+    Answer,
+    Kind,
+    Mask,
+    above,
+    against,
+    begins,
+    below,
+    common,
+    place_text,
+    throws_to_reach,
+    undecided,
+)
+from limitsets.proofs.prover.goals.recurrent_orbits import Loop, Refutation, cycle_that, meets
+from limitsets.proofs.prover.goals.violating_orbits import sample_passage
+from limitsets.proofs.prover.thinning import perron_frobenius_bound, slopes
+from limitsets.systems.cells import CellSet
+
+
+def _wanted(found: Attraction, goal: Reaches) -> Mask:
+    """Cells on the side that lie at x or beyond."""
+    wanted = np.zeros(found.component.size, dtype=bool)
+    edges = found.cover.grid.edges[goal.side][0]
+    wanted[found.cover.grid.of_side(goal.side)] = edges[:-1] >= above(goal.x)
+    return wanted
+
+
+def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
+    every = goal.every_orbit
+
+    def refutes(loop: Loop) -> bool:
+        return (every or loop.attracts) and meets(loop, goal.laid) and not _arrives(loop, goal)
+
+    never = cycle_that(found, scene, refutes, attracting=not every)
+    short = falls_short(found, goal)
+    if short is None:
+        return against(never)
+    return short._replace(counterexample=never.states) if never.states else short
+
+
+def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
+    missing = common(found, anywhere=False)
+    if missing:
+        return undecided(missing)
+    wanted, inside = _wanted(found, goal), found.component >= 0
+    short = falls_short(found, goal)
+    if short is not None:
+        return short
+    if goal.every_orbit:
+        return _every(found, scene, goal, wanted)
+    missing = (found.missing or not_null(found)) if goal.from_anywhere else ""
+    if missing:
+        return undecided(missing, final=found.cover.box.landing > 0.0 and not goal.laid)
+    throws, _, reason = perron_frobenius_bound(found.cover, inside & ~wanted)
+    if reason:
+        return undecided(reason)
+    # a little more, so that other arithmetic can confirm it
+    return Answer("proved", "", _section(scene, goal, throws + throws // 8 + 1))
+
+
+def not_null(found: Attraction) -> str:
+    """Say what is missing for this: almost no start of the basin comes to a given set of length zero.
+
+    Where the slope is positive, what is thrown to a set of length zero has length zero.
+    """
+    basin = found.basin
+    for side, near in enumerate(found.joint):
+        if basin.near and not near.rises:
+            return f"near the joint on side {side}: the landing is not proved to rise with the start"
+    off = (found.component < 0) & (basin.rank >= 0)
+    flat = np.flatnonzero(off & ~(slopes(found.cover, CellSet(found.cover.grid, off)) > 0.0))
+    return f"the slope is not proved positive on {found.cover.place(int(flat[0]))}" if flat.size else ""
+
+
+def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answer:
+    missing = common(found, anywhere=True) if goal.from_anywhere else ""
+    cells = found.basin.rank >= 0 if goal.laid else np.ones_like(wanted)
+    cells = cells if goal.from_anywhere else found.component >= 0
+    throws, left = throws_to_reach(found, cells, wanted)
+    if left.size:
+        return undecided(f"an orbit from {found.cover.place(int(left[0]))} may never get there")
+    if missing:
+        return undecided(missing, final=found.cover.box.landing > 0.0 and not goal.laid)
+    return Answer("proved", "", _section(scene, goal, throws))
+
+
+def _section(scene: Scene, goal: Reaches, throws: int) -> dict[str, Any]:
+    section = {
+        "kind": goal.kind,
+        "x": place_text(goal, scene),
+        "side": goal.side,
+        "every_orbit": goal.every_orbit,
+        "throws": throws,
+    }
+    return section | ({"from_anywhere": True} if goal.from_anywhere else {})
+
+
+def _arrives(loop: Loop, goal: Reaches) -> bool:
+    """Whether it is not excluded that a periodic orbit gets there."""
+    return bool(((loop.side == goal.side) & (loop.hi >= below(goal.x))).any())
+
+
+def falls_short(found: Attraction, goal: Reaches) -> Answer | None:
+    """Refute the goal by an attracting component that ends below x: no orbit in it gets there.
+
+    It is mapped into itself and has an interior: so many starts never get there.  The orbit is shown, not needed.
+    """
+    edges = found.cover.grid.edges[goal.side][0]
+    reach = np.zeros(found.component.size, dtype=bool)
+    reach[found.cover.grid.of_side(goal.side)] = edges[1:] >= below(goal.x)
+    for number in range(int(found.component.max(initial=-1)) + 1):
+        mine = found.component == number
+        if not (mine & reach).any():
+            cells = np.flatnonzero(mine)
+            reason = f"no orbit in the attracting component of {found.cover.place(int(cells[0]))} gets there"
+            return against(
+                Refutation(sample_passage(found, cells), "almost-every", {"component": number}), reason
+            )
+    return None
+
+
+def _sentence(section: Mapping[str, Any]) -> str:
+    where = begins(section) if section.get("from_anywhere") else "in the attracting cells"
+    there = f"comes to rest on side {section['side']} at x = {section['x']} or beyond"
+    if section["every_orbit"]:
+        return f"From every start {where} a part {there}, after {section['throws']} throws at most."
+    return f"From every start {where}, but for starts of total length zero, a part {there}."
+
+
+KIND = Kind(
+    _prove,
+    _refute,
+    _sentence,
+    lambda goal: [above(goal.x)],
+    lambda goal: not goal.every_orbit,
+    rechecked=True,
+)

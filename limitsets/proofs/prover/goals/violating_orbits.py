@@ -1,0 +1,350 @@
+"""Orbits that refute a goal: proposed in floats, with the noise chosen at every throw, and proved in intervals.
+
+Random throws miss what the noise can do at its worst; reachability, one state per cell, does not.  An orbit found is
+replayed from its start with every decision proved and every state enclosed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.feeder.goals import Laid
+from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.orbits import replay
+from limitsets.proofs.prover.parameters import ParameterBox
+from limitsets.systems.cells import Grid
+from limitsets.systems.maps import codes, images, orbit
+
+Wrong: TypeAlias = Callable[[Any, Any], Any]
+"""From places and sides to whether each violates the goal; of an enclosure, its lower end is asked."""
+
+# Values of kappa tried at every throw where it may differ.
+CHOICES = 33
+
+# Throws from the start at which the search gives up.
+MOST_THROWS = 2000
+
+# Without a choice: throws of the orbit that is searched, and of one that is only shown.
+SEARCHED, SHOWN = 200_000, 20
+
+# Throws that bring an orbit from the attracting cells to the limit set, before a violation counts.
+SETTLING = 20_000
+
+# Violations by less than this, relative to x, may be rounding.
+MORE_THAN_ROUNDING = 1.0 - 1e-9
+
+
+@dataclass(frozen=True)
+class State:
+    """One state of a counterexample.
+
+    Attributes
+    ----------
+    lo, hi : float
+        Enclosure of x.
+    side : int
+        The side.
+    kappa : float or None
+        Gravity over squared speed of the throw made from here; None for the last state.
+    landing : float or None
+        How far beyond the model's place that throw lands; None for the last state, and without such noise.
+    """
+
+    lo: float
+    hi: float
+    side: int
+    kappa: float | None
+    landing: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Give it as a plain table for JSON."""
+        return {"x": 0.5 * (self.lo + self.hi), "between": [self.lo, self.hi], "side": self.side}
+
+
+class ThrowChoice(NamedTuple):
+    """What one throw may be like: kappa, and how far beyond the model's place it lands."""
+
+    kappa: float
+    landing: float
+
+
+class Path(NamedTuple):
+    """States and, one fewer, what each throw was like."""
+
+    x: list[float]
+    side: list[int]
+    thrown: list[ThrowChoice]
+
+
+def throw_choices(box: ParameterBox, kappas: int = CHOICES) -> list[ThrowChoice]:
+    """List what a throw may be like: values of kappa across its noise, the ends and the middle of the landing's.
+
+    A little inside the bounds, so that each is one of the noise's whatever the last digit.
+    """
+    ends, shift = (box.lo.kappa, box.hi.kappa), box.landing * (1.0 - 1e-9)
+    margin = 1e-9 * (ends[1] - ends[0])
+    values = (
+        np.linspace(ends[0] + margin, ends[1] - margin, kappas) if box.kappa_varies else [box.middle_kappa]
+    )
+    shifts = (-shift, 0.0, shift) if shift > 0.0 else (0.0,)
+    return [ThrowChoice(float(kappa), landing) for kappa in values for landing in shifts]
+
+
+class ThrownStates(NamedTuple):
+    """Images of some states: x', side', number of the state, number of the choice, whether it stays on the arm."""
+
+    x: NDArray[np.float64]
+    side: NDArray[np.int64]
+    state: NDArray[np.int64]
+    choice: NDArray[np.int64]
+    stays: NDArray[np.bool_]
+
+
+def throws(box: ParameterBox, x: Any, side: Any, options: list[ThrowChoice]) -> ThrownStates:
+    """Images of all states under all choices."""
+    found = []
+    for kappa in sorted({option.kappa for option in options}):
+        map_now = box.at_kappa(kappa)
+        for s in np.unique(side).tolist():
+            mine = np.flatnonzero(side == s)
+            got = images(map_now, x[mine], s)
+            landed = got.code != codes.OUTSIDE_MODEL
+            to, state = got.side[landed], mine[landed]
+            for number, option in enumerate(options):
+                if option.kappa == kappa:
+                    after = got.x[landed] + option.landing
+                    stays = (after > box.hi.a[to]) & (after <= box.lo.arm_length)
+                    found.append((after, to, state, np.full(to.size, number), stays))
+    return ThrownStates(*(np.concatenate(part) for part in zip(*found, strict=True)))
+
+
+def violation(thrown: ThrownStates, wrong: Wrong) -> NDArray[np.int64]:
+    """Find the farthest image on the arm that violates the goal by more than rounding: its number, or no number."""
+    bad = np.flatnonzero(wrong(thrown.x * MORE_THAN_ROUNDING, thrown.side) & thrown.stays)
+    return bad[np.argsort(-thrown.x[bad])[:1]]
+
+
+@dataclass(eq=False)
+class ReachedStates:
+    """States met so far, with where each came from."""
+
+    x: list[NDArray[np.float64]]
+    side: list[NDArray[np.int64]]
+    parent: list[NDArray[np.int64]]
+    choice: list[NDArray[np.int64]]
+
+    @classmethod
+    def of(cls, x: NDArray[np.float64], side: NDArray[np.int64]) -> ReachedStates:
+        """Begin with some starts."""
+        none = np.full(x.size, -1)
+        return cls([x], [side], [none], [none])
+
+    def add(self, thrown: ThrownStates, keep: NDArray[np.int64]) -> None:
+        """Take some images of the states added last."""
+        before = sum(part.size for part in self.x[:-1])
+        self.x.append(thrown.x[keep])
+        self.side.append(thrown.side[keep])
+        self.parent.append(thrown.state[keep] + before)
+        self.choice.append(thrown.choice[keep])
+
+    def plus(self, thrown: ThrownStates, keep: NDArray[np.int64]) -> ReachedStates:
+        """Return the same with some more, leaving this as it is."""
+        more = ReachedStates([*self.x], [*self.side], [*self.parent], [*self.choice])
+        more.add(thrown, keep)
+        return more
+
+    def path(self, last: int, options: list[ThrowChoice]) -> Path:
+        """States and throws from the start to number `last` of those added last."""
+        x, side = np.concatenate(self.x), np.concatenate(self.side)
+        parent, choice = np.concatenate(self.parent), np.concatenate(self.choice)
+        order = [x.size - self.x[-1].size + last]
+        while parent[order[-1]] >= 0:
+            order.append(int(parent[order[-1]]))
+        order.reverse()
+        return Path(x[order].tolist(), side[order].tolist(), [options[k] for k in choice[order[1:]]])
+
+
+def middle(found: Attraction, cells: NDArray[np.int64]) -> tuple[float, int]:
+    """Middle of the middle one of some cells, and its side."""
+    cell = int(cells[cells.size // 2])
+    side = int(found.cover.grid.side_of(cell))
+    lo, hi = found.cover.grid.boxes([cell], side)
+    return 0.5 * float(lo[0, 0] + hi[0, 0]), side
+
+
+def on_limit_set(found: Attraction) -> tuple[float, int]:
+    """Follow an orbit from the attracting cells until it is as near to the limit set as floats come, and its end.
+
+    Cells surround the limit set: what starts in one of them may violate a goal once, on its way, and never again.
+    """
+    start, on = middle(found, found.cells.numbers())
+    box = found.cover.box
+    path = orbit(box.at_kappa(box.middle_kappa), start, on, SETTLING)
+    return float(path.x[-1]), int(path.side[-1])
+
+
+def violating_path(found: Attraction, wrong: Wrong) -> Path | None:
+    """Breadth first from an attracting cell, one state per cell, until a state violates the goal."""
+    grid: Grid = found.cover.grid
+    start, on = on_limit_set(found)
+    x, side = np.array([start]), np.array([on])
+    seen = np.zeros(grid.n_cells, dtype=bool)
+    reached, options = ReachedStates.of(x, side), throw_choices(found.cover.box)
+    for _ in range(MOST_THROWS):
+        thrown = throws(found.cover.box, x, side, options)
+        bad = violation(thrown, wrong)
+        if bad.size:
+            reached.add(thrown, bad)
+            return reached.path(0, options)
+        cells = np.full(thrown.x.size, -1)
+        for s in np.unique(thrown.side).tolist():
+            cells[thrown.side == s] = grid.index(thrown.x[thrown.side == s], s)
+        new = np.flatnonzero((cells >= 0) & ~seen[cells] & thrown.stays)
+        _, where = np.unique(cells[new], return_index=True)
+        keep = new[where]
+        if not keep.size:
+            return None
+        seen[cells[keep]] = True
+        reached.add(thrown, keep)
+        x, side = thrown.x[keep], thrown.side[keep]
+    return None
+
+
+def sample_passage(found: Attraction, cells: NDArray[np.int64]) -> tuple[State, ...]:
+    """Prove some throws from the middle of some cells, to be shown."""
+    box = found.cover.box
+    choice = ThrowChoice(box.middle_kappa, 0.0)
+    path = orbit(box.at_kappa(choice.kappa), *middle(found, cells), SHOWN)
+    return replayed(box, Path(path.x.tolist(), path.side.tolist(), [choice] * path.code.size))
+
+
+def proved_wrong(box: ParameterBox, path: Path, wrong: Wrong) -> tuple[State, ...]:
+    """Prove an orbit as `replayed`, and that its last state violates the goal; empty if it cannot be."""
+    states = replayed(box, path)
+    if not states:
+        return ()
+    return states if wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all() else ()
+
+
+def replayed(box: ParameterBox, path: Path) -> tuple[State, ...]:
+    """Prove an orbit: its states enclosed, all but the last proved to be on the arm; empty if it cannot be.
+
+    Parameters
+    ----------
+    box : ParameterBox
+        The scene's parameters; where kappa does not differ from throw to throw the orbit is one of every kappa in it.
+    path : Path
+        The orbit as found.
+    """
+    ends = [[t.kappa, t.kappa] if box.kappa_varies else [box.lo.kappa, box.hi.kappa] for t in path.thrown]
+    bounds = np.array(ends, dtype=float).reshape(-1, 2).T
+    shifts = np.array([t.landing for t in path.thrown], dtype=float)
+    lo, hi, sides = replay(box, (path.x[0], path.x[0]), path.side[0], bounds, shifts)
+    if lo.size < len(path.x) or not (hi[:-1] <= box.lo.arm_length).all():
+        return ()
+    thrown = [(t.kappa, t.landing if box.landing > 0.0 else None) for t in path.thrown]
+    rows = zip(lo.tolist(), hi.tolist(), sides.tolist(), [*thrown, (None, None)], strict=True)
+    return tuple(State(low, high, side, *how) for low, high, side, how in rows)
+
+
+# ----------------------------------------------------------------
+# Starts on the arm that refute a goal: by the landing of one throw, or by an orbit that leaves the arm.
+
+
+# Starts per side, throws, and orbits that are tried, in the search for one that leaves the arm.
+STARTS, UNTIL_GONE, TRIED = 256, 400, 8
+
+
+def one_throw(found: Attraction, wrong: Wrong, up_to: float = math.inf, laid: Laid = ()) -> tuple[State, ...]:
+    """Find a start, laid down up to some x, whose next landing violates the goal, and prove it; empty if none is."""
+    grid, box = found.cover.grid, found.cover.box
+    x = np.concatenate([0.5 * (edges[:-1] + edges[1:]) for (edges,) in grid.edges])
+    side = np.repeat(np.arange(grid.sides), [edges.size - 1 for (edges,) in grid.edges])
+    good = (x < up_to) & _lies_in(laid, x, side)
+    x, side = x[good], side[good]
+    if not x.size:
+        return ()
+    options = throw_choices(box, 3)
+    thrown = throws(box, x, side, options)
+    bad = violation(thrown, wrong)
+    if not bad.size:
+        return ()
+    reached = ReachedStates.of(x, side)
+    reached.add(thrown, bad)
+    states = proved_wrong(box, reached.path(0, options), wrong)
+    return states if states and states[-1].hi <= box.lo.arm_length else ()
+
+
+def start_that_leaves(found: Attraction, laid: Laid = ()) -> tuple[State, ...]:
+    """Find a start on the arm whose orbit lands off it, x <= a or beyond the end, and prove it.
+
+    Parameters
+    ----------
+    found : Attraction
+        Cells and images.
+    laid : Laid
+        Where it begins, in one of these ranges; () for anywhere on the arm.
+
+    Returns
+    -------
+    tuple of State
+        The orbit, the landing off the arm last; empty if none is found.
+    """
+    box = found.cover.box
+    for option in throw_choices(box, 3):
+        for path in _first_to_leave(found, option, laid):
+            states = replayed(box, path)
+            if states and _is_off(box, states[-1]):
+                return states
+    return ()
+
+
+def _lies_in(laid: Laid, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether starts lie in some ranges; all do where there are none."""
+    some = [(side == on) & (lo < x) & (x < hi) for on, lo, hi in laid]
+    found: NDArray[np.bool_] = np.any(some, axis=0) if some else np.ones_like(x, dtype=bool)
+    return found
+
+
+def _starts(found: Attraction, laid: Laid) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Choose starts on all of the arm; with scattered landings also one nearer to the joint than these scatter."""
+    box, x, side = found.cover.box, [], []
+    for s, (edges,) in enumerate(found.cover.grid.edges):
+        if not box.rests[s]:
+            continue
+        centres = 0.5 * (edges[:-1] + edges[1:])
+        centres = centres[_lies_in(laid, centres, np.full(centres.size, s))]
+        near = [box.hi.a[s] + 0.125 * box.landing] if box.landing > 0.0 and not found.cover.points else []
+        x.append(np.concatenate([near, centres[:: max(1, centres.size // STARTS)]]))
+        side.append(np.full(x[-1].size, s))
+    starts, sides = np.concatenate(x), np.concatenate(side)
+    good = _lies_in(laid, starts, sides)
+    return starts[good], sides[good]
+
+
+def _first_to_leave(found: Attraction, option: ThrowChoice, laid: Laid) -> Iterator[Path]:
+    """Throw some starts again and again, always in the same way, until some have left the arm: their orbits."""
+    x, side = _starts(found, laid)
+    if not x.size:
+        return
+    reached = ReachedStates.of(x, side)
+    for _ in range(UNTIL_GONE):
+        thrown = throws(found.cover.box, x, side, [option])
+        for k in np.flatnonzero(~thrown.stays)[:TRIED]:
+            yield reached.plus(thrown, np.array([k])).path(0, [option])
+        keep = np.flatnonzero(thrown.stays)
+        if keep.size < thrown.stays.size or not keep.size:
+            return
+        reached.add(thrown, keep)
+        x, side = thrown.x[keep], thrown.side[keep]
+
+
+def _is_off(box: ParameterBox, state: State) -> bool:
+    """Whether a landing is proved to be at x <= a or beyond the arm's end."""
+    return bool(state.hi <= box.lo.a[state.side] or state.lo > box.hi.arm_length)

@@ -1,0 +1,492 @@
+"""One query: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
+
+Cells are refined where needed: first some hundreds a side, then borders spread evenly over the attracting cells.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.goals import Goal, Reaches
+from limitsets.feeder.scene import Scene, load
+from limitsets.proofs.prover.attraction import Attraction, attraction
+from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.goals import Answer, cuts, prove, prove_or_refute
+from limitsets.proofs.prover.goals.kind import against, undecided
+from limitsets.proofs.prover.goals.laid_starts import laid_only, narrowed, starts_in
+from limitsets.proofs.prover.goals.reaches import falls_short
+from limitsets.proofs.prover.goals.recurrent_orbits import Refutation, closed
+from limitsets.proofs.prover.goals.violating_orbits import (
+    Path,
+    ReachedStates,
+    ThrowChoice,
+    Wrong,
+    on_limit_set,
+    throw_choices,
+    throws,
+    violation,
+)
+from limitsets.proofs.prover.parameters import ParameterBox, SceneBox, parameter_box
+from limitsets.proofs.prover.proof import Claim
+from limitsets.systems.maps import Orbit, orbit
+
+# ----------------------------------------------------------------
+# Worst-case orbits: a goal is violated by choosing the disturbance at every throw.
+#
+# Random throws miss them, and a forward search with one state per cell misses small violations.  The search is
+# therefore backward reachability on a fine raster: places from which one throw can violate the goal, from which two
+# can, and so on; then forward from a long orbit without noise that meets such a place, with every throw computed
+# anew.
+
+
+# Places of the raster, values of kappa at a throw, throws back from the violation, throws of the orbit, states kept.
+PLACES, KAPPAS, BACK, LENGTH, KEPT = 120_000, 9, 4, 200_000, 4000
+
+# Throws of the long orbit before the noise begins: the closed orbit may begin at each of them.
+BEFORE = 12
+
+Array = NDArray[np.float64]
+Sides = NDArray[np.int64]
+
+
+class _Raster:
+    """Places evenly over the attracting cells, and the nearest of them to any place."""
+
+    def __init__(self, found: Attraction) -> None:
+        extents = found.cells.extents()
+        total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
+        self.step = total / PLACES
+        self.low, self.first = {}, {}
+        x, side, count = [], [], 0
+        for s, parts in extents.items():
+            if not parts:
+                continue
+            lo, hi = parts[0][0], parts[-1][1]
+            some = np.arange(lo, hi + self.step, self.step)
+            self.low[s], self.first[s] = lo, count
+            x.append(some)
+            side.append(np.full(some.size, s))
+            count += some.size
+        self.x, self.side = np.concatenate(x), np.concatenate(side)
+
+    def nearest(self, x: Array, side: Sides) -> Sides:
+        """Return the number of the nearest place; -1 where there is none."""
+        found = np.full(x.size, -1)
+        for s, first in self.first.items():
+            mine = np.flatnonzero(side == s)
+            number = first + np.rint((x[mine] - self.low[s]) / self.step).astype(np.int64)
+            last = first + int((self.side == s).sum())
+            found[mine] = np.where((number >= first) & (number < last), number, -1)
+        return found
+
+
+def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Add the neighbours."""
+    wide = mask.copy()
+    wide[1:] |= mask[:-1]
+    wide[:-1] |= mask[1:]
+    return wide
+
+
+def worst_orbit(found: Attraction, wrong: Wrong) -> Refutation:
+    """Find a closed orbit that violates a goal, with the noise chosen at every throw, and prove it.
+
+    Parameters
+    ----------
+    found : Attraction
+        Cells and images, of a box of parameters with noise.
+    wrong : callable
+        From places and sides to whether each violates the goal.
+
+    Returns
+    -------
+    Refutation
+        Empty if none is found.
+    """
+    box, options = found.cover.box, throw_choices(found.cover.box, KAPPAS)
+    raster = _Raster(found)
+    start, on = on_limit_set(found)
+    path = orbit(box.at_kappa(box.middle_kappa), start, on, LENGTH)
+    here = raster.nearest(path.x, path.side)
+    levels = [_beside(wrong(raster.x, raster.side))]
+    known = np.zeros(raster.x.size, dtype=bool)
+    for back in range(1, BACK + 1):
+        left = np.flatnonzero(~known)
+        thrown = throws(box, raster.x[left], raster.side[left], options)
+        to = raster.nearest(thrown.x, thrown.side)
+        hit = (to >= 0) & thrown.stays & levels[-1][to]
+        good = np.zeros(raster.x.size, dtype=bool)
+        good[left[thrown.state[hit]]] = True
+        levels.append(_beside(good))
+        known |= good
+        begin = np.flatnonzero((here >= 0) & levels[back][here])
+        begin = begin[begin >= BEFORE][:KEPT]
+        refutation = _followed(found, wrong, raster, levels, path, begin, options)
+        if refutation.states:
+            return refutation
+    return Refutation()
+
+
+def _followed(
+    found: Attraction,
+    wrong: Wrong,
+    raster: _Raster,
+    levels: list[NDArray[np.bool_]],
+    path: Orbit,
+    begin: Sides,
+    options: list[ThrowChoice],
+) -> Refutation:
+    """Throw on from states of the long orbit along the levels, and close and prove what then violates the goal."""
+    if not begin.size:
+        return Refutation()
+    reached = ReachedStates.of(path.x[begin], path.side[begin].astype(np.int64))
+    for back, level in reversed(list(enumerate(levels[:-1]))):
+        thrown = throws(found.cover.box, reached.x[-1], reached.side[-1], options)
+        if back == 0:
+            keep = violation(thrown, wrong)
+        else:
+            to = raster.nearest(thrown.x, thrown.side)
+            keep = np.flatnonzero((to >= 0) & level[to] & thrown.stays)
+            keep = keep[:: max(1, keep.size // KEPT)]
+        if not keep.size:
+            return Refutation()
+        reached.add(thrown, keep)
+    tail = reached.path(0, options)
+    same = (path.x[begin] == tail.x[0]) & (path.side[begin] == tail.side[0])
+    first = int(begin[np.flatnonzero(same)[0]])
+    before = slice(first - BEFORE, first)
+    usual = ThrowChoice(found.cover.box.middle_kappa, 0.0)
+    whole = Path(
+        [*path.x[before].tolist(), *tail.x],
+        [*path.side[before].tolist(), *tail.side],
+        [*([usual] * BEFORE), *tail.thrown],
+    )
+    return closed(found.cover.box, whole, wrong)
+
+
+# ----------------------------------------------------------------
+# One claim of all pieces of a tolerance, from those of each: the weakest numbers, for the fewest starts.
+
+
+# For which starts a goal holds: the fewer the later.
+STARTS = ("every", "within", "almost-every", "from", "cells")
+
+
+def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
+    """Join one claim, proved on every piece by its cells: with the weakest of the numbers, for the fewest starts."""
+    sections = [claim.section for claim in claims]
+    section = dict(sections[0])
+    near = [other["near_joint"] for other in sections if "near_joint" in other]
+    section.pop("near_joint", None)
+    if len(near) == len(sections):
+        section["near_joint"] = {side: _weakest([other[side] for other in near]) for side in near[0]}
+    for count in ("max_rank", "throws", "jogs", "thinning"):
+        counts = [other[count] for other in sections if count in other]
+        if counts:
+            section[count] = max(counts)
+    if "least_slope" in section:
+        section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
+    if claims[0].starts is None:
+        return Claim(claims[0].claim, "proved", "", section)
+    words = [one.starts if isinstance(one.starts, str) else next(iter(one.starts)) for one in claims]
+    weakest = max(zip(words, claims, strict=True), key=lambda each: STARTS.index(each[0]))[1]
+    starts = weakest.starts
+    section.pop("lost", None)
+    if isinstance(starts, dict) and "from" in starts:
+        given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
+        if len(near) < len(sections):  # of starts before the cells nothing is claimed then
+            first = [[float(edges[0]) for (edges,) in one.cover.grid.edges] for one in found]
+            given += [{side: cells[int(side)] for side in given[0]} for cells in first]
+        starts = {"from": {side: max(each[side] for each in given) for side in given[0]}}
+        section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
+        lost = [other["lost"] for other in sections if "lost" in other]
+        if len(lost) == len(claims):
+            section["lost"] = {
+                side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]
+            }
+        most, whole = zip(*(one.shares_from(section) for one in found), strict=True)
+    else:
+        section["starts"] = weakest.section["starts"]
+        most, whole = tuple(claim.shares for claim in claims), (True,)
+    least = {"share": min, "leaves": min, "creeps": min, "open": max}
+    shares = {key: pick(each[key] for each in most) for key, pick in least.items()}
+    notes = {claim.note for claim in claims}
+    note = notes.pop() if len(notes) == 1 else ""
+    joined = replace(weakest, section=section, counterexample=(), starts=starts, shares=shares, note=note)
+    if all(whole):
+        return joined
+    share = math.ceil(1000.0 * shares["open"]) / 10.0
+    reason = (
+        "each value is proved alone, but near the joint starts that come out at one value may stay behind at another:"
+        f" of {share:g} % of the starts the same is not proved for all, and 1 % may be"
+    )
+    return replace(joined, verdict="proved-on-cells", reason=reason)
+
+
+def _weakest(near: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Near the joint on one side of every piece: the least factor, and a bracket of all fixed points."""
+    joined: dict[str, Any] = {"q": min((each["q"] for each in near), key=float.fromhex)}
+    if "fixed_point" in near[0]:  # or in none of them: h = 0 would lie in a piece between
+        ends = [each["fixed_point"] for each in near]
+        lowest, highest = (lo for lo, _ in ends), (hi for _, hi in ends)
+        joined["fixed_point"] = [min(lowest, key=float.fromhex), max(highest, key=float.fromhex)]
+    return joined
+
+
+# ----------------------------------------------------------------
+
+
+# Cells per side to begin with, then borders over all that attracts, and pieces of a parameter where a cell is open to
+# both decisions; more cells to begin with where nothing attracts.
+BASE, FINE, PIECES = 512, (0, 4000, 16_000, 32_000), (8, 32, 128, 512)
+BASES = (512, 2048, 8192)
+
+# For goals about every start: cells per side, as no part of the arm matters more than the others.
+LADDER = (512, 2048, 8192, 32_768)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of the goals on one box.
+
+    Attributes
+    ----------
+    verdict : str
+        "proved" (all goals), "refuted" (one of them), "undecided", or "impossible" (no such scene, or no part of it).
+    reason : str
+        Why it is not proved.
+    found : Attraction or None
+        The cells that prove it.
+    answers : tuple of Answer
+        One per goal, where all are proved; what refutes one, where one is refuted.
+    refuted : Goal or None
+        The goal that is refuted.
+    counterexample : tuple of State
+        The orbit that does it.
+    piece : SceneBox or None
+        The scenes it was asked of; None for the scene as it is.
+    noise : dict of str to str
+        The noise.
+    within : dict of str to str
+        Deviations that those of a single scene do not exceed, by quantity.
+    """
+
+    verdict: str
+    reason: str = ""
+    found: Attraction | None = None
+    answers: tuple[Answer, ...] = ()
+    refuted: Goal | None = None
+    counterexample: tuple[Any, ...] = ()
+    piece: SceneBox | None = None
+    noise: Mapping[str, str] = field(default_factory=dict)
+    within: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Query:
+    """Some goals of a scene: all have to hold.
+
+    Attributes
+    ----------
+    scene : Scene
+        The scene.
+    goals : tuple of Goal
+        What is asked.
+    known : dict
+        "base": cells per side, outside what attracts, with which the goals were proved last.
+    """
+
+    scene: Scene
+    goals: tuple[Goal, ...]
+    known: dict[str, int] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, scene: Scene, goals: tuple[Goal, ...]) -> Query:
+        """Put goals to a scene, without what a margin is not asked about.
+
+        The scene's own goal is left out, so that a certificate says what was asked; and its scatter, because no
+        quantity deviates in a margin but those asked about.
+        """
+        tree = scene.as_dict()
+        tree.pop("goal", None)
+        tree.get("effects", {}).pop("spread", None)
+        return cls(load(tree), goals)
+
+    @property
+    def anywhere(self) -> bool:
+        """Whether some goal is about every start on the arm."""
+        return any(goal.from_anywhere or goal.of_every_start for goal in self.goals)
+
+    def box(self, piece: SceneBox | None, noise: Mapping[str, str]) -> ParameterBox:
+        """Enclose the parameters."""
+        return parameter_box(self.scene, tree=None if piece is None else piece.tree(), noise=dict(noise))
+
+    def prove(
+        self,
+        piece: SceneBox | None = None,
+        noise: Mapping[str, str] | None = None,
+        finest: int = 3,
+        bases: int = len(BASES),
+    ) -> Outcome:
+        """Prove the goals, with finer and finer cells; or say what is missing.
+
+        Parameters
+        ----------
+        piece : SceneBox, optional
+            Scenes, all at once: cells as if the quantities differed at every throw.
+        noise : mapping of str to str, optional
+            What differs at every throw.
+        finest : int
+            Refinements, up to 3.
+        bases : int
+            Numbers of cells to begin with that are tried where nothing attracts, up to 3.
+        """
+        noise = dict(noise or {})
+        try:
+            box = self.box(piece, noise)
+            for base in self._bases():
+                coarse = self._coarse(box, bases, base)
+                found, answers = self._refined(coarse, box, finest, base)
+                missing = answers[-1]
+                if missing.verdict == "proved":
+                    self.known["base"] = base
+                    return Outcome("proved", "", found, answers, piece=piece, noise=noise)
+                # finer cells where nothing attracts are needed only for starts that are not proved to come
+                if missing.final or missing.verdict != "proved-on-cells":
+                    break
+        except AnswerError as error:
+            return Outcome("impossible", _said(error), piece=piece, noise=noise)
+        reason = missing.reason
+        if missing.verdict == "proved-on-cells":
+            share = 100.0 * missing.shares["share"]
+            laid = " laid down" if any(goal.laid for goal in self.goals) else ""
+            reason = f"the goal is proved for {math.floor(10.0 * share) / 10.0:g} % of the starts{laid} only: {reason}"
+        if not (found.component >= 0).any():
+            reason = f"{reason}: from some of them, parts may leave the arm"
+        return Outcome("undecided", reason, found, piece=piece, noise=noise)
+
+    def _bases(self) -> tuple[int, ...]:
+        """Cells per side outside what attracts: first as many as proved the goals last, or the fewest; then more."""
+        return BASES[:1] if self.anywhere else BASES[BASES.index(self.known.get("base", BASE)) :]
+
+    def _refined(
+        self, found: Attraction, box: ParameterBox, finest: int, base: int
+    ) -> tuple[Attraction, tuple[Answer, ...]]:
+        """Refine what attracts until the goals are proved, or finer cells cannot do it."""
+        for step in range(finest + 1):
+            if step:
+                found = self._finer(found, box, step, base)
+            answers = self._each(found)
+            missing = answers[-1]
+            if missing.verdict == "proved" or missing.final or not (found.component >= 0).any():
+                break
+        return found, answers
+
+    def _each(self, found: Attraction) -> tuple[Answer, ...]:
+        """Prove one goal after the other, up to the first that is not: it comes last then."""
+        answers: list[Answer] = []
+        for goal in self.goals:
+            answers.append(prove(found, self.scene, goal))
+            if answers[-1].verdict != "proved":
+                break
+        return tuple(answers)
+
+    def cells(self, piece: SceneBox | None, step: int) -> Attraction:
+        """Return the cells of one refinement, whatever they prove."""
+        box = self.box(piece, {})
+        return self._finer(self._coarse(box), box, step)
+
+    def _coarse(self, box: ParameterBox, bases: int = len(BASES), base: int = BASE) -> Attraction:
+        for cells in (base, *(more for more in BASES[:bases] if more > base)):
+            found = attraction(cover(box, cells, cuts(self.goals, box.lo.a.size), PIECES[0]))
+            if (found.component >= 0).any():
+                break
+        return found
+
+    def _finer(self, found: Attraction, box: ParameterBox, step: int, base: int = BASE) -> Attraction:
+        """Cut what attracts into more cells; or everything, where a goal is about every start."""
+        borders = cuts(self.goals, box.lo.a.size)
+        if self.anywhere:
+            return attraction(cover(box, LADDER[step], borders, PIECES[step]))
+        extents = found.cells.extents()
+        total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
+        for side, parts in extents.items():
+            for lo, hi in parts:
+                count = max(2, round(FINE[step] * (hi - lo) / total))
+                borders[side] = [*borders[side], *np.linspace(lo, hi, count).tolist()]
+        return attraction(cover(box, base, borders, PIECES[step]))
+
+    def refute(self, piece: SceneBox | None = None, noise: Mapping[str, str] | None = None) -> Outcome:
+        """Search for an orbit of one scene that violates one of the goals.
+
+        Parameters
+        ----------
+        piece : SceneBox, optional
+            The scene, each quantity known but for the last digits.
+        noise : mapping of str to str, optional
+            What differs at every throw, chosen by the search.
+        """
+        noise = dict(noise or {})
+        reason = "no orbit is found that violates it"
+        try:
+            box = self.box(piece, noise)
+            found = self._coarse(box)
+        except AnswerError as error:
+            return Outcome("impossible", _said(error), piece=piece, noise=noise)
+        for goal in self.goals:
+            answer = self._against(found, goal)
+            if answer.verdict == "refuted":
+                return Outcome(
+                    "refuted", answer.reason, found, (answer,), goal, answer.counterexample, piece, noise
+                )
+            reason = answer.reason or reason
+        return Outcome("undecided", reason, found, piece=piece, noise=noise)
+
+    def _against(self, found: Attraction, goal: Goal) -> Answer:
+        """Search for what refutes one goal: where throws differ, for the worst that they can do."""
+        wrong = goal.wrong()
+        if isinstance(goal, Reaches) and not goal.every_orbit:
+            # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
+            finer = self._finer(found, found.cover.box, 2)
+            finer = narrowed(finer, starts_in(finer, goal.laid)[0]) if goal.laid else finer
+            return laid_only(falls_short(finer, goal) or undecided(""), finer, goal.laid)
+        if wrong is None or not found.cover.box.noise or goal.from_anywhere:
+            return prove_or_refute(found, self.scene, goal)
+        answer = prove(found, self.scene, goal)
+        found = narrowed(found, starts_in(found, goal.laid)[0]) if goal.laid else found
+        if not (found.component >= 0).any():
+            return answer
+        return laid_only(against(worst_orbit(found, wrong), answer.reason), found, goal.laid)
+
+
+def joined_claims(pieces: Sequence[Outcome]) -> tuple[Claim, ...]:
+    """Join what is proved of several pieces: one claim for each goal, of the starts for which all of them prove it."""
+    found = [piece.found for piece in pieces if piece.found is not None]
+    claims = [
+        [
+            Claim("goal", "proved", "", dict(one.section), starts=one.starts, shares=dict(one.shares))
+            for one in piece.answers
+        ]
+        for piece in pieces
+    ]
+    return tuple(weakest_of(of_goal, found) for of_goal in zip(*claims, strict=True))
+
+
+def unjoined(pieces: Sequence[Outcome]) -> str:
+    """Say why pieces do not prove the goals together, in one certificate; empty if they do."""
+    missing = [piece.reason for piece in pieces if piece.verdict != "proved"]
+    missing = missing or [claim.reason for claim in joined_claims(pieces) if claim.verdict != "proved"]
+    return missing[0] if missing else ""
+
+
+def _said(error: AnswerError) -> str:
+    """Say why there is no such scene."""
+    value = f"{error.value:.6g}" if isinstance(error.value, float) else error.value
+    return f"there is no such part or throw: {error.thing} is {value}; it has to be {error.allowed}"

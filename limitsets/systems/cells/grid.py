@@ -1,0 +1,578 @@
+"""Grids: uniform, or graded so that cells shrink in proportion to their distance from an anchor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from limitsets.base.errors import GridError, shown
+from limitsets.base.tables import Column, Table, Tabled
+
+# ----------------------------------------------------------------
+# Where states may lie: a box of x for each side, or none.
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """A box of x per side.
+
+    Attributes
+    ----------
+    lo, hi : ndarray, shape (n_sides, dimension)
+        Corners of the boxes.  A side without states has ``lo == hi``: a chamfer on which a part cannot rest.
+    anchor : ndarray, shape (n_sides,), or None
+        In one dimension: a point below `lo` towards which graded cells shrink (the throw: R = a_i).
+
+    Raises
+    ------
+    GridError
+        For shapes that do not fit, boxes that end before they begin, no side with states, numbers that are not finite,
+        or an anchor inside a box.
+
+    Examples
+    --------
+    >>> from limitsets.cells import Domain
+    >>> Domain([[0.0]], [[1.0]]).sides
+    1
+    """
+
+    lo: NDArray[np.float64]
+    hi: NDArray[np.float64]
+    anchor: NDArray[np.float64] | None = None
+
+    def __post_init__(self) -> None:
+        lo, hi = (np.array(corner, dtype=np.float64) for corner in (self.lo, self.hi))
+        if lo.ndim != 2 or lo.shape != hi.shape or lo.shape[1] not in (1, 2, 3) or lo.shape[0] == 0:
+            raise GridError(
+                "the shape of the domain",
+                (lo.shape, hi.shape),
+                "lo and hi of shape (sides, dimension), dimension 1 to 3",
+                "pass one row per side",
+            )
+        some, none = (lo < hi).all(axis=1), (lo == hi).all(axis=1)
+        if not (np.isfinite(lo).all() and np.isfinite(hi).all() and (some | none).all() and some.any()):
+            wrong = ~(np.isfinite(lo) & np.isfinite(hi) & (lo < hi)) & (~none[:, None] | none.all())
+            side, axis = np.argwhere(wrong)[0].tolist()
+            low, high = float(lo[side, axis]), float(hi[side, axis])
+            raise GridError(
+                f"the domain{f' on side {side}' if len(lo) > 1 else ''} along axis {axis}",
+                (low, high),
+                "(lo, hi), finite and with lo < hi",
+                "swap them" if low > high else "correct them",
+            )
+        object.__setattr__(self, "lo", lo)
+        object.__setattr__(self, "hi", hi)
+        if self.anchor is not None:
+            anchor = np.array(self.anchor, dtype=np.float64)
+            if lo.shape[1] != 1 or anchor.shape != (lo.shape[0],) or not (anchor < lo[:, 0]).all():
+                raise GridError(
+                    "the anchor",
+                    anchor.tolist(),
+                    "one number below lo per side, in one dimension",
+                    "correct the anchor",
+                )
+            object.__setattr__(self, "anchor", anchor)
+
+    @property
+    def sides(self) -> int:
+        """Number of sides."""
+        return int(self.lo.shape[0])
+
+    @property
+    def inhabited(self) -> NDArray[np.bool_]:
+        """Which sides have states, shape (n_sides,)."""
+        some: NDArray[np.bool_] = np.logical_and.reduce(self.lo < self.hi, axis=1)
+        return some
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates of x."""
+        return int(self.lo.shape[1])
+
+
+def as_domain(domain: Domain | ArrayLike) -> Domain:
+    """Read a domain: a `Domain`, or for one side a list of (lo, hi), one pair per axis.
+
+    Examples
+    --------
+    >>> from limitsets.cells import as_domain
+    >>> as_domain([(-1, 1), (0, 2)]).dimension
+    2
+    """
+    if isinstance(domain, Domain):
+        return domain
+    try:
+        pairs = np.array(domain, dtype=np.float64)
+    except (TypeError, ValueError):
+        pairs = np.empty(0)
+    if pairs.shape == (2,):
+        pairs = pairs[None, :]
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        if isinstance(getattr(domain, "domain", None), Domain):  # of a scene
+            raise GridError("the domain", type(domain).__name__, "a Domain", "pass its .domain")
+        raise GridError("the domain", domain, "a Domain, or one (lo, hi) per axis", "pass [(lo, hi), ...]")
+    return Domain(pairs[:, 0][None, :], pairs[:, 1][None, :])
+
+
+# ----------------------------------------------------------------
+
+
+# Graded cells grow with their distance from the anchor up to this share of the side's extent and are equal beyond:
+# near a_i of the throw, where jogs shrink in proportion to R - a_i, resolution is relative; far from it, absolute.
+EQUAL_BEYOND = 0.25
+
+# Nodes are kept as 32-bit integers.
+MOST_CELLS = 2**31 - 16
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Grid(Tabled):
+    """A grid of closed cells on each side.
+
+    Attributes
+    ----------
+    domain : Domain
+        What is covered.
+    edges : tuple of tuple of ndarray
+        ``edges[side][axis]``, shape (n + 1,): ascending cell borders, float64; a side without states has one, and no
+        cell.
+
+    Raises
+    ------
+    GridError
+        For borders that do not ascend, or of fewer digits: rounded to them, distinct borders become one.
+    """
+
+    domain: Domain
+    edges: tuple[tuple[NDArray[np.float64], ...], ...]
+
+    def __post_init__(self) -> None:
+        axes = [axis for side in self.edges for axis in side]
+        if not all(axis.dtype == np.float64 for axis in axes):
+            raise GridError(
+                "the type of the cells' borders",
+                ", ".join(sorted({str(axis.dtype) for axis in axes})),
+                "float64",
+                "compute the borders in float64: narrower numbers may merge them",
+            )
+        cut = zip(self.edges, self.domain.inhabited.tolist(), strict=True)
+        least = [1 + some for side, some in cut for _ in side]
+        if not all(a.size >= n and (a[1:] > a[:-1]).all() for a, n in zip(axes, least, strict=True)):
+            raise GridError(
+                "the cells",
+                [int(axis.size) - 1 for axis in axes],
+                "cells wider than the spacing of floating-point numbers",
+                "ask for fewer",
+            )
+
+    def __repr__(self) -> str:
+        return f"Grid({self.n_cells} cells: {', '.join('x'.join(map(str, n)) for n in self.shape.tolist())})"
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [
+            (side, axis, edges.size - 1, (edges[0], edges[-1]), (np.diff(edges).min(), np.diff(edges).max()))
+            for side, axes in enumerate(self.edges)
+            for axis, edges in enumerate(axes)
+        ]
+        spans = (Column("x", show=".6g", ends=True), Column("width of a cell", show=".3g", ends=True))
+        return (Table(("side", "axis", "cells", *spans), rows, f"Grid of {self.n_cells} cells"),)
+
+    @property
+    def sides(self) -> int:
+        """Number of sides."""
+        return len(self.edges)
+
+    @property
+    def dimension(self) -> int:
+        """Number of axes."""
+        return len(self.edges[0])
+
+    @cached_property
+    def shape(self) -> NDArray[np.int64]:
+        """Cells per side and axis, shape (n_sides, dimension)."""
+        return np.array([[axis.size - 1 for axis in side] for side in self.edges], dtype=np.int64)
+
+    @cached_property
+    def offset(self) -> NDArray[np.int64]:
+        """Number of the first cell of each side, and last the number of cells, shape (n_sides + 1,)."""
+        return np.concatenate([[0], np.cumsum(self.shape.prod(axis=1))]).astype(np.int64)
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return int(self.offset[-1])
+
+    def of_side(self, side: int) -> slice:
+        """Cells of one side."""
+        return slice(int(self.offset[side]), int(self.offset[side + 1]))
+
+    def side_of(self, cells: ArrayLike) -> NDArray[np.int64]:
+        """Side of each cell."""
+        return np.searchsorted(self.offset, np.asarray(cells), side="right").astype(np.int64) - 1
+
+    def index(self, x: ArrayLike, side: int) -> NDArray[np.int64]:
+        """Cells that hold the given states of one side; -1 outside, the upper one on a shared border.
+
+        Parameters
+        ----------
+        x : array_like, shape (n,) or (n, dimension)
+            States.
+        side : int
+            Their side.
+
+        Returns
+        -------
+        ndarray of int, shape (n,)
+            Numbers of the cells.
+        """
+        states = np.asarray(x, dtype=np.float64).reshape(-1, self.dimension)
+        inside = np.ones(len(states), dtype=bool)
+        number = np.zeros(len(states), dtype=np.int64)
+        for axis, edges in enumerate(self.edges[side]):
+            column = states[:, axis]
+            inside &= (column >= edges[0]) & (column <= edges[-1]) & (edges.size > 1)
+            k = np.clip(np.searchsorted(edges, column, side="right") - 1, 0, edges.size - 2)
+            number = number * (edges.size - 1) + k
+        return np.where(inside, number + self.offset[side], -1)
+
+    def axes(self, cells: ArrayLike, side: int) -> tuple[NDArray[np.int64], ...]:
+        """Position along each axis of cells of one side."""
+        shape = tuple(int(n) for n in self.shape[side])
+        return tuple(np.unravel_index(np.asarray(cells) - self.offset[side], shape))
+
+    def boxes(self, cells: ArrayLike, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Corners of cells of one side: two arrays of shape (n, dimension)."""
+        position = self.axes(cells, side)
+        pairs = [(edges[k], edges[k + 1]) for edges, k in zip(self.edges[side], position, strict=True)]
+        return np.stack([lo for lo, _ in pairs], axis=-1), np.stack([hi for _, hi in pairs], axis=-1)
+
+    def centres(self, side: int) -> NDArray[np.float64]:
+        """Middles of all cells of one side, shape (n,) in one dimension, (n, dimension) otherwise."""
+        middles = [0.5 * (edges[1:] + edges[:-1]) for edges in self.edges[side]]
+        if self.dimension == 1:
+            return middles[0]
+        return np.stack([m.ravel() for m in np.meshgrid(*middles, indexing="ij")], axis=-1)
+
+    @cached_property
+    def measure(self) -> NDArray[np.float64]:
+        """Length, area or volume of every cell, shape (n_cells,)."""
+        parts = []
+        for side in self.edges:
+            volume = np.ones(1)
+            for edges in side:
+                volume = np.multiply.outer(volume, np.diff(edges)).ravel()
+            parts.append(volume)
+        return np.concatenate(parts)
+
+    def refine(self, parts: int = 2) -> Grid:
+        """Cut every cell into `parts` equal ones along each axis.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> ls.grid([(0.0, 1.0)], cells=8).refine(4).n_cells
+        32
+        """
+        if parts < 1:
+            raise GridError("the number of parts", parts, "an integer from 1", "pass parts=2")
+        return Grid(self.domain, tuple(tuple(_split(edges, parts) for edges in side) for side in self.edges))
+
+
+def _split(edges: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
+    weight = np.arange(parts) / parts
+    inner = edges[:-1, None] + weight * np.diff(edges)[:, None]
+    return np.append(inner.ravel(), edges[-1])
+
+
+def _graded(lo: float, hi: float, anchor: float, cells: int) -> NDArray[np.float64]:
+    """Edges whose distance from the anchor grows by a constant factor, then by a constant step of the same size.
+
+    With y the distance from the anchor the edges are equidistant in u = ln y up to y_c and in y / y_c beyond it,
+    so that width and rate of growth are continuous at y_c.
+    """
+    first, last = lo - anchor, hi - anchor
+    change = max(first, EQUAL_BEYOND * last)
+    log_part = math.log(change / first)
+    u = np.linspace(0.0, log_part + (last - change) / change, cells + 1)
+    near = first * np.exp(np.minimum(u, log_part))
+    y = np.where(u <= log_part, near, change + change * (u - log_part))
+    edges: NDArray[np.float64] = anchor + y
+    edges[0], edges[-1] = lo, hi
+    return edges
+
+
+def _counts(cells: Any, depth: int | None, dimension: int) -> tuple[int, ...]:
+    if depth is not None:
+        if not isinstance(depth, int) or depth < 1:
+            raise GridError(
+                "the depth of the grid", depth, "an integer from 1", "pass depth=16, or cells=..."
+            )
+        return tuple(2 ** ((depth + dimension - 1 - axis) // dimension) for axis in range(dimension))
+    counts = tuple(cells) if isinstance(cells, Sequence | np.ndarray) else (cells,) * dimension
+    if len(counts) != dimension or not all(isinstance(n, int | np.integer) and n >= 1 for n in counts):
+        raise GridError(
+            "the number of cells",
+            cells,
+            "an integer from 1" + (f", or {dimension} of them" if dimension > 1 else ""),
+            "pass cells=1024" + (", or one per axis" if dimension > 1 else ""),
+        )
+    return tuple(int(n) for n in counts)
+
+
+def grid(
+    domain: Domain | ArrayLike,
+    cells: int | Sequence[int] = 1024,
+    *,
+    depth: int | None = None,
+    grading: str | None = None,
+) -> Grid:
+    """Cut a domain into cells.
+
+    Parameters
+    ----------
+    domain : Domain or list of (lo, hi)
+        What to cover; a list of pairs is one side, one pair per axis.
+    cells : int or sequence of int
+        Cells per axis of each side.
+    depth : int, optional
+        Instead of `cells`: halve the box `depth` times, the axes in turn beginning with the first.
+    grading : {"uniform", "graded"}, optional
+        Default: graded where the domain has an anchor.
+
+    Returns
+    -------
+    Grid
+        The cells.
+
+    Raises
+    ------
+    GridError
+        For a domain, number or word that cannot be.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> ls.grid(ls.load("paper-designed").domain, cells=1024).n_cells
+    3072
+    """
+    region = as_domain(domain)
+    counts = _counts(cells, depth, region.dimension)
+    words = ("uniform", "graded")
+    if grading is not None and not (isinstance(grading, str) and grading in words):
+        raise GridError("the grading", shown(grading), " or ".join(words), "correct the word")
+    if grading == "graded" and region.anchor is None:
+        raise GridError(
+            "the grading", grading, "uniform, for a domain without anchor", "give the domain an anchor"
+        )
+    if math.prod(counts) * region.sides > MOST_CELLS:
+        raise GridError(
+            "the number of cells",
+            math.prod(counts) * region.sides,
+            f"at most {MOST_CELLS}",
+            "ask for fewer cells",
+        )
+    graded = region.anchor is not None and grading != "uniform"
+    sides = []
+    for side, some in enumerate(region.inhabited.tolist()):
+        if not some:
+            axes: tuple[NDArray[np.float64], ...] = tuple(end[None] for end in region.hi[side])
+        elif graded and region.anchor is not None:
+            lo, hi, anchor = float(region.lo[side, 0]), float(region.hi[side, 0]), float(region.anchor[side])
+            axes = (_graded(lo, hi, anchor, counts[0]),)
+        else:
+            pairs = zip(region.lo[side], region.hi[side], counts, strict=True)
+            axes = tuple(np.linspace(lo, hi, n + 1) for lo, hi, n in pairs)
+        sides.append(axes)
+    return Grid(region, tuple(sides))
+
+
+# ----------------------------------------------------------------
+# Sets of cells of one grid and their algebra: union, intersection, difference, complement, inclusion.
+
+
+@dataclass(frozen=True, eq=False)
+class CellSet:
+    """A set of cells of a grid.
+
+    Attributes
+    ----------
+    grid : Grid
+        The grid.
+    mask : ndarray of bool, shape (n_cells,)
+        True for the cells in the set.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> from limitsets.cells import CellSet
+    >>> cover = ls.grid([(0.0, 1.0)], cells=4)
+    >>> left, middle = CellSet.of(cover, [0, 1]), CellSet.of(cover, [1, 2])
+    >>> (left | middle).extents()
+    {0: [(0.0, 0.75)]}
+    >>> (left & middle).measure(), left <= middle
+    (0.25, False)
+    """
+
+    grid: Grid
+    mask: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        if self.mask.shape != (self.grid.n_cells,) or self.mask.dtype != bool:
+            raise GridError("the mask", self.mask.shape, f"{self.grid.n_cells} booleans", "give one per cell")
+
+    def __repr__(self) -> str:
+        return f"CellSet({len(self)} of {self.grid.n_cells} cells)"
+
+    @classmethod
+    def of(cls, grid: Grid, cells: ArrayLike) -> CellSet:
+        """Return the set of the given cell numbers."""
+        mask = np.zeros(grid.n_cells, dtype=bool)
+        mask[np.asarray(cells, dtype=np.int64)] = True
+        return cls(grid, mask)
+
+    def _other(self, other: CellSet) -> NDArray[np.bool_]:
+        if other.grid is not self.grid:
+            raise GridError(
+                "the other set", "cells of another grid", "cells of the same grid", "build it on this grid"
+            )
+        return other.mask
+
+    def __or__(self, other: CellSet) -> CellSet:
+        return CellSet(self.grid, self.mask | self._other(other))
+
+    def __and__(self, other: CellSet) -> CellSet:
+        return CellSet(self.grid, self.mask & self._other(other))
+
+    def __sub__(self, other: CellSet) -> CellSet:
+        return CellSet(self.grid, self.mask & ~self._other(other))
+
+    def __invert__(self) -> CellSet:
+        return CellSet(self.grid, ~self.mask)
+
+    def __le__(self, other: CellSet) -> bool:
+        return not bool((self.mask & ~self._other(other)).any())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, CellSet) and bool((self.mask == self._other(other)).all())
+
+    __hash__ = None  # type: ignore[assignment]  # sets of cells compare by content
+
+    def __len__(self) -> int:
+        return int(self.mask.sum())
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self.numbers().tolist())
+
+    def __contains__(self, cell: int) -> bool:
+        return bool(self.mask[cell])
+
+    def numbers(self) -> NDArray[np.int64]:
+        """Numbers of the cells, ascending."""
+        return np.flatnonzero(self.mask)
+
+    def measure(self) -> float:
+        """Length, area or volume of the set."""
+        return float(self.grid.measure[self.mask].sum())
+
+    def holds(self, x: ArrayLike, side: int) -> NDArray[np.bool_]:
+        """Whether the cell of each state (`Grid.index`) is in the set; x of shape (n,) or (n, dimension)."""
+        if self.grid.dimension > 1:
+            cell = self.grid.index(x, side)
+            return self.mask[cell] & (cell >= 0)
+        # The borders of the set are fewer than those of the cells.
+        states, edges = np.asarray(x, dtype=np.float64).ravel(), self.grid.edges[side][0]
+        met = self.mask[self.grid.of_side(side)].astype(np.int8)
+        border = edges[np.flatnonzero(np.diff(np.concatenate([[0], met, [0]])))]
+        inside: NDArray[np.bool_] = np.searchsorted(border, states, side="right") % 2 == 1
+        if met[-1:].any():
+            inside |= states == edges[-1]  # of the last cell, whose upper border is nobody else's
+        return inside
+
+    def extents(self, axis: int = 0) -> dict[int, list[tuple[float, float]]]:
+        """Per side the intervals that the cells make up; in more dimensions their ranges along one axis.
+
+        Parameters
+        ----------
+        axis : int
+            Which one; the first by default.
+
+        Returns
+        -------
+        dict of int to list of (lo, hi)
+            Ascending; a side without cells is left out.
+
+        Raises
+        ------
+        GridError
+            An axis that the grid has not.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> cells = CellSet.of(ls.grid([(0.0, 1.0), (0.0, 4.0)], cells=4), [5])
+        >>> cells.extents(), cells.extents(axis=1)
+        ({0: [(0.25, 0.5)]}, {0: [(1.0, 2.0)]})
+        """
+        if axis not in range(self.grid.dimension):
+            allowed = f"0 to {self.grid.dimension - 1}"
+            raise GridError("the axis", axis, allowed, "name an axis of the grid")
+        found: dict[int, list[tuple[float, float]]] = {}
+        for side in range(self.grid.sides):
+            block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
+            others = tuple(each for each in range(self.grid.dimension) if each != axis)
+            met = np.any(block, axis=others).astype(np.int8)
+            border = np.flatnonzero(np.diff(np.concatenate([[0], met, [0]])))
+            edges = self.grid.edges[side][axis]
+            if border.size:
+                found[side] = [(float(edges[a]), float(edges[b])) for a, b in border.reshape(-1, 2)]
+        return found
+
+    def pieces(self) -> dict[int, list[tuple[tuple[float, float], ...]]]:
+        """Per side the boxes that hold its connected pieces, a pair (lo, hi) for each axis.
+
+        Returns
+        -------
+        dict of int to list of tuple of (lo, hi)
+            In the order of the first cell of each piece; cells that share a corner are connected.  A side without
+            cells is left out.
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> CellSet.of(ls.grid([(0.0, 1.0), (0.0, 4.0)], cells=4), [0, 5, 15]).pieces()
+        {0: [((0.0, 0.5), (0.0, 2.0)), ((0.75, 1.0), (3.0, 4.0))]}
+        """
+        from scipy import ndimage
+
+        found: dict[int, list[tuple[tuple[float, float], ...]]] = {}
+        for side, axes in enumerate(self.grid.edges):
+            block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
+            labels, _ = ndimage.label(block, np.ones((3,) * self.grid.dimension))
+            boxes = [
+                tuple(
+                    (float(edges[part.start]), float(edges[part.stop]))
+                    for edges, part in zip(axes, piece, strict=True)
+                )
+                for piece in ndimage.find_objects(labels)
+            ]
+            if boxes:
+                found[side] = boxes
+        return found
+
+    def refined(self, fine: Grid) -> CellSet:
+        """Return the cells of a refinement (`Grid.refine`) that lie in this set."""
+        mask = np.zeros(fine.n_cells, dtype=bool)
+        for side in range(self.grid.sides):
+            block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
+            for axis in range(self.grid.dimension):
+                parts = int(fine.shape[side, axis] // max(self.grid.shape[side, axis], 1))
+                block = np.repeat(block, parts, axis=axis)
+            mask[fine.of_side(side)] = block.ravel()
+        return CellSet(fine, mask)

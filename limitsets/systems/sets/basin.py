@@ -1,0 +1,368 @@
+"""Basins: the ends of the paths from each cell."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base.arguments import arguments_checked
+from limitsets.base.errors import AnswerError
+from limitsets.base.tables import Column, Table, Tabled, how_found
+from limitsets.numbers.jit import kernel
+from limitsets.systems.cells import Grid
+from limitsets.systems.graph import TransitionGraph
+from limitsets.systems.graph.components import reach
+from limitsets.systems.graph.images.enclosed import BOTH, NOTHING, BoxImages
+from limitsets.systems.maps import codes, images
+from limitsets.systems.sets.attracting import Attractor
+
+# ----------------------------------------------------------------
+# Recurrent sets of cells in which no orbit stays: cells that meet their own image because they are coarse.
+#
+# Such a set is refined by itself; where images are sampled in more than one dimension they are enlarged by a fine
+# cell on every side.  If no fine cell is recurrent, every orbit passes through, and the cells that lead there can be
+# decided without a finer grid.  Where the images are proved, the fine ones are too, for the same box of parameters.
+
+
+# Parts of a cell along an axis, step by step: few sets need the finest ones.  A step ends the search that would take
+# more fine cells than this.
+PARTS, MOST_CELLS = (2, 4, 16, 64), 100_000
+
+# More steps than there are fine cells: of an orbit that can come back to a cell.
+ENDLESS = 1 << 40
+
+Integers = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+
+def passing(graph: TransitionGraph) -> NDArray[np.bool_]:
+    """Tell the recurrent components that orbits pass through; proved where the images are.
+
+    Returns
+    -------
+    ndarray of bool, shape (k,)
+        For each of `graph.recurrent_components()`; an attracting one is none.
+    """
+    return _stays(graph) > 0
+
+
+def longest_stays(graph: TransitionGraph) -> Integers:
+    """Most steps that an orbit stays in each recurrent component that it passes through; 0 for the others."""
+    stays, parts = _stays(graph), PARTS[-1]
+    component = _components(graph, stays > 0)
+    while np.count_nonzero(component >= 0) * parts**graph.grid.dimension > MOST_CELLS:
+        parts //= 2
+    return np.minimum(stays, _refined(graph, component, parts)) if parts > 1 else stays
+
+
+def _stays(graph: TransitionGraph) -> Integers:
+    """Bound the stays in components through which orbits are seen to pass, each by the first step that shows it."""
+    left = ~graph.condensation().attracting
+    stays = np.zeros(left.size, dtype=np.int64)
+    for parts in PARTS:
+        component = _components(graph, left)
+        count = np.count_nonzero(component >= 0)
+        if not count or count * parts**graph.grid.dimension > MOST_CELLS:
+            break
+        found = _refined(graph, component, parts)
+        stays += np.where(found < ENDLESS, found, 0)
+        left &= stays == 0
+    return stays
+
+
+def _components(graph: TransitionGraph, chosen: NDArray[np.bool_]) -> Integers:
+    """Recurrent component of each cell, -1 in all that are not chosen."""
+    parts = graph.components()
+    number = np.full(parts.count, -1)
+    number[np.flatnonzero(parts.recurrent)[chosen]] = np.flatnonzero(chosen)
+    return number[parts.label]
+
+
+@kernel(entry=True, counting=False)
+def _fill_longest(
+    source: Any, target: Any, first: Any, after: Any, path: Any, done: Any, longest: Any
+) -> None:
+    """Cells on the longest path from each cell, ENDLESS where a path comes back: depth first, by an explicit stack.
+
+    `first` (-1) and `after` become the lists of edges of each cell, `longest` is 0 until a cell is met.
+    """
+    for edge in range(source.size):
+        after[edge] = first[source[edge]]
+        first[source[edge]] = edge
+    for root in range(longest.size):
+        depth = 0 if longest[root] == 0 else -1
+        path[0] = root
+        while depth >= 0:
+            cell = path[depth]
+            longest[cell] = max(longest[cell], 1)
+            edge = first[cell]
+            if edge < 0:
+                done[cell] = True
+                depth -= 1
+                continue
+            to = target[edge]
+            if longest[to] == 0:  # the edge stays in the list until the cell it leads to is done
+                depth += 1
+                path[depth] = to
+                continue
+            beyond = longest[to] + 1 if done[to] else ENDLESS
+            longest[cell] = min(max(longest[cell], beyond), ENDLESS)
+            first[cell] = after[edge]
+
+
+@kernel(entry=True, counting=False)
+def _link(
+    box: Any,
+    of: Any,
+    first: Any,
+    count: Any,
+    axes: Any,
+    shape: Any,
+    offset: int,
+    parts: int,
+    component: Any,
+    rank: Any,
+    source: Any,
+    target: Any,
+) -> Any:
+    """Fill the edges from fine cells to the fine cells of their own component that their boxes meet; how many."""
+    made = 0
+    each = parts ** len(axes)
+    for k in range(box.size):
+        total = 1
+        for axis in range(len(axes)):
+            total *= count[axis][k]
+        for place in range(total):
+            rest, coarse, within = place, 0, 0
+            for axis in range(len(axes)):
+                at = first[axis][k] + rest % count[axis][k]
+                rest //= count[axis][k]
+                coarse = coarse * shape[axis] + axes[axis][at // parts]
+                within = within * parts + at % parts
+            coarse += offset
+            if component[coarse] == of[k]:
+                source[made] = box[k]
+                target[made] = rank[coarse] * each + within
+                made += 1
+    return made
+
+
+class _Axis(NamedTuple):
+    """Fine cells along one axis of a side: their ends, and the cells they are parts of, those that are looked at."""
+
+    lower: Floats
+    upper: Floats
+    cells: Integers
+
+
+def _refined(graph: TransitionGraph, component: Integers, parts: int) -> Integers:
+    """Cut the cells of components: most steps that an orbit stays in each, 0 where a component has no cell here.
+
+    They are ENDLESS where it may come back to a fine cell, and where the images do not tell.
+    """
+    grid, proved, cells = graph.grid, graph.method == "boxes", np.flatnonzero(component >= 0)
+    rank = np.zeros(graph.n_cells, np.int64)
+    rank[cells] = np.arange(cells.size)
+    owners = np.repeat(component[cells], parts**grid.dimension)
+    longest, begun, sources, targets = np.zeros_like(owners), 0, [rank[:0]], [rank[:0]]
+    of_side = np.split(cells, np.searchsorted(cells, grid.offset[1 : grid.sides]))
+    axes = [_axes(grid, here, side, parts) for side, here in enumerate(of_side)]
+    for side, here in enumerate(of_side):
+        if not here.size:
+            continue
+        sub = np.indices((parts,) * grid.dimension).reshape(grid.dimension, -1)
+        place = [
+            (np.searchsorted(axis.cells, at)[:, None] * parts + s).ravel()
+            for axis, at, s in zip(axes[side], grid.axes(here, side), sub, strict=True)
+        ]
+        lo, hi = (tuple(axis[end][at] for axis, at in zip(axes[side], place, strict=True)) for end in (0, 1))
+        boxes, clear = (_enclosed if proved else _hulls)(graph, lo, hi, side)
+        longest[begun : begun + clear.size][~clear] = ENDLESS
+        for least, most, to, given in boxes:
+            for after in range(grid.sides):
+                some = np.flatnonzero(given & (to == after))
+                first, count = _met(axes[after], least, most, some, int(grid.dimension > 1 and not proved))
+                source, target = np.empty((2, int(np.prod(count, axis=0).sum())), np.int64)
+                among = tuple(axis.cells for axis in axes[after]), tuple(map(int, grid.shape[after]))
+                where = *among, int(grid.offset[after]), parts, component, rank
+                made = _link(begun + some, owners[begun + some], first, count, *where, source, target)
+                sources.append(source[:made])
+                targets.append(target[:made])
+        begun += clear.size
+    source, target = np.concatenate(sources), np.concatenate(targets)
+    lists = np.full(owners.size, -1), np.empty_like(source), np.empty_like(owners)
+    _fill_longest(source, target, *lists, longest > 0, longest)
+    most = np.zeros(graph.condensation().attracting.size, dtype=np.int64)
+    np.maximum.at(most, owners, longest)
+    return most
+
+
+def _axes(grid: Grid, here: Integers, side: int, parts: int) -> list[_Axis]:
+    """Cut the axes of a side; in one dimension, where an axis is as long as the side, but for the cells looked at."""
+    found = []
+    for edges in grid.edges[side]:
+        cells = here - grid.offset[side] if grid.dimension == 1 else np.arange(edges.size - 1)
+        ends = edges[cells, None] + np.arange(parts + 1) / parts * (edges[cells + 1] - edges[cells])[:, None]
+        ends[:, -1] = edges[cells + 1]
+        found.append(_Axis(ends[:, :-1].ravel(), ends[:, 1:].ravel(), cells))
+    return found
+
+
+def _hulls(graph: TransitionGraph, lo: Any, hi: Any, side: int) -> tuple[list[Any], Any]:
+    """Boxes around the images of the corners of fine cells, their sides, where they say; whether all corners agree."""
+    found = [
+        images(graph.map, np.stack(corner, axis=1), side) for corner in product(*zip(lo, hi, strict=True))
+    ]
+    x, first = [there.x.reshape(-1, len(lo)) for there in found], found[0]
+    least, most = np.minimum.reduce(x), np.maximum.reduce(x)
+    clear = (first.code >= 0) & (np.isfinite(least) & np.isfinite(most)).all(axis=1)
+    for there in found[1:]:
+        clear &= (there.code == first.code) & (there.side == first.side)
+    return [(least, most, first.side, clear)], clear
+
+
+def _enclosed(graph: TransitionGraph, lo: Any, hi: Any, side: int) -> tuple[list[Any], Any]:
+    """Proved boxes of the images of fine cells, one or two each, their sides, where they are; whether one is proved."""
+    found = BoxImages(graph.map, graph.map if graph.upper is None else graph.upper, side, lo, hi)
+    boxes = [
+        (*(np.stack(corner, axis=1) for corner in found.slots[slot]), found.to[2 * slot], given)
+        for slot, given in enumerate((found.count != NOTHING, found.count == BOTH))
+    ]
+    return boxes, found.count != NOTHING
+
+
+def _met(axes: list[_Axis], lo: Floats, hi: Floats, some: Integers, pad: int) -> tuple[Any, Any]:
+    """Fine cells of one side that some boxes meet, and so many more around: the first on each axis, and how many."""
+    first, count = [], []
+    for k, axis in enumerate(axes):
+        begin = np.maximum(np.searchsorted(axis.upper, lo[some, k], side="left") - pad, 0)
+        end = np.minimum(np.searchsorted(axis.lower, hi[some, k], side="right") + pad, axis.lower.size)
+        first.append(begin)
+        count.append(np.maximum(end - begin, 0))
+    return tuple(first), tuple(count)
+
+
+# ----------------------------------------------------------------
+
+
+# A recurrent set of more cells is hardly one unstable cycle.
+MOST_OF_A_CYCLE = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Basins(Tabled):
+    """Where the paths from each cell end.
+
+    Attributes
+    ----------
+    grid : Grid
+        The cells.
+    labels : ndarray of int32, shape (n_cells,)
+        0 and up: attractor of that number, on every path.  -1, -2, -3, -5: the exit of that code, on every path.
+        -4: paths end in different places, or may stay in a recurrent set that is not closed: the cell is undecided.
+    attractors : tuple of float
+        Share of each attractor's basin, weighted by length (area, volume) over all sides.
+    undecided_between : float
+        Share of undecided cells.
+    exits : dict of str to float
+        Share of the cells all of whose paths leave by that exit.
+    advice : str or None
+        What to do about recurrent sets that are not closed, where there are any.
+    how : str
+        "proved" where the transitions are (method "boxes"), "cells" where the images of cells are sampled.
+    """
+
+    grid: Grid
+    labels: NDArray[np.int32]
+    attractors: tuple[float, ...]
+    undecided_between: float
+    exits: dict[str, float]
+    advice: str | None = None
+    how: str = "cells"
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [
+            *((f"attractor {k}", share) for k, share in enumerate(self.attractors)),
+            *((f"leave: {name}", share) for name, share in self.exits.items()),
+            ("undecided", self.undecided_between),
+        ]
+        return (Table(("where paths end", Column("share", show=".6f")), rows, "Basins", how_found(self.how)),)
+
+
+@arguments_checked
+def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
+    """Label every cell with what all its paths end in.
+
+    Parameters
+    ----------
+    graph : TransitionGraph
+        From `limitsets.transitions`.
+    found : tuple of Attractor
+        From `limitsets.attractors` of the same graph.
+
+    Returns
+    -------
+    Basins
+        Labels and shares; undecided cells and each exit are states of their own.
+
+    Raises
+    ------
+    AnswerError
+        For attractors of another graph.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid([(-1.2, 1.2)], cells=100), method="corners")
+    >>> ls.basins(graph, ls.attractors(graph)).attractors
+    (0.49, 0.49)
+    """
+    attracting = graph.condensation().attracting
+    if any(a.cells.grid is not graph.grid for a in found) or len(found) != int(attracting.sum()):
+        raise AnswerError(
+            "the attractors",
+            f"{len(found)} of another graph",
+            "those of this graph",
+            "call attractors(graph)",
+        )
+    weight = graph.grid.measure
+    total = float(weight.sum())
+    sets, through = graph.recurrent_components(), passing(graph)
+    labels = graph.condensation().destinations(through)
+    lowest = min(codes.UNDECIDED, *graph.exits.values())
+    share = np.bincount(labels - lowest, weights=weight, minlength=len(found) - lowest) / total
+    by_code = {code: float(share[code - lowest]) for code in range(lowest, len(found))}
+    return Basins(
+        graph.grid,
+        labels,
+        tuple(by_code[k] for k in range(len(found))),
+        by_code[codes.UNDECIDED],
+        {name: by_code[code] for name, code in graph.exits.items()},
+        _advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
+        graph.how,
+    )
+
+
+def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | None:
+    """Say from how many starts a recurrent set that is not closed can be reached, and what to do."""
+    if not lasting:
+        return None
+    marks = np.zeros(graph.n_cells, dtype=np.uint8)
+    for cells in lasting:
+        marks[cells] = 1
+    weight = graph.grid.measure
+    share = float(weight[reach(graph.ranges, graph.components(), marks) > 0].sum() / weight.sum())
+    reached = f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached"
+    coarse = "an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
+    if max(map(len, lasting)) <= MOST_OF_A_CYCLE:
+        return f"{reached}, an unstable cycle or {coarse}"
+    return (
+        f"{reached}, a chaotic repeller or {coarse}; near a repeller they decide few more starts, sample the shares: "
+        "limitsets.resilience.basin_stability(graph, found, starts=10000)"
+    )

@@ -1,0 +1,6 @@
+"""The topology of attractors at one parameter point after another: how many, of how many bands, in which order."""
+
+from limitsets.systems.topology.points import reaches, region_of, topologies
+from limitsets.systems.topology.work import DOUBTS, Topologies
+
+__all__ = ["DOUBTS", "Topologies", "reaches", "region_of", "topologies"]
