@@ -52,7 +52,7 @@ def imported_names(source: Path) -> set[str]:
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_only_jit_imports_numba(source):
     numba = {"numba", "llvmlite"} & imported_names(source)
-    assert not numba or source.parent == PACKAGE / "jit"
+    assert not numba or source.parent == PACKAGE / "numbers" / "jit"
 
 
 def test_the_checker_imports_nothing_of_ours():
@@ -97,7 +97,7 @@ def test_the_names_of_a_room_are_listed_by_its_face_alone():
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_only_the_engine_room_imports_pymunk(source):
-    assert "pymunk" not in imported_names(source) or source.parent == PACKAGE / "engine"
+    assert "pymunk" not in imported_names(source) or source.parent == PACKAGE / "feeder" / "engine"
 
 
 def test_import_loads_none_of_the_late_packages():
@@ -143,11 +143,29 @@ def test_public_names_stay_what_they_are(order):
     """)
 
 
-def test_a_public_name_spelt_like_a_module_is_that_module():
-    modules = {module.name for module in iter_modules(limitsets.__path__)}
-    for name in modules & set(limitsets.__all__):
-        assert getattr(limitsets, name) is importlib.import_module(f"limitsets.{name}")
-        run_python(f"import types, limitsets; assert isinstance(limitsets.{name}, types.ModuleType)")
+def test_the_listing_of_the_package_is_its_nine_wings():
+    listed = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
+    wings = {"base", "numbers", "systems", "feeder", "proofs", "checker", "parameters", "cell", "face"}
+    assert listed == wings | {"__init__.py", "__main__.py", "py.typed"}
+
+
+@pytest.mark.parametrize("room", sorted(name for name, place in limitsets._PUBLIC.items() if ":" not in place))
+def test_a_room_under_its_public_name_is_that_room(room):
+    """The same object, also of what is in it: a second import would register its kernels a second time."""
+    place = importlib.import_module(f"limitsets.{limitsets._PUBLIC[room]}")
+    assert importlib.import_module(f"limitsets.{room}") is place is getattr(limitsets, room)
+    assert place.__name__ == place.__spec__.name == f"limitsets.{limitsets._PUBLIC[room]}"
+    for file in iter_modules(getattr(place, "__path__", ())):
+        if not file.ispkg and file.name != "__main__":
+            inner = importlib.import_module(f"limitsets.{room}.{file.name}")
+            assert inner is importlib.import_module(f"{place.__name__}.{file.name}")
+
+
+def test_a_room_that_is_not_there_is_missed_by_the_name_that_was_asked_for():
+    with pytest.raises(ModuleNotFoundError, match=r"limitsets\.rooms"):
+        importlib.import_module("limitsets.rooms")
+    with pytest.raises(AttributeError, match="has no attribute 'rooms'"):
+        limitsets.rooms  # noqa: B018
 
 
 def test_files_that_the_glossary_names_are_there():

@@ -10,15 +10,6 @@ from __future__ import annotations
 import math
 import numbers
 
-__all__ = [
-    "AnswerError",
-    "DataError",
-    "GeometryError",
-    "GridError",
-    "LimitsetsError",
-    "MapError",
-    "SceneError",
-]
 
 # Letters of a text that an error shows.
 LONGEST = 64

@@ -24,7 +24,6 @@ from typing import Any
 
 from limitsets.base.errors import LimitsetsError
 
-__all__ = ["as_json", "as_plain", "as_table", "code_digest", "locked", "picked", "replaced"]
 
 # The wing that shows answers and makes none.
 _FACE = "face"

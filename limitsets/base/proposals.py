@@ -7,8 +7,6 @@ import sys
 from pathlib import Path
 from shlex import quote
 
-__all__ = ["proposed"]
-
 
 def proposed(*words: object) -> str:
     """Write a command of this package, by the program as the user started it, its words quoted for the shell.

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-__all__ = ["Column", "Table", "Tabled", "aligned", "bands_of", "facts", "how_found", "joined"]
-
 # Characters of the line that names an answer.
 SHORT = 110
 
