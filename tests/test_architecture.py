@@ -149,7 +149,9 @@ def test_the_listing_of_the_package_is_its_nine_wings():
     assert listed == wings | {"__init__.py", "__main__.py", "py.typed"}
 
 
-@pytest.mark.parametrize("room", sorted(name for name, place in limitsets._PUBLIC.items() if ":" not in place))
+@pytest.mark.parametrize(
+    "room", sorted(name for name, place in limitsets._PUBLIC.items() if ":" not in place)
+)
 def test_a_room_under_its_public_name_is_that_room(room):
     """The same object, also of what is in it: a second import would register its kernels a second time."""
     place = importlib.import_module(f"limitsets.{limitsets._PUBLIC[room]}")

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple, NoReturn, ParamSpec, TypeVar
 
 from limitsets.base.errors import AnswerError, shown
 
-
 P = ParamSpec("P")
 R = TypeVar("R")
 

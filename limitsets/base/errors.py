@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import numbers
 
-
 # Letters of a text that an error shows.
 LONGEST = 64
 

@@ -24,7 +24,6 @@ from typing import Any
 
 from limitsets.base.errors import LimitsetsError
 
-
 # The wing that shows answers and makes none.
 _FACE = "face"
 

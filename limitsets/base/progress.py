@@ -11,7 +11,6 @@ from functools import wraps
 from html import escape
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
-
 Progress: TypeAlias = Callable[[str, int, int], None]
 """Told the step, how much of it is done, and of how much."""
 
