@@ -1,4 +1,4 @@
-"""Finished trials, kept in a file that is replaced whole: a run that is cut off goes on with what is left."""
+"""Runs of many chunks or trials: where they are computed, who hands them out, and finished ones kept in a file."""
 
 from __future__ import annotations
 
@@ -453,6 +453,7 @@ def _kept(work: Work, store: Kept, future: Future[Any], number: int, told: _Told
 
 
 # ----------------------------------------------------------------
+# Finished trials, kept in a file that is replaced whole: a run that is cut off goes on with what is left.
 
 
 Row = dict[str, Any]

@@ -149,9 +149,7 @@ def locked(place: str | Path) -> Iterator[None]:
         yield
     finally:
         if file is not None:
-            lock.unlink(
-                missing_ok=True
-            )  # before it is closed: whoever waits for this file finds that it is gone
+            lock.unlink(missing_ok=True)  # before it is closed: whoever waits for it finds that it is gone
             os.close(file)
 
 

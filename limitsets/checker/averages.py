@@ -1,4 +1,4 @@
-"""The mean of a function after a throw with even noise, bounded for every start: the arithmetic of one step in floats.
+"""Throws whose speed deviates, and the mean of a function after a throw, bounded for every start: one step in floats.
 
 docs/certificates.md, "Probabilities", numbers 20 (means at nodes) and 21 (between nodes).  A function V is continuous
 and affine between nodes.  With e the scatter of the landing, W(y) is the mean of V on [y - e, y + e] and
@@ -242,6 +242,8 @@ def deciding_floats(s: Side, phi: Array, x: Array, kappa: Array) -> Array:
 
 
 # ----------------------------------------------------------------
+# The mean of a function after a throw with even noise, bounded for every start: the arithmetic of one step in
+# floats.
 
 
 OUTERMOST = 1e4  # beyond its nodes a function is constant up to here

@@ -1,4 +1,4 @@
-"""The brackets of a noisy chain, found anew.
+"""The claim `probabilities`: what it says, and the brackets of a noisy chain, found anew.
 
 docs/certificates.md, "Probabilities", number 22.  The checker makes the steps itself, and its own brackets have to lie
 within those claimed.
@@ -230,6 +230,7 @@ def places_in_words(places: list[Place], unit: str) -> str:
 
 
 # ----------------------------------------------------------------
+# The brackets of a noisy chain, found anew.
 
 
 MOST_MEAN = 5_000  # steps in which a mean is bounded

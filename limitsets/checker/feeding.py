@@ -1,4 +1,4 @@
-"""Feeding: on which side parts come to rest at X or beyond, where the arm ends, and that they do.
+"""The end of the arm, and feeding: on which side parts come to rest at X or beyond, and that they do.
 
 docs/certificates.md, "Feeding", and number 17.
 """
@@ -164,6 +164,7 @@ def share_of(end: ArmEnd, scene: Scene, some: Array) -> float:
 
 
 # ----------------------------------------------------------------
+# Feeding: on which side parts come to rest at X or beyond, where the arm ends, and that they do.
 
 
 PARTS = "safety wrong progress almost never_fed"  # of the claim: a file has some of them

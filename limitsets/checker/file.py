@@ -1,4 +1,4 @@
-"""The file: a zip of a header and arrays.  docs/certificates.md, "The file".
+"""The file: a zip of a header and arrays (docs/certificates.md, "The file"), its texts, quantities and JSON.
 
 Sizes, depths and hashes are checked before anything is believed, and nothing is unpickled or evaluated.
 """
@@ -213,6 +213,7 @@ def model_in_words(model: dict[str, Any]) -> str:
 
 
 # ----------------------------------------------------------------
+# The file: a zip of a header and arrays.  docs/certificates.md, "The file".
 
 
 def stored_entries(data: memoryview, most: int, what: str) -> dict[str, memoryview]:

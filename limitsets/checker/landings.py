@@ -1,4 +1,4 @@
-"""The throws of one side of a noisy chain: where they land from every node, and by which branch from every cell.
+"""One side of a noisy chain: where throws land from every node and by which branch, and one throw of a bound.
 
 docs/certificates.md, "Probabilities", numbers 18 (landings) and 19 (the border).
 """
@@ -192,6 +192,7 @@ class Chain:
 
 
 # ----------------------------------------------------------------
+# The throws of one side of a noisy chain: where they land from every node, and by which branch from every cell.
 
 
 PIECES = 8  # of the speeds, where what decides is not seen to rise or fall with them at once

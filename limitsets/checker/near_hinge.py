@@ -1,4 +1,4 @@
-"""Near the hinge: starts before the first cell of a side.
+"""Near the hinge: starts before the first cell of a side; and thinning: which cells come to the cells wanted.
 
 docs/certificates.md, "What it rests on", number 6 (near the joint), and "The surface above the joint".
 """

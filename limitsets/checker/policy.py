@@ -1,4 +1,4 @@
-"""A policy for a sensor of one bit: how its file is read, and what it says in words.
+"""A policy for a sensor of one bit: how its file is read, what it says in words, and that its beliefs hold.
 
 docs/certificates.md, "Policies" and "Arrays of a policy".
 """

@@ -1,4 +1,4 @@
-"""Orbits that refute a goal, because they come back or because the goal speaks of every throw.
+"""Periodic orbits, and orbits that refute a goal, because they come back or the goal speaks of every throw.
 
 docs/certificates.md, "Refutations".
 """
@@ -151,6 +151,7 @@ def orbits_statement(section: dict[str, Any]) -> str:
 
 
 # ----------------------------------------------------------------
+# Orbits that refute a goal, because they come back or because the goal speaks of every throw.
 
 
 MOST_THROWS = 100_000  # throws of an orbit that refutes

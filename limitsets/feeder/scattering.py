@@ -1,4 +1,4 @@
-"""The random quantities of a throw, their laws, and the map of a scene with them."""
+"""The random quantities of a throw: probability laws, their strata, and the map of a scene with them."""
 
 from __future__ import annotations
 
@@ -293,6 +293,7 @@ def transformed(strata: Strata, function: Any) -> Strata:
 
 
 # ----------------------------------------------------------------
+# The random quantities of a throw, their laws, and the map of a scene with them.
 
 
 LAWS: dict[str, Any] = {"gaussian": Gaussian, "bounded": Uniform}

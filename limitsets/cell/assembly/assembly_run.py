@@ -1,4 +1,4 @@
-"""Trials of assembly, run anywhere and counted: `limitsets.assemble`."""
+"""Trials of assembly, run anywhere and counted with their intervals: `limitsets.assemble`."""
 
 from __future__ import annotations
 
@@ -142,6 +142,7 @@ def joint_of(rows: Sequence[TrialRow]) -> Joint:
 
 
 # ----------------------------------------------------------------
+# Trials of assembly, run anywhere and counted: `limitsets.assemble`.
 
 
 Progress = Callable[[str, int, int], None]

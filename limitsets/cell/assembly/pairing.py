@@ -1,4 +1,4 @@
-"""Two scenes that share an arm, its throw and its cavity."""
+"""Two scenes that share an arm: their pair, what a trial draws, and whether the outlines come into each other's way."""
 
 from __future__ import annotations
 

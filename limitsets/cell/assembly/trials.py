@@ -1,4 +1,4 @@
-"""A trial of two parts in contact with each other and with the cavity, in the engine."""
+"""A trial of two parts: in contact with each other in the engine, or passing through each other (the paper)."""
 
 from __future__ import annotations
 
@@ -125,6 +125,7 @@ def _thrown(end: ArmEnd, params: Any, start: Start, shift: float) -> tuple[Start
 
 
 # ----------------------------------------------------------------
+# A trial of two parts in contact with each other and with the cavity, in the engine.
 
 
 MOST_THROWS = 500

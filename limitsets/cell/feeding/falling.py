@@ -1,4 +1,4 @@
-"""What falls in: a part that comes to rest beyond the end of the arm tips over it, and slides down the ramp.
+"""What falls in: a part beyond the end of the arm tips over it, how long that takes, and its way down the ramp.
 
 How long it takes to tip: `tipping`.  What is assumed stands in docs/feeding.md.
 """
@@ -225,6 +225,7 @@ def tipping_times(scene: Scene, side: int) -> Callable[[Array], Array]:
 
 
 # ----------------------------------------------------------------
+# What falls in: a part that comes to rest beyond the end of the arm tips over it, and slides down the ramp.
 
 
 FATES = ("right", "wrong", "wall", "edge", "left", "never")

@@ -1,4 +1,4 @@
-"""What can be reached on enclosed images of the cells before X, where the arm ends.
+"""What is proved of feeding, in words and numbers, and what can be reached on enclosed images of the cells before X.
 
 An orbit goes on from cells before X and ends in a cell beyond.  A cell without a rank (`proofs.basin`) whose image
 comes to the border of the cells may leave: towards the joint it may also come to lie before the first cells, and is
@@ -194,6 +194,7 @@ def _places(beyond: Mapping[Any, float], unit: str) -> str:
 
 
 # ----------------------------------------------------------------
+# What can be reached on enclosed images of the cells before X, where the arm ends.
 
 
 Mask = NDArray[np.bool_]

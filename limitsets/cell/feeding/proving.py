@@ -1,4 +1,4 @@
-"""Which sides can be fed, from which starts, under every sequence of the noise; and that every start is fed.
+"""Proofs of feeding: which sides, from which starts, under every noise; brackets throw by throw; their certificate.
 
 The arm ends at X.  On enclosed images of cells an orbit goes on from cells before X, and ends in a cell beyond.
 
@@ -103,6 +103,7 @@ def _places(end: ArmEnd) -> dict[str, Places]:
 
 
 # ----------------------------------------------------------------
+# Which sides can be fed, from which starts, under every sequence of the noise; and that every start is fed.
 
 
 Progress = Callable[[str, int, int], None]

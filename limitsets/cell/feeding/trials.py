@@ -1,4 +1,4 @@
-"""Trials as experimenters make them: parts from random starts, thrown until they fall in or leave the arm."""
+"""Trials as experimenters make them, until parts fall in or leave the arm, and the shares of all fates among them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All answers about a tray: `limitsets.tray`."""
+"""All answers about a tray, `limitsets.tray`, and the chain of one depression."""
 
 from __future__ import annotations
 
@@ -261,6 +261,7 @@ def filled(counts: Counts, passes: int, random: np.random.Generator, each: float
 
 
 # ----------------------------------------------------------------
+# All answers about a tray: `limitsets.tray`.
 
 
 # The stream of random numbers of the intervals.

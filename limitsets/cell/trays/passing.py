@@ -1,4 +1,4 @@
-"""What a pass is: a kick of the plate, and a part that comes by; drawn by laws that are named."""
+"""One depression pass by pass in the engine: kicks, parts that come by, counts, whether it forgets, and films."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many parts on a tray at once, pass after pass, in the rigid-body engine: they push each other, or pass through.
+"""Many parts on a tray at once, pass after pass, in the engine: they push each other or pass through; and counts.
 
 In each pass the plate is kicked, and then all parts come by together, spread evenly over the depressions.  What is
 assumed: docs/tray.md.

@@ -1,4 +1,4 @@
-"""A film of feeding: throws until the part tips over the end of the arm, falls onto the ramp and slides down.
+"""Films of what falls into the cavity: throws of a feeder, and what the engine recorded of several parts.
 
 The part tips about the end of the arm as limitsets/cell/feeding/falling.py says: M theta'' = g (d sin theta + e cos
 theta). It then slides without friction until it meets the far wall or the floor; that, and a fall of a part that lies

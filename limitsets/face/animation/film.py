@@ -1,4 +1,4 @@
-"""A film as data: where everything is in every frame, and what is written under it.  Writers only draw it."""
+"""A film as data: where everything is in every frame, cut from legs, and its captions.  Writers only draw it."""
 
 from __future__ import annotations
 

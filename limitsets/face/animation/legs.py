@@ -1,4 +1,4 @@
-"""The legs of one throw: the arm goes down, swings up and stops; the part flies, strikes, turns and rests.
+"""The legs of one throw, from the arm's way down to rest, and the lanes that stand beside a film.
 
 Where the scene simulates no stroke the swing is drawn: from `SWING` below to level, with constant acceleration, so that
 the arm stops with the speed of the throw.
@@ -81,6 +81,7 @@ def require_start(scene: Scene, start: tuple[float, int]) -> tuple[float, int]:
 
 
 # ----------------------------------------------------------------
+# The legs of one throw: the arm goes down, swings up and stops; the part flies, strikes, turns and rests.
 
 
 Array = NDArray[np.float64]

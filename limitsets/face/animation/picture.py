@@ -1,4 +1,4 @@
-"""What a frame looks like, in pixels from the upper left: above the arm with the parts, below a lane for each side.
+"""What a frame looks like, in pixels from the upper left: the arm with parts and cavity, below a lane for each side.
 
 Both have one axis of x, so that a part stands over its place in the lanes.  What does not move is drawn once
 (`Picture.still`); what does is asked for frame by frame (`Picture.moving`), or drawn by the script of a page from the
@@ -219,6 +219,7 @@ class LanePicture:
 
 
 # ----------------------------------------------------------------
+# What a frame looks like, in pixels from the upper left: above the arm with the parts, below a lane for each side.
 
 
 # The widest and the narrowest picture, its borders, and the most for what is above the lanes.

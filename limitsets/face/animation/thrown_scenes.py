@@ -1,4 +1,4 @@
-"""A film of a scene: its throws from a start."""
+"""Films of throws: of a scene from a start, of an orbit that refutes a margin, of feedback with its sensor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A film as a page that stands alone: what is still as SVG, what moves as numbers, and a script that draws it."""
+"""Films as files: an animated GIF from pixels, and a page of SVG and numbers that stands alone."""
 
 from __future__ import annotations
 
@@ -153,6 +153,7 @@ def _colours(picture: Picture) -> bytes:
 
 
 # ----------------------------------------------------------------
+# A film as a page that stands alone: what is still as SVG, what moves as numbers, and a script that draws it.
 
 
 # Digits of a length over all of the picture: a hundredth of a pixel is a tenth of the last one.

@@ -1,4 +1,4 @@
-"""`limitsets analyse`: where the throws lead, as a report."""
+"""`limitsets analyse`, `audit` and `fit`: where the throws lead, what the model leaves out, the model from a film."""
 
 from __future__ import annotations
 

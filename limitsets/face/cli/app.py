@@ -1,4 +1,4 @@
-"""The commands and the options they share."""
+"""The commands, the options they share, and errors as one line on stderr with an exit code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values of options: numbers, places on the arm, deviations and bounds of quantities."""
+"""Values of options (numbers, places, deviations, bounds), and certificates as files of the commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`limitsets assemble`: pairs of parts thrown along one arm into a cavity, and what becomes of them."""
+"""`limitsets assemble` and `tray`: pairs of parts thrown into a cavity, and depressions that fill."""
 
 from __future__ import annotations
 

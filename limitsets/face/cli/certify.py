@@ -1,4 +1,4 @@
-"""`limitsets certify`: what is proved of a scene, in words and as a certificate."""
+"""`limitsets certify` and `recheck`: what is proved of a scene, in words and as a certificate; a certificate anew."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`limitsets design`: quantities of a scene for which its critical points are as wanted, or the margin large."""
+"""`limitsets design`: quantities for wanted critical points, for a large margin, or (`--goal`) for the scene's goal."""
 
 from __future__ import annotations
 
@@ -121,6 +121,7 @@ def _text_of_goal(found: GoalDesign, files: list[Path], about: About, asked: int
 
 
 # ----------------------------------------------------------------
+# `limitsets design`: quantities of a scene for which its critical points are as wanted, or the margin large.
 
 
 FREE = "free"

@@ -1,4 +1,4 @@
-"""`limitsets margin`: how much each quantity may deviate before the goal fails, proved and refuted."""
+"""`limitsets margin` and `robustness`: how much quantities may deviate, and the sheet of all tolerances."""
 
 from __future__ import annotations
 

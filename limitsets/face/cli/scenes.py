@@ -1,4 +1,4 @@
-"""`limitsets scenes`: what is built in."""
+"""Commands about scenes and this installation: `scenes`, `new`, `check`, `doctor`, `explore`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`limitsets throw`: single throws, with what is worth knowing of each."""
+"""`limitsets throw` and `plot`: single throws, with what is worth knowing of each, and one figure."""
 
 from __future__ import annotations
 

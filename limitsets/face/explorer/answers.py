@@ -1,4 +1,4 @@
-"""What the page says in words: estimates, proofs and margins, as HTML in which nothing from outside is markup."""
+"""What the page says, as HTML in which nothing from outside is markup, and how other scenes are typed or drawn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A small atlas beside the scene: computed when it is asked for, or one that was stored; a click opens its feeder."""
+"""A small atlas beside the scene, computed by a process of its own, or stored; a click opens one of its feeders."""
 
 from __future__ import annotations
 
@@ -137,6 +137,7 @@ def _answered(
 
 
 # ----------------------------------------------------------------
+# A small atlas beside the scene: computed when it is asked for, or one that was stored; a click opens its feeder.
 
 
 POINTS = 33

@@ -1,4 +1,4 @@
-"""What this package draws in the browser by itself: pictures on a canvas, sliders, and lines of text.
+"""What this package draws in the browser by itself: how the page looks, pictures on a canvas, sliders with fields.
 
 A figure of Bokeh costs the browser some 20 ms for a picture of the lanes, and its slider, which rebuilds itself at
 every move, 14 ms for a move: too much for 20 pictures a second on two cores.  These cost 2 ms and 5 ms.

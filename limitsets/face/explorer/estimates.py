@@ -1,4 +1,4 @@
-"""What follows the sliders: attractors, basins, critical points and the goal's threshold, in some 10 ms.
+"""Knobs, the numbers that sliders move, and what follows them in some 10 ms: attractors, basins, the goal's threshold.
 
 Cells find what attracts and from where; the compiled loop of the atlas then finds the ends of each attractor to the
 last digits, where it can decide them.  Both are estimates: no rounding is enclosed, and images of cells are sampled.
@@ -241,6 +241,7 @@ def map_with(params: Any, values: Mapping[str, float]) -> Any:
 
 
 # ----------------------------------------------------------------
+# What follows the sliders: attractors, basins, critical points and the goal's threshold, in some 10 ms.
 
 
 CELLS = 2048

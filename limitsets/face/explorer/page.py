@@ -1,4 +1,4 @@
-"""The page of a scene: one visitor's sliders, pictures and answers, and what happens when they are touched.
+"""The page of a scene, and that of a map: sliders, pictures and answers, and what happens when they are touched.
 
 Everything that moves is done by `beat`, some sixty times a second: slider events only say that something has changed,
 so that a hand that is faster than the computation leaves no queue behind.
@@ -126,6 +126,7 @@ class MapPage:
 
 
 # ----------------------------------------------------------------
+# The page of a scene: one visitor's sliders, pictures and answers, and what happens when they are touched.
 
 
 RESTS = 0.6

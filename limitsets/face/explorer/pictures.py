@@ -1,4 +1,4 @@
-"""The pictures of the part and of the arm."""
+"""The pictures of the part, of the arm, of where parts come to rest, and of where a map leads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Visitors: each has a page of his own, in a browser or in a notebook, and a beat that moves it."""
+"""`limitsets.explore`: visitors with a page each, in a browser or a notebook, and the server on this machine."""
 
 from __future__ import annotations
 
@@ -111,6 +111,7 @@ def _free_port(address: str, port: int) -> int:
 
 
 # ----------------------------------------------------------------
+# Visitors: each has a page of his own, in a browser or in a notebook, and a beat that moves it.
 
 
 COMPILING = "compiling, once: the throw, images of cells, attractors"

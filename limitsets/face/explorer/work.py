@@ -116,9 +116,6 @@ def _sides_in(goal: Any) -> list[int]:
     return [each for each in goal if isinstance(each, int)] if isinstance(goal, list) else []
 
 
-# ----------------------------------------------------------------
-
-
 # Points along each axis of a stored atlas that are shown; the rest would be smaller than a finger.
 MOST_SHOWN = 48
 

@@ -1,4 +1,4 @@
-"""Maps of an atlas: the classes of its points, with a legend in words.
+"""Maps of an atlas: axes, pixels and hatches, the classes of its points, with a legend in words.
 
 The colour of a class comes from the class alone, so it is the same in every picture: the structure of the attractors
 gives the face, ways out a hatch.  Faces come back after seven, lighter; neighbours are told apart by a line and by the
@@ -220,6 +220,7 @@ def _value_of(found: Atlas, name: str) -> float | None:
 
 
 # ----------------------------------------------------------------
+# Maps of an atlas: the classes of its points, with a legend in words.
 
 
 # Paul Tol's light scheme, made for areas and colour-blind readers, without its orange; a cycle's face.

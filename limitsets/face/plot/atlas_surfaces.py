@@ -1,4 +1,4 @@
-"""Surfaces of an atlas: one of its numbers as colours, or as a line where one quantity varies."""
+"""Numbers against parameters: surfaces and lines of an atlas, and the bifurcation diagram of a continuation."""
 
 from __future__ import annotations
 

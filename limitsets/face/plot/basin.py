@@ -1,4 +1,4 @@
-"""Basins: strips per side in one dimension, pictures of the plane in two."""
+"""Basins, as strips per side or pictures of the plane, and the Morse graph in layers."""
 
 from __future__ import annotations
 

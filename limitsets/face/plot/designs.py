@@ -1,4 +1,4 @@
-"""The path of a design: limit sets and critical points of its scenes (Fig. 6 of the paper)."""
+"""Designs: limit sets and critical points along a path (Fig. 6 of the paper), and margin against throws to feed."""
 
 from __future__ import annotations
 

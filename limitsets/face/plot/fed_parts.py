@@ -1,4 +1,4 @@
-"""Feeding in pictures: a part that tips into the cavity, how long it takes, throws until it is fed, and the noise."""
+"""Feeding and assembly in pictures: parts that tip into the cavity, their fates, and pairs that lie in it."""
 
 from __future__ import annotations
 

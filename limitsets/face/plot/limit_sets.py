@@ -1,4 +1,4 @@
-"""The limit set, one lane per side, with throws as arrows (Figs. 4 and 6 of the paper)."""
+"""The limit set, one lane per side (Figs. 4 and 6 of the paper), and the map x' against x, one panel per side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Margins: a bar per quantity, curves over X, and the box of a joint margin; proved and refuted."""
+"""Margins, proved and refuted, orbits that violate a goal, and an audit as strips along the arm."""
 
 from __future__ import annotations
 

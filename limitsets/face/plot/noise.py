@@ -1,4 +1,4 @@
-"""Figures of noise: density of the places of rest, number of throws, and the effect of the noise level."""
+"""What scatters: density of the places of rest, number of throws, level of the noise; and the residuals of a fit."""
 
 from __future__ import annotations
 

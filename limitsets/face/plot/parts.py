@@ -1,4 +1,4 @@
-"""The part on the arm: its outline, the numbers of its sides, its centre of mass, and where a side has its left end."""
+"""The part on the arm, with its sides and its centre of mass; and one throw of it (Fig. 3 of the paper)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shared by all figures: colours, line styles, hatches, an empty figure, and a piece of an orbit."""
+"""Shared by all figures: what a figure is of, colours, line styles, hatches, an empty figure, a piece of an orbit."""
 
 from __future__ import annotations
 
@@ -103,6 +103,7 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
 
 
 # ----------------------------------------------------------------
+# Shared by all figures: colours, line styles, hatches, an empty figure, and a piece of an orbit.
 
 
 Extents: TypeAlias = Mapping[int, Sequence[tuple[float, float]]]

@@ -1,4 +1,4 @@
-"""One throw of the map as motion: the flight by its formulas, the impact, and the way to rest.
+"""One throw of the map as motion: the part's vertices in flight, the impact, and the way to rest.
 
 The angle at the impact, the place of rest and the sides turned are the map's.  A throw that scatters gives its kappa
 back by the angle at which its vertex lands, and its landing by where it comes to rest.
@@ -334,6 +334,7 @@ def _drawn(hit: Impact, rest: tuple[Array, float]) -> Turning:
 
 
 # ----------------------------------------------------------------
+# One throw of the map as motion: the flight by its formulas, the impact, and the way to rest.
 
 
 # Effects that the turn about the struck vertex does not know.

@@ -1,4 +1,4 @@
-"""The pages: an answer in the words of someone who builds a feeder.
+"""Pages in the words of someone who builds a feeder: tables, goals as sentences, what a fit says, as Markdown and HTML.
 
 The words stand in `templates`.  A paragraph there may be broken into lines as its sentences come: it is one line in the
 page, and one whose sentences are all left out is none.
@@ -346,6 +346,7 @@ def void_of(outcome: GoalOutcome, unit: str, spread: str | None) -> str:
 
 
 # ----------------------------------------------------------------
+# The pages: an answer in the words of someone who builds a feeder.
 
 
 # Blocks of these signs keep their lines: headings, tables, lists, commands.

@@ -1,4 +1,4 @@
-"""The sheet of tolerances as a page: what is told of a margin, of margins against X and of noise, for its template."""
+"""The sheet of tolerances as a page and as files: margins, margins against X and noise, for its template."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Write the report's files, all of them or none."""
+"""Write a report's files, all of them or none; an audit in words and its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several parts on one arm at once, in the engine: thrown together, in contact with each other and with the ground.
+"""Several parts on one arm at once, in the engine: thrown together, in contact, and what may be asked of them.
 
 What is assumed stands in docs/many_parts.md.
 """
@@ -211,6 +211,7 @@ class Touching:
 
 
 # ----------------------------------------------------------------
+# Several parts on one arm at once, in the engine: thrown together, in contact with each other and with the ground.
 
 
 # Time [rad] between two looks at who is asleep or lost, and between two frames of a film.

@@ -1,4 +1,4 @@
-"""One part and one depression of a plate: it falls, hits the edges, rolls over or lies down in it, until it rests.
+"""One part and one depression of a plate, until it rests; and where a part is seated.
 
 The depression's middle is at x = 0, the plate's surface at y = 0.  Lengths are those of the scene; gravity is one size
 (the part's longest side) per unit of time squared, so that nothing depends on a throw.  Mass 1.
@@ -135,6 +135,7 @@ def _ahead(point: Points, outline: Points, way: Points) -> float:
 
 
 # ----------------------------------------------------------------
+# One part and one depression of a plate: it falls, hits the edges, rolls over or lies down in it, until it rests.
 
 
 EMPTY, UNFINISHED = 0, -1

@@ -1,4 +1,4 @@
-"""One part of a crowd: its release, its way down to the arm, and the joint that holds the struck vertex.
+"""One part of a crowd: the ground, its way from release to rest, and what is kept of its motion for films.
 
 Velocities in a crowd's space are those of half a step later, so that the engine's steps are exact in free flight
 (`limitsets.feeder.engine.stage`).  The impact on the joint is the engine's, in a space of the part's own: an instant
@@ -152,6 +152,7 @@ def ground_of(
 
 
 # ----------------------------------------------------------------
+# One part of a crowd: its release, its way down to the arm, and the joint that holds the struck vertex.
 
 
 OUT, FLYING, HINGED, LOOSE = "out", "flying", "hinged", "loose"

@@ -1,4 +1,4 @@
-"""A part over the arm in the engine: bodies, units and time steps.
+"""A part over the arm in the engine: bodies, time steps, flight, the joint at a struck vertex, contact until it lies.
 
 Lengths are those of the scene; the unit of time is 1/w, so that the arm turns at rate 1, gravity is kappa, and a time
 in flight is the angle by which the part has turned.  Mass 1; the joint is the origin.

@@ -1,4 +1,4 @@
-"""One throw in the engine: flight, first contact, and motion to rest by a hinge or by the engine's own contact."""
+"""One throw in the engine, struck or by a stroke, from flight to rest; and its comparison with the map."""
 
 from __future__ import annotations
 
@@ -75,6 +75,7 @@ def accelerate(stage: Stage, stroke: float, friction: float, step: float) -> Non
 
 
 # ----------------------------------------------------------------
+# One throw in the engine: flight, first contact, and motion to rest by a hinge or by the engine's own contact.
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Convex polygons: from vertices, or a triangle from its three side lengths.
+"""The shape of a part: its convex polygon, its mass, and the sides it can rest on.
 
 Coordinates enter only as differences from a vertex of the part, so that where the origin lies costs no digits.
 """

@@ -1,4 +1,4 @@
-"""The goals, one dataclass each: how an analysis decides it, and how it reads."""
+"""The goals, one dataclass each: what it says of itself, how an analysis decides it, and how it reads."""
 
 from __future__ import annotations
 
@@ -196,6 +196,7 @@ def declare(goal: type[Goal]) -> type[Goal]:
 
 
 # ----------------------------------------------------------------
+# The goals, one dataclass each: how an analysis decides it, and how it reads.
 
 
 # fractions are sums over cells: a whole one is 1 up to rounding

@@ -1,4 +1,4 @@
-"""From a TOML structure to the fields of a `Scene`: units, and what contradicts what."""
+"""From a TOML structure to the fields of a `Scene`: goal, world, effects, units, and what contradicts what."""
 
 from __future__ import annotations
 
@@ -137,6 +137,7 @@ def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Re
 
 
 # ----------------------------------------------------------------
+# From a TOML structure to the fields of a `Scene`: units, and what contradicts what.
 
 
 def resolved(structure: object, file: str | None) -> dict[str, Any]:

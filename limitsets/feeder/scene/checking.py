@@ -1,4 +1,4 @@
-"""All that is wrong with a scene, and what is improbable, at once."""
+"""All that is wrong with a scene, and what is improbable, at once; and a scene to start from."""
 
 from __future__ import annotations
 
@@ -347,6 +347,7 @@ def _toml(value: Any) -> str:
 
 
 # ----------------------------------------------------------------
+# All that is wrong with a scene, and what is improbable, at once.
 
 
 # Without these there is no scene; all other tables can be left out to look at the rest.

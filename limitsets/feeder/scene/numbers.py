@@ -1,4 +1,4 @@
-"""A scene's text as numbers of any kind: floats, spans of rationals, numbers with derivatives.
+"""A scene's text as numbers of any kind; as floats each is checked, and what cannot be is refused.
 
 The tables of part, gravity and throw are read here and nowhere else but in the checker, which trusts nothing of ours.
 A kind of number says how a quantity becomes one of it; the formulas are those of `geometry`, written on scalars.

@@ -1,4 +1,4 @@
-"""Names of quantities: one list for scenes, calls, the command line and JSON."""
+"""Names of quantities, one list for scenes, calls, commands and JSON; and their text as numbers in the scene's unit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Read scenes: built-in scenes by name, TOML files, TOML text, and structures."""
+"""Read scenes by name, from files, text and structures, also what can be read of a refused one; and write them."""
 
 from __future__ import annotations
 

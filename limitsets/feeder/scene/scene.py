@@ -1,4 +1,4 @@
-"""A scene with resolved units, the input of all later rooms."""
+"""A scene with resolved units, the input of all later rooms; and the units in which it writes its quantities."""
 
 from __future__ import annotations
 

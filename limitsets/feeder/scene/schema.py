@@ -1,7 +1,7 @@
-"""The schema of a scene as pydantic models: all keys and their allowed values.
+"""The schema of a scene as pydantic models: leaf types, keys and their allowed values.
 
 Every key says what it means, with an example: the words of `limitsets new`.  Goals, facts and effects are those that
-are declared.  Only `validation` and `starting` import this file, lazily: pydantic takes 0.1 s.
+are declared.  Only `validation` and `checking` import this file, lazily: pydantic takes 0.1 s.
 """
 
 from __future__ import annotations
@@ -20,9 +20,8 @@ from limitsets.feeder.scene.facts import FACTS, Fact
 from limitsets.feeder.scene.units import density_dimension, parse
 
 # ----------------------------------------------------------------
-# The leaf types of the schema: each carries the allowed values and the remedy, so that errors read alike.
-#
-# Values remain text; `build` gives them units.  Only `schema` imports this file: pydantic takes 0.1 s.
+# The leaf types of the schema: each carries the allowed values and the remedy, so that errors read alike.  Values
+# remain text; `build` gives them units.
 
 
 def _refusal(thing: str, allowed: str, remedy: str) -> PydanticCustomError:
@@ -129,6 +128,7 @@ def says(text: str, example: object = None) -> Any:
 
 
 # ----------------------------------------------------------------
+# The schema of a scene as pydantic models: all keys and their allowed values.
 
 
 class Table(BaseModel):

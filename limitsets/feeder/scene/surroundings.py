@@ -1,4 +1,4 @@
-"""A tray: a plate with equal depressions, over which parts wash again and again."""
+"""What stands around the arm: the cavity at its end, a sensor with throws to choose from, a tray."""
 
 from __future__ import annotations
 
@@ -312,6 +312,7 @@ def _sensor(table: SensorTable, count: int, arm_length: float, resolver: Resolve
 
 
 # ----------------------------------------------------------------
+# A tray: a plate with equal depressions, over which parts wash again and again.
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Enclosures of the numbers behind the model's assumptions, for cells of starts and boxes of parameters.
+"""Enclosures of the numbers behind the model's assumptions, the hinge's force among them, for cells and boxes.
 
 Proof kernels in the steps of `throw_box.py`.  Where the decision between jog and flip is not proved, the enclosures
 hold for both.  Mass and the throw's w are 1; forces are given in weights, impulses in that of the throw itself.
@@ -134,6 +134,7 @@ def hinge_force(
 
 
 # ----------------------------------------------------------------
+# Enclosures of the numbers behind the model's assumptions, for cells of starts and boxes of parameters.
 
 
 class Assumed(IntEnum):

@@ -1,4 +1,4 @@
-"""Free flight of a part that leaves the arm again, up to the next vertex that strikes.
+"""The part at or over the arm after an impact: held at a vertex, sliding on it, or in free flight to the next one.
 
 Only one vertex can be the lowest while the part has turned from lying on its side by less than the exterior angle
 there; at the ends of that range a neighbour is as low and takes over.  From the start of such a range, with the lowest
@@ -354,6 +354,7 @@ def slide_on(part: FullSide, mu: float, side_way: int, hit: Contact) -> tuple[Co
 
 
 # ----------------------------------------------------------------
+# Free flight of a part that leaves the arm again, up to the next vertex that strikes.
 
 
 # Vertices that may be the lowest in turn before a flight is given up: no throw turns a part that far.

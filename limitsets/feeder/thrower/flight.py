@@ -1,4 +1,4 @@
-"""Flight: the angle at which the left vertex meets the arm.
+"""Flight: sin phi, 1 - cos phi and phi - sin phi, and the angle at which the left vertex meets the arm.
 
 With s = sin phi, v = 1 - cos phi, w = phi - sin phi the height of the left vertex over the arm is
 
@@ -108,6 +108,7 @@ def turn_back_slightly(to: Turned, e: float) -> Turned:
 
 
 # ----------------------------------------------------------------
+# Flight: the angle at which the left vertex meets the arm.
 
 
 # Halley's method: the step before the last is small enough for `turn_back`, and a last step this small against phi

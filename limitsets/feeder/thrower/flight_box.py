@@ -1,4 +1,4 @@
-"""The box twin of `flight.py`: brackets of the impact angle, and its derivative.
+"""The box twin of `flight.py`: enclosures of sine and cosine, brackets of the impact angle, and its derivative.
 
 The impact is enclosed by a bracket: numbers proposed by Halley's method, accepted only when the height of the vertex
 is proved positive at (and, being concave, before) the lower one and negative at the upper one.
@@ -98,6 +98,7 @@ def turn_box(phi: Interval) -> Turned:
 
 
 # ----------------------------------------------------------------
+# The box twin of `flight.py`: brackets of the impact angle, and its derivative.
 
 
 # The bracket of an impact reaches this far, relative to phi, beyond what Halley's method proposes: wide against the

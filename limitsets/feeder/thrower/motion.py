@@ -1,4 +1,4 @@
-"""State of the part between two events of a throw, as the kernels of the effects pass it on.
+"""State of the part between two events of a throw, for points and for boxes, and what an effect says of itself.
 
 Lengths in the scene's unit, rates divided by the throw's w, velocities by w as well, energies by m w^2.  Sides and
 vertices are counted on without end, counterclockwise: number k means side, or its left vertex, k mod n, so that k less

@@ -1,4 +1,4 @@
-"""Parameters of the throw map, in the form that kernels take.
+"""Parameters of the throw map, in the form that kernels take, and the numbers of one side for points and for boxes.
 
 `Throw` holds one entry per side; `Side` what one side's kernels need, gathered once per batch so that the loop over
 starts reads no array but theirs.

@@ -1,4 +1,4 @@
-"""The exponential on closed intervals.
+"""The exponential and the natural logarithm on closed intervals.
 
 Exponential of a double: x = n ln 2 + r by subtraction of ln 2 in two parts, |r| <= ln(2)/2 (a hair more), then the
 Taylor polynomial, scaled by 2^n through the bits of the exponent.  For |x| <= `LARGEST` the result is within

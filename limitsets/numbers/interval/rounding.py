@@ -1,4 +1,4 @@
-"""Stepping outward by arithmetic.
+"""Stepping outward by arithmetic, and the guard before every certified run that the processor does what proofs assume.
 
 For a double y and any rounding direction, the exact result of one operation that gave y lies within one unit in the
 last place of y, at most ``2^-52 |y|``, or ``2^-1074`` below the normal range.  ``3 * 2^-52 |y| + 3 * 2^-1074`` covers

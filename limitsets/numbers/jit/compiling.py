@@ -1,4 +1,4 @@
-"""The decorators of kernels, plain helpers of kernels from outside, and what a user reads if one does not compile."""
+"""The decorators of kernels: how they compile, helpers from outside, and what a user reads if one does not compile."""
 
 from __future__ import annotations
 
@@ -43,6 +43,7 @@ OVERLOAD = ("error_model", "fastmath")  # what an overload takes of these
 
 
 # ----------------------------------------------------------------
+# The decorators of kernels, plain helpers of kernels from outside, and what a user reads if one does not compile.
 
 
 F = TypeVar("F", bound=Callable[..., Any])

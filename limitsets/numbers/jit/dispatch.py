@@ -1,4 +1,4 @@
-"""Functions whose method is chosen by the class of an argument, at compile time."""
+"""Functions whose method is chosen by the class of an argument, at compile time; and one of many parameter points."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Choice of the cheapest method for a given error of the ends of the limit sets, before the computation.
-
-this file determines the error reached.
+"""The cheapest method for a given error of the limit set's ends, and the error reached, found independently.
 
 Two methods give the extents of an attractor.  The error of the borders of attracting cells is about the width of a
 cell times the slope of the throws after a critical point: half the error costs twice the cells and the time.  Images of

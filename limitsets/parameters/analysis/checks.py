@@ -1,4 +1,4 @@
-"""Comparison of the answer with a thousand orbits from random starts, which reveal attractors that cells missed.
+"""What is looked at beside the answers: assumptions at places, the goal, and random orbits against attractors missed.
 
 In cells that are too coarse an attractor has an edge out and is not recognised.  Orbits that stay where no attractor
 was found, or do not end where the label of their cell says, reveal it.
@@ -224,6 +224,7 @@ def goal_outcome(
 
 
 # ----------------------------------------------------------------
+# Comparison of the answer with a thousand orbits from random starts, which reveal attractors that cells missed.
 
 
 # Starts, and throws after which they are looked at: most have come to an attractor by the first.

@@ -1,4 +1,4 @@
-"""The task that an atlas asks where no other is named: the topology of the attractors."""
+"""The task that an atlas asks where no other is named, the topology of attractors, and its checks in the run itself."""
 
 from __future__ import annotations
 
@@ -111,6 +111,7 @@ def _against_proof(block: Block, told: Topologies, k: int) -> int:
 
 
 # ----------------------------------------------------------------
+# The task that an atlas asks where no other is named: the topology of the attractors.
 
 
 _CODES = {

@@ -1,4 +1,4 @@
-"""A plan: which points of which subject a task answers for, in which chunks."""
+"""Tasks known by an importable name, and plans: which points of which subject a task answers for, in which chunks."""
 
 from __future__ import annotations
 
@@ -198,6 +198,7 @@ def resolved(name: str) -> Callable[..., Any]:
 
 
 # ----------------------------------------------------------------
+# A plan: which points of which subject a task answers for, in which chunks.
 
 
 Region: TypeAlias = tuple[slice, ...]

@@ -1,4 +1,4 @@
-"""What a plan varies: a scene by its quantities, or any registered map by the fields of its parameters."""
+"""What a plan varies: axes, and a scene by its quantities or any registered map by the fields of its parameters."""
 
 from __future__ import annotations
 
@@ -132,6 +132,7 @@ def _taken_apart(word: str, text: object) -> tuple[Fraction, str | None]:
 
 
 # ----------------------------------------------------------------
+# What a plan varies: a scene by its quantities, or any registered map by the fields of its parameters.
 
 
 Array: TypeAlias = npt.NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""What a worker does: answer for one chunk of a plan."""
+"""What a worker does: answer for one chunk of a plan, with boundaries of classes refined."""
 
 from __future__ import annotations
 
@@ -156,6 +156,7 @@ def _sums(cells: Ints, values: Ints) -> Ints:
 
 
 # ----------------------------------------------------------------
+# What a worker does: answer for one chunk of a plan.
 
 
 COMPUTED, IMPOSSIBLE, REFUSED = 0, 1, 2

@@ -1,4 +1,4 @@
-"""Following attractors along a path: the public call."""
+"""Attractors followed along a path: matched, stepped until they go on one to one, and what happens between steps."""
 
 from __future__ import annotations
 
@@ -410,6 +410,7 @@ def events_of(follower: Follower, numbers: list[list[int]]) -> tuple[Event, ...]
 
 
 # ----------------------------------------------------------------
+# Following attractors along a path: the public call.
 
 
 Progress = Callable[[str, int, int], None]

@@ -1,4 +1,4 @@
-"""Sets of intervals grown from inside: images of short pieces of an orbit, until they fill what the orbit fills.
+"""Sets found from orbits: intervals grown from inside until they fill an attractor, and attracting cycles.
 
 Cells enclose an attractor from outside, and with it whatever unstable cycle lies in a gap narrower than they are.
 Images of a short interval around a point of the attractor never leave the attractor, so that no gap is closed.

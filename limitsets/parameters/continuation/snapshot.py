@@ -1,4 +1,4 @@
-"""The attractors at one point of the path: attracting cycles by Newton's method, the others as intervals.
+"""The attractors at one point of the path, and what continuation gives: the attractors at each step, numbered.
 
 Candidates are orbits from both sides of every critical point, from all over the domain, and from the attracting cells
 of a transition graph.  Orbits that close are cycles.  The others are grown from inside (`growth.py`).  A set that holds

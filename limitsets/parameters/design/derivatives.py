@@ -1,4 +1,4 @@
-"""First critical points with their derivatives by any quantities of the scene: the implicit function theorem.
+"""First critical points with their derivatives by any quantities of the scene: dual numbers, implicit functions.
 
 At a critical point r the deciding number F(r, q) is zero, so dr/dq = -(dF/dq) / (dF/dr).  F is evaluated on dual
 numbers: from the scene's text through the formulas of `geometry`, and through the impact angle by the same theorem.
@@ -421,6 +421,7 @@ class _Duals(Numbers):
 
 
 # ----------------------------------------------------------------
+# First critical points with their derivatives by any quantities of the scene: the implicit function theorem.
 
 
 # Newton steps from the number that a bisection of the kernels found.

@@ -1,4 +1,4 @@
-"""A robust design, and what others get of it: plain tables for JSON, and a folder with scene, answer, certificates."""
+"""A robust design and what others get of it: throws to feed, the Pareto front, tables, a folder with certificates."""
 
 from __future__ import annotations
 
@@ -245,6 +245,7 @@ def best_of(options: Sequence[Option]) -> list[Option]:
 
 
 # ----------------------------------------------------------------
+# A robust design, and what others get of it: plain tables for JSON, and a folder with scene, answer, certificates.
 
 
 @dataclass(frozen=True, eq=False)

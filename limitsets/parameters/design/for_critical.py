@@ -1,4 +1,4 @@
-"""Limit sets along the path of a design, on which the critical points move to their targets (Fig. 6 of the paper)."""
+"""Design for wanted critical points (`limitsets.design`), and limit sets along its path (Fig. 6 of the paper)."""
 
 from __future__ import annotations
 
@@ -367,6 +367,7 @@ def _in_the_way(search: TrialLog, trial: Trial) -> list[str]:
 
 
 # ----------------------------------------------------------------
+# Limit sets along the path of a design, on which the critical points move to their targets (Fig. 6 of the paper).
 
 
 Extents = dict[int, list[tuple[float, float]]]

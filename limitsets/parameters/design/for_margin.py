@@ -1,4 +1,4 @@
-"""Robust design: the part with a large proved joint margin, and its cost in throws.
+"""Robust design: the part with a large proved joint margin, and its cost in throws; the last steps included.
 
 There are two goals: every part at rest beyond X lies on the side, and almost every orbit comes to rest there, so that
 an X that no orbit reaches does not count.  Search by floats (`search`), round to manufacturable values, prove
@@ -143,6 +143,7 @@ def _simplex(corner: Sequence[float], edge: float) -> NDArray[np.float64]:
 
 
 # ----------------------------------------------------------------
+# Robust design: the part with a large proved joint margin, and its cost in throws.
 
 
 TOLERANCE = {

@@ -1,4 +1,4 @@
-"""Global search, by floats, for the part with the largest margin.
+"""Global search, by floats, for the part with the largest margin: its bounds, counterweight, and model validity.
 
 The search knows one number, the joint margin by floats (`estimated`); what it ends with `limitsets.robust` proves.
 scipy's differential evolution moves a population of designs; in between, the best one is tried on all corners of the
@@ -274,6 +274,7 @@ def _side_of_centre(scene: Scene) -> int:
 
 
 # ----------------------------------------------------------------
+# Global search, by floats, for the part with the largest margin.
 
 
 # Designs in the population, generations between two looks at all corners, and corners kept as hard.

@@ -1,4 +1,4 @@
-"""Root finding for critical points: scipy's trust region with our Jacobian, then continuation, then other starts.
+"""Root finding for critical points by our Jacobian, continuation and other starts; or the nearest scene.
 
 An impossible scene (a part that tips over on one of its sides) and a scene without a wanted critical point have no
 residual; the trust region treats nan as a step too far and shrinks.
@@ -259,6 +259,7 @@ class TrialLog:
 
 
 # ----------------------------------------------------------------
+# Root finding for critical points: scipy's trust region with our Jacobian, then continuation, then other starts.
 
 
 REACHED = 1e-9

@@ -1,4 +1,4 @@
-"""What a fit found: values with intervals, the scatter, misrecorded sides, the scene that has it all."""
+"""What a fit says: values with intervals, scatter, the scene that has it all, and whether the margin is enough."""
 
 from __future__ import annotations
 

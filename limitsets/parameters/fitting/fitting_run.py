@@ -1,4 +1,4 @@
-"""`limitsets.fit`: speed, centre of mass, surface height and radius of gyration from filmed throws."""
+"""`limitsets.fit`: a scene's quantities from filmed throws; and films that the model makes, to test the intervals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The likelihood of filmed throws (docs/fitting.md), at many parameter points at once.
+"""The likelihood of filmed throws (docs/fitting.md): what the model predicts, what rows are, which throws tell more.
 
 A row says: the decision at the true place before was this one, and the part landed there.  The decision is uncertain by
 the measured place before and the scatter of the speed; the landing by the measured places, by the scatter of the speed
@@ -222,6 +222,7 @@ def _prices(wrong: float, sides: int) -> tuple[float, float]:
 
 
 # ----------------------------------------------------------------
+# The likelihood of filmed throws (docs/fitting.md), at many parameter points at once.
 
 
 # The decision is never sharper than this share of the arm, nor a landing.

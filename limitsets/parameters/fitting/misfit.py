@@ -1,4 +1,4 @@
-"""Does the model fit at all?  Tests of what is left of the landings, at a level of 5 %.
+"""Whether the model fits what is left of the landings, and which misreading of a film would explain it.
 
 Two tests, each at half the level.  Outliers: the likelihood ratio of "some landings scatter more than others" against
 "all alike", its law found by drawing from the fitted model.  Structure: do residuals depend on side, branch and place

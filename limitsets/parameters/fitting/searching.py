@@ -1,4 +1,4 @@
-"""The search of a fit: the most likely machine, and how far it may be from the true one."""
+"""The search of a fit: its start, maxima and profiles, the most likely machine, and how far off it may be."""
 
 from __future__ import annotations
 
@@ -369,6 +369,7 @@ def end_of_profile(
 
 
 # ----------------------------------------------------------------
+# The search of a fit: the most likely machine, and how far it may be from the true one.
 
 
 # Share of the region's volume over all repetitions of the film.

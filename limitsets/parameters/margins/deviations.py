@@ -1,4 +1,4 @@
-"""Deviations of one quantity: the possible readings, their units, and the values that they stand for.
+"""Deviations of one quantity, or of several at once: readings, units, and the values and boxes they stand for.
 
 A deviation has a size, a rational number of its unit: percent of the value, or a length or an angle.  The texts
 written here are input of `limitsets.certify` and of certificates, so every size is a short decimal.

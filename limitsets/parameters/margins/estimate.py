@@ -1,4 +1,4 @@
-"""Estimate of the joint margin by floats: the factor on a vector of tolerances at which a part is fed wrongly.
+"""Estimate of the joint margin by floats, from the least robustly positively invariant set around an orbit.
 
 Fed at X on a side means: every part at rest beyond X lies on the side, and parts come to rest there.  With
 every quantity off by s tolerances the highest place T(s) on another side has risen, the farthest place R(s) on the
@@ -197,6 +197,7 @@ def _closed(params: Throw, cuts: list[_Cuts], lo: Array, hi: Array, landing: flo
 
 
 # ----------------------------------------------------------------
+# Estimate of the joint margin by floats: the factor on a vector of tolerances at which a part is fed wrongly.
 
 
 # Steps towards the margin between two factors.

@@ -1,4 +1,4 @@
-"""The joint margin: the factor on a whole vector of tolerances, up to which goals are proved.
+"""The joint margin: the factor on a whole vector of tolerances up to which goals are proved, by subdivision.
 
 Every quantity is fixed but unknown, except the landing place, which differs at every throw.  The worst corners, each
 a single scene, bracket the factor from above, the proof of the whole box from below.
@@ -366,6 +366,7 @@ class Subdivision:
 
 
 # ----------------------------------------------------------------
+# The joint margin: the factor on a whole vector of tolerances, up to which goals are proved.
 
 
 # Seconds after which the proof of the box ends with what it has.

@@ -96,9 +96,6 @@ def void_of(goals: Sequence[Goal], reach: float | None, unit: str) -> str:
     return ""
 
 
-# ----------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Margin(Tabled):
     """How much one quantity of a scene, or all of its tolerance, may deviate.

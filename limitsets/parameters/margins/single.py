@@ -1,4 +1,4 @@
-"""Margins as functions of X, for "beyond X only one side": where to let the arm end.
+"""Margins of one quantity at a time, proved and refuted; and as functions of X: where to let the arm end.
 
 With growing X the slack to parts on other sides grows, and the slack of the wanted side falls.  Every X therefore has
 two goals: beyond X only the wanted side, and almost every orbit comes to rest on that side beyond X.  The margin is
@@ -228,6 +228,7 @@ def _of_none(query: Query, nominal: Outcome) -> Bracket:
 
 
 # ----------------------------------------------------------------
+# Margins as functions of X, for "beyond X only one side": where to let the arm end.
 
 
 @dataclass(frozen=True, eq=False)

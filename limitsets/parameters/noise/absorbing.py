@@ -1,4 +1,4 @@
-"""Absorption of a noisy chain: probabilities and mean numbers of throws.
+"""Closed classes of a noisy chain, probabilities of absorption, mean numbers of throws and their distribution.
 
 The absorbing sets are a goal (some cells), the closed classes of the rest, and the exits.  With Q the operator on all
 other cells and b the probability of going to one of these in one step, its probability h solves (I - Q) h = b.  Of
@@ -286,6 +286,7 @@ def classes(chain: Transfer) -> tuple[NoisyClass, ...]:
 
 
 # ----------------------------------------------------------------
+# Absorption of a noisy chain: probabilities and mean numbers of throws.
 
 
 RESIDUAL = 1e-12

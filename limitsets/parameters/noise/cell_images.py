@@ -1,4 +1,4 @@
-"""Images of cells under the noise of the throw itself: boxcars of a map and a stratum of its parameter.
+"""Images of cells under the noise of the throw: boxcars, and borders of pieces interpolated between parameters.
 
 In one dimension, with forced branches, cells are cut where the map of each stratum changes its branch, turns or jumps:
 a critical point moves with the noise, and so does the cut.  Otherwise points of the cells are mapped; if neighbouring
@@ -332,6 +332,7 @@ class InterpolatedPieces:
 
 
 # ----------------------------------------------------------------
+# Images of cells under the noise of the throw itself: boxcars of a map and a stratum of its parameter.
 
 
 MapOf = Callable[[float], Any]

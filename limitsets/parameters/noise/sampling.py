@@ -1,4 +1,4 @@
-"""The same statistics by Monte Carlo: many parts, counter-based random numbers, standard errors.
+"""The same statistics by Monte Carlo: many parts, random numbers by counters, standard errors, binomial intervals.
 
 Parts are independent of each other, so the spread between them gives the standard error of every mean.  It is an
 independent check of the transfer operator: the throws are those of `limitsets.orbit`.
@@ -44,6 +44,7 @@ def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> 
 
 
 # ----------------------------------------------------------------
+# The same statistics by Monte Carlo: many parts, counter-based random numbers, standard errors.
 
 
 # Throws that are not counted: the part comes onto the limit set first.

@@ -1,4 +1,4 @@
-"""Statistics of a scene with noise: stationary densities, throws to the goal, sensitivity to the noise level."""
+"""Statistics of a scene with noise: the chain solved at one level, densities, throws to the goal, sensitivities."""
 
 from __future__ import annotations
 
@@ -233,6 +233,7 @@ def _differences(problem: ChainProblem, noise: Scattering, name: str, step: floa
 
 
 # ----------------------------------------------------------------
+# Statistics of a scene with noise: stationary densities, throws to the goal, sensitivity to the noise level.
 
 
 CELLS = 1024

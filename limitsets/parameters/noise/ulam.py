@@ -1,4 +1,4 @@
-"""The transfer operator of a noisy map between the cells of a grid: Ulam's method, generalised cell mapping.
+"""The transfer operator of a noisy map between cells (Ulam's method, generalised cell mapping), in two stages.
 
 P[i, j] is the probability that a state anywhere in cell i, equally likely, is in cell j one step later.  The noise of
 the step itself (speed, tilt: a parameter of the map) and the noise of the landing place, added afterwards, are two
@@ -182,6 +182,7 @@ def landing_stage(
 
 
 # ----------------------------------------------------------------
+# The transfer operator of a noisy map between the cells of a grid: Ulam's method, generalised cell mapping.
 
 
 STRATA = 24

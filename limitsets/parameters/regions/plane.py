@@ -1,4 +1,4 @@
-"""Certified margins: the largest proved square around a point, and the point of a plane that has the most room."""
+"""A whole plane of parameters: cells certified, halved and glued to regions; and the points with the most room."""
 
 from __future__ import annotations
 
@@ -296,6 +296,7 @@ def _code(record: Record) -> int:
 
 
 # ----------------------------------------------------------------
+# Certified margins: the largest proved square around a point, and the point of a plane that has the most room.
 
 
 # Halvings of a size; it is lessened by this share, against the rounding of its ends.

@@ -1,4 +1,4 @@
-"""What is proved of one cell of parameters: a record that holds for every parameter in it.
+"""What is proved of one cell of parameters: a record that holds for every parameter in it, orbits and jogs included.
 
 A cell of parameters is a scene with a tolerance, fixed but unknown: the proofs of `limitsets.proofs` are about it as
 they are about any.  Here they are asked for, as cheaply as may be, and put together.
@@ -250,6 +250,7 @@ def _held(box: ParameterBox, near: Return, k: int, lo: float, hi: float) -> tupl
 
 
 # ----------------------------------------------------------------
+# What is proved of one cell of parameters: a record that holds for every parameter in it.
 
 
 # Cells per side where nothing is known yet; more where nothing attracts with them.

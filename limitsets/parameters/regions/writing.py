@@ -1,4 +1,4 @@
-"""The certificate of a plane: for each cell of parameters all that a recheck needs, and nothing that it has to trust.
+"""The certificate of a plane of parameters: its axes, and for each cell all that a recheck needs, nothing to trust.
 
 The file is laid out as every certificate (docs/certificates.md).  The cells of the arm stand one after another, those
 of all cells of parameters together; borders that several cells of parameters share stand once.
@@ -140,6 +140,8 @@ def placed(scene: Scene, axes: Sequence[CellAxis]) -> Scene:
 
 
 # ----------------------------------------------------------------
+# The certificate of a plane: for each cell of parameters all that a recheck needs, and nothing that it has to
+# trust.
 
 
 STARTS = ("every", "almost-every", "from", "cells")

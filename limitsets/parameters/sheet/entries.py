@@ -1,4 +1,4 @@
-"""One line of a tolerance sheet: a margin as plain data, to be written to a file and read again.
+"""One line of a tolerance sheet as plain data, and checkpoints: each goes to a file that a later run reads again.
 
 A `Margin` holds the cells of its proof.  A line of the sheet is thousands of times smaller: the bracket, the orbit at
 its upper end, and the names of the files that prove both.

@@ -1,4 +1,4 @@
-"""The robustness of a scene as one answer: margins, the best X, noise, and the parts left out with their reasons."""
+"""The robustness of a scene as one answer: margins, their curve over X, noise, and what is left out, with reasons."""
 
 from __future__ import annotations
 
@@ -228,6 +228,7 @@ def scattering_from(scene: Scene, texts: Mapping[str, str], law: str = "gaussian
 
 
 # ----------------------------------------------------------------
+# The robustness of a scene as one answer: margins, the best X, noise, and the parts left out with their reasons.
 
 
 PARTS = ("margins", "joint", "curve", "noise", "audit")

@@ -1,4 +1,4 @@
-"""The audit: every assumption of the minimal model, evaluated on the limit set and on the whole domain.
+"""The audit: every assumption of the minimal model on the limit set and the whole domain, and the effects called for.
 
 An assumption is broken if its number is proved to be on the wrong side of its limit at a tested throw; it holds if the
 number is proved to be on the right side on every cell.  Otherwise the answer is sampled.

@@ -1,4 +1,4 @@
-"""Decide by enclosures of its number whether an assumption is broken or holds."""
+"""Whether an assumption is broken or holds, by enclosures of its number, at the states where it is asked."""
 
 from __future__ import annotations
 
@@ -157,6 +157,7 @@ def places(scene: Scene, box: ParameterBox) -> Places:
 
 
 # ----------------------------------------------------------------
+# Decide by enclosures of its number whether an assumption is broken or holds.
 
 
 Flags = NDArray[np.bool_]

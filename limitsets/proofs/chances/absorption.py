@@ -1,4 +1,4 @@
-"""Brackets of the probabilities of absorption, of quantiles and means, for a scene whose throws scatter.
+"""Brackets of the probabilities of absorption, of quantiles and means, for a scene that scatters: what is proved.
 
 Within n throws both bounds come from n steps from V_0 = 1 on the target.  The mean from below is that of min(T, n);
 from above it is a finite V >= 1 + K V off the absorbing states: with V_(n+1) <= V_n + c for c < 1,
@@ -177,6 +177,7 @@ class AbsorptionBrackets(Tabled):
 
 
 # ----------------------------------------------------------------
+# Brackets of the probabilities of absorption, of quantiles and means, for a scene whose throws scatter.
 
 
 CELLS, THROWS = 4000, 200

@@ -258,9 +258,6 @@ class Windows:
         return lo, hi
 
 
-# ----------------------------------------------------------------
-
-
 ROUNDING = 2.0**-40
 # Entries merged into one at most, and operations that make one, rounded up.
 MERGED = 1024

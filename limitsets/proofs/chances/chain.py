@@ -1,4 +1,4 @@
-"""The noisy chain of a scene on its cells: which places absorb, and one throw of a bound."""
+"""The noisy chain of a scene on its cells: which places absorb, one throw of a bound, and the certificate."""
 
 from __future__ import annotations
 

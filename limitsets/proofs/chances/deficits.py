@@ -1,4 +1,4 @@
-"""How far the mean after a throw may lie above its chord on a cell, in three ways.
+"""How far the mean after a throw may lie above its chord on a cell, for laws given as staircases.
 
 By the borders of strata and branches, where the density of the speed jumps; by the nodes at which the slope of the
 averaged function falls; and by all that this function may be where throws land.
@@ -218,6 +218,7 @@ def _span(target: Nodes, side: NDArray[np.int64], lo: Array, hi: Array) -> Span:
 
 
 # ----------------------------------------------------------------
+# How far the mean after a throw may lie above its chord on a cell, in three ways.
 
 
 Index = NDArray[np.int64]

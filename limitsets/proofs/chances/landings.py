@@ -1,4 +1,4 @@
-"""Where throws from places land, and how that changes with place and speed, with proved bounds.
+"""Where throws from places land and whether they flip, and how that changes with place and speed, with proved bounds.
 
 The impact angle p of a start x solves x = P(p), P(p) = kappa p / 2 + S(p); the part comes to rest at x + D(p), less
 the shift of a flip (`proofs/prover/two_throws.py`).  With kappa above the vertex's distance from the centre of mass P
@@ -67,6 +67,7 @@ def moments(phi: Array, most: int = 2) -> Moments:
 
 
 # ----------------------------------------------------------------
+# Where throws from places land, and how that changes with place and speed, with proved bounds.
 
 
 NEWTON = 12

@@ -1,4 +1,4 @@
-"""The game of a controller who knows a set of cells that holds the part, and asks one question after every throw.
+"""The game of a controller who knows a set of cells and asks one question after every throw; beliefs as bits.
 
 A belief B is a set of cells; after a throw and an answer it is the outer image of B, cut with the cells in which that
 answer may come.  The game asks for nothing but the image of each cell under each action: any map's graph serves.
@@ -88,6 +88,7 @@ class Kept:
 
 
 # ----------------------------------------------------------------
+# The game of a controller who knows a set of cells that holds the part, and asks one question after every throw.
 
 
 Mask: TypeAlias = NDArray[np.bool_]

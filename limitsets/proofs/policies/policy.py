@@ -1,4 +1,4 @@
-"""Policies as tables: in which state to throw how, and which state comes after which answer."""
+"""Policies as tables: which throw in which state, which state after which answer; and the search for one."""
 
 from __future__ import annotations
 

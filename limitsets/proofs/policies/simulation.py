@@ -1,4 +1,4 @@
-"""A policy thrown many times: random starts, noise anywhere in its bounds and at them, errors of the sensor too."""
+"""A policy thrown many times with noise and errors of the sensor; and starts from which no policy can do it."""
 
 from __future__ import annotations
 
@@ -196,6 +196,7 @@ def not_within(
 
 
 # ----------------------------------------------------------------
+# A policy thrown many times: random starts, noise anywhere in its bounds and at them, errors of the sensor too.
 
 
 Floats = NDArray[np.float64]

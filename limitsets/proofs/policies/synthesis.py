@@ -1,4 +1,4 @@
-"""One bit of feedback: which throw on which answer brings the part to a wanted side and place."""
+"""One bit of feedback: which throw on which answer brings the part to a wanted side and place; its certificate."""
 
 from __future__ import annotations
 
@@ -127,6 +127,7 @@ def _images(cover: Cover) -> Arrays:
 
 
 # ----------------------------------------------------------------
+# One bit of feedback: which throw on which answer brings the part to a wanted side and place.
 
 
 class Limits(NamedTuple):

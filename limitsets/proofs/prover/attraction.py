@@ -1,4 +1,4 @@
-"""Attraction: every start on the arm enters the attracting cells and stays there.
+"""Attraction: every start on the arm enters the attracting cells and stays there; and trapping.
 
 An integer rank falls strictly along every image off the attracting cells, and attracting cells lead to attracting cells
 of the same component only; neither needs the map to be continuous.

@@ -1,4 +1,4 @@
-"""The proved basin: starts that are proved to come to the attracting cells and stay there.
+"""The proved basin: starts, also those near the hinge, that come to the attracting cells and stay there.
 
 Every start in a cell of the basin either comes to the attracting cells, by ranks that fall, or belongs to a set of
 length zero.  Off the attracting cells a cell of the basin is of one of three kinds:
@@ -234,6 +234,7 @@ def _beyond(found: Cover, side: int, x: float) -> NearHinge:
 
 
 # ----------------------------------------------------------------
+# The proved basin: starts that are proved to come to the attracting cells and stay there.
 
 
 Mask = NDArray[np.bool_]

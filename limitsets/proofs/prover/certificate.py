@@ -1,4 +1,4 @@
-"""Writing a certificate: all data that a recheck needs, none that it has to trust.
+"""Writing a certificate: all data that a recheck needs, none that it has to trust; and the recheck from Python.
 
 One zip, stored: `header.json` (claims, the map's formulas for people, the scene as written, hashes) and `arrays.npz`
 (per box of parameters: cell borders, target cells per branch, branch, rank, component, brackets of the impact angle).
@@ -154,6 +154,7 @@ def recheck(
 
 
 # ----------------------------------------------------------------
+# Writing a certificate: all data that a recheck needs, none that it has to trust.
 
 
 FORMAT, VERSION = "limitsets-proof", 2

@@ -1,4 +1,4 @@
-"""Cells for a proof, and the enclosures of their images.
+"""Cells for a proof and the enclosures of their images, from the unstable fixed point of the jog on (h > 0).
 
 The cells of side i run from just beyond a_i to the arm's end, graded towards a_i; starts nearer to a_i are treated
 in `near_hinge.py`.  Where the arm's surface is above the joint they begin just beyond the unstable fixed point of
@@ -297,6 +297,7 @@ def leaves(box: ParameterBox, side: int, point: FixedPoint, x: float) -> tuple[f
 
 
 # ----------------------------------------------------------------
+# Cells for a proof, and the enclosures of their images.
 
 
 # Share of a side's extent that is left to the argument near the joint.

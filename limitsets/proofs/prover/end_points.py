@@ -1,4 +1,4 @@
-"""End points of the limit set, each between two proved numbers, outer and inner.
+"""End points of the limit set, each between two proved numbers, from images rounded outward and inward.
 
 The limit set is the intersection L of N, F(N), F(F(N)), ..., where N are the attracting cells, which F maps into
 themselves, and F is read with both one-sided limits where the decision between jog and flip changes.
@@ -282,6 +282,7 @@ def at_rest(image: Callable[[Intervals], Intervals], union: Intervals) -> tuple[
 
 
 # ----------------------------------------------------------------
+# End points of the limit set, each between two proved numbers, outer and inner.
 
 
 class CriticalBracket(NamedTuple):

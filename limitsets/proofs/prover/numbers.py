@@ -1,4 +1,4 @@
-"""Intervals with their derivatives (forward mode): narrow enclosures of functions over boxes.
+"""Numbers of the prover: rational intervals, arrays of intervals, and intervals with derivatives (forward mode).
 
 If a formula contains an uncertain quantity several times, its natural interval extension is too wide, because the
 places vary independently (dependency problem).  The mean-value form reduces the excess.  With c in the box and f'
@@ -320,6 +320,7 @@ def _as(value: object) -> Intervals | None:
 
 
 # ----------------------------------------------------------------
+# Intervals with their derivatives (forward mode): narrow enclosures of functions over boxes.
 
 
 Number: TypeAlias = Any

@@ -1,4 +1,4 @@
-"""Periodic orbits: proof of existence, of local uniqueness, and of stability or instability.
+"""Orbits replayed in interval arithmetic, and periodic orbits: existence, local uniqueness, stability or instability.
 
 G is the throw composed along an itinerary, x a number near one of its fixed points, I a small interval around x.
 
@@ -113,6 +113,7 @@ def replay(
 
 
 # ----------------------------------------------------------------
+# Periodic orbits: proof of existence, of local uniqueness, and of stability or instability.
 
 
 Pair = tuple[float, float]

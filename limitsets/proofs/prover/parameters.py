@@ -1,4 +1,4 @@
-"""The box of map parameters given by a scene's decimals, tolerances and noise.
+"""The box of map parameters given by a scene's decimals, tolerances and noise, and the effects that it can hold.
 
 From the text of the scene, in exact rational spans (`rational.py`), through the same formulas of `geometry` that floats
 go through; only the last step rounds to doubles, outward.
@@ -219,6 +219,7 @@ def whole(scene: Scene, tolerance: Mapping[str, str]) -> SceneBox:
 
 
 # ----------------------------------------------------------------
+# The box of map parameters given by a scene's decimals, tolerances and noise.
 
 
 NARROWER = "lower the tolerance or noise"

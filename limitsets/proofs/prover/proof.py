@@ -1,4 +1,4 @@
-"""What was proved of a scene: the claims, their certificate, and their tables for JSON."""
+"""What was proved of a scene, or refuted by an orbit: the claims, their certificates, and their tables for JSON."""
 
 from __future__ import annotations
 
@@ -137,6 +137,7 @@ def write_refutation(
 
 
 # ----------------------------------------------------------------
+# What was proved of a scene: the claims, their certificate, and their tables for JSON.
 
 
 SHARES = ("share", "leaves", "creeps", "open")

@@ -1,4 +1,4 @@
-"""One query: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
+"""One query: whether goals hold for all of a box of scenes and every noise; worst orbits; the weakest of claims.
 
 Cells are refined where needed: first some hundreds a side, then borders spread evenly over the attracting cells.
 """
@@ -241,6 +241,7 @@ def _weakest(near: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 # ----------------------------------------------------------------
+# One query: whether goals hold for all of a box of scenes, and every sequence of throws with some noise.
 
 
 # Cells per side to begin with, then borders over all that attracts, and pieces of a parameter where a cell is open to

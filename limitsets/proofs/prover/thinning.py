@@ -1,4 +1,4 @@
-"""A density bound by the Perron-Frobenius operator: almost every orbit leaves some cells (thinning).
+"""Expansion on attracting cells, and a density bound (Perron-Frobenius): almost every orbit leaves some cells.
 
 Let the starts be spread evenly over the cells, with density 1, and consider only those that have not left.  After one
 more throw their density at y is the sum of (density at x) / |slope at x| over all x that are thrown to y.  Along a run
@@ -108,6 +108,7 @@ def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any]]
 
 
 # ----------------------------------------------------------------
+# A density bound by the Perron-Frobenius operator: almost every orbit leaves some cells (thinning).
 
 
 Mask = NDArray[np.bool_]

@@ -1,4 +1,4 @@
-"""Two throws with the same parameters: a bound of the place they lead to, in every scene of a box.
+"""Two throws with the same parameters: a bound of where they lead in every scene of a box, by impact angles.
 
 Cells proved for a box of parameters allow other parameters at every throw, as time-varying noise does.  Time-invariant
 parameters lead less far: the scene whose slow throws jog to the highest place is not the one whose fast throws then
@@ -154,6 +154,7 @@ class Formulas:
 
 
 # ----------------------------------------------------------------
+# Two throws with the same parameters: a bound of the place they lead to, in every scene of a box.
 
 
 # Variables before the part's lengths: both angles, where the first throw lands beyond its place, kappa, surface height.

@@ -1,4 +1,4 @@
-"""Grids: uniform, or graded so that cells shrink in proportion to their distance from an anchor."""
+"""Cells: the domain of a map, grids on it, uniform or graded, and the algebra of sets of cells."""
 
 from __future__ import annotations
 
@@ -121,6 +121,7 @@ def as_domain(domain: Domain | ArrayLike) -> Domain:
 
 
 # ----------------------------------------------------------------
+# Grids: uniform, or graded so that cells shrink in proportion to their distance from an anchor.
 
 
 # Graded cells grow with their distance from the anchor up to this share of the side's extent and are equal beyond:

@@ -1,4 +1,4 @@
-"""Build the transition graph of a map on a grid."""
+"""Build the transition graph of a map on a grid, if the graph fits in memory."""
 
 from __future__ import annotations
 
@@ -83,6 +83,7 @@ def require_memory(grid: Grid, method: str) -> None:
 
 
 # ----------------------------------------------------------------
+# Build the transition graph of a map on a grid.
 
 
 @arguments_checked

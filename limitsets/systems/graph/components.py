@@ -1,4 +1,4 @@
-"""Strongly connected components, their order, and reachability, on ranges.
+"""Strongly connected components, reachability and the condensation, on ranges of cells.
 
 `strong_components` is Tarjan's algorithm in Pearce's form (Inf. Proc. Letters 116, 2016) with an explicit stack: it
 walks each cell's runs of targets where they lie.  Components come out in reverse topological order, so a component

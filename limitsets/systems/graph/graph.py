@@ -1,4 +1,4 @@
-"""The transition graph: cells and, last, exits as nodes; an edge where the image of a cell meets another.
+"""The transition graph: cells and, last, exits as nodes; an edge where an image meets a cell; its Morse graph.
 
 For networkx it is a directed graph with its own backend (`backend.py`); it carries its map and its grid.
 """

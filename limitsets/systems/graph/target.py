@@ -1,4 +1,4 @@
-"""The grid of the images, and the closed cells that an interval meets."""
+"""The grid of the images: the closed cells that an interval meets, as boxes and as ranges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The map contract: the functions of a discrete-time map on (x, side), and its registration.
+"""The map contract: the functions of a discrete-time map on (x, side), its registration, and corners of its parameters.
 
 A map is a NamedTuple of parameters; its class decides which kernels run (`limitsets.jit.generic`).  Drivers are
 written once, here and in the rooms above, and know maps only through these functions:

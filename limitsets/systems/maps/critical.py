@@ -1,4 +1,4 @@
-"""Switching points of a one-dimensional map; for the throw all critical points of the paper, r_i and further ones.
+"""Bisection along a line, and with it the switching points of a map; for the throw all critical points of the paper.
 
 A side is sampled, densely towards its anchor.  Every change between two samples is bisected down to adjacent floats,
 and every extremum of the deciding number towards zero is followed to its top, so that two changes between a pair of
@@ -143,6 +143,7 @@ def hidden(value_of: Callable[[Array], Array], x: Array) -> Array:
 
 
 # ----------------------------------------------------------------
+# Switching points of a one-dimensional map; for the throw all critical points of the paper, r_i and further ones.
 
 
 SAMPLES = 4096

@@ -1,4 +1,4 @@
-"""Loops over whole arrays, written once for every map.
+"""Loops over whole arrays, written once for every map: images, orbits, random numbers by counters, Lyapunov exponents.
 
 A batch is all on one side: what the side needs is gathered once and the loop vectorises.  States of a map in more
 than one dimension travel as a tuple of arrays, one per coordinate.
@@ -85,6 +85,7 @@ def normal_pair(seed: int, a: int, b: int) -> tuple[float, float]:
 
 
 # ----------------------------------------------------------------
+# Loops over whole arrays, written once for every map.
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Monotone pieces: a one-dimensional map cut at switching points, turning points and jumps.
+"""Steps along forced branches at many parameter points, and the monotone pieces of a one-dimensional map.
 
 On a piece the map is a monotone function of x.  The image of an interval of it is then known from the two ends, and
 one symbol names what an orbit does there: limit sets by end points and cycles by itinerary stand on these cuts.
@@ -236,6 +236,7 @@ def at_points(
 
 
 # ----------------------------------------------------------------
+# Monotone pieces: a one-dimensional map cut at switching points, turning points and jumps.
 
 
 # A step this large between adjacent floats is a jump; the root of a grazing throw moves by the root of an ulp.

@@ -1,4 +1,4 @@
-"""Basin entropy and boundary basin entropy.
+"""Basin entropy and boundary basin entropy, from boxes of cells.
 
 The cells are grouped into boxes.  In a box that has the share p_j of its decided starts in basin j the entropy is
 S = -sum p_j ln p_j; the basin entropy is its mean over all boxes, the boundary basin entropy that over the boxes with
@@ -187,6 +187,7 @@ def largest_entropy(mass: Floats, open_to: NDArray[np.bool_], rest: Floats) -> F
 
 
 # ----------------------------------------------------------------
+# Basin entropy and boundary basin entropy.
 
 
 # Cells along each side of a box.

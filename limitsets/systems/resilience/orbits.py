@@ -1,4 +1,4 @@
-"""Random starts in cells, and where their orbits come to.
+"""Inner and outer basins on cells, and random starts in cells whose orbits come to an attractor.
 
 Cells end at the border of the domain: what leaves is lost to them.  Orbits of starts that a caller asks for may come
 back: one has left for good where it ends beyond the border and was there for the last half of its steps.
@@ -140,6 +140,7 @@ def told(caption: str, undecided: float, cut: bool = False) -> str:
 
 
 # ----------------------------------------------------------------
+# Random starts in cells, and where their orbits come to.
 
 
 Floats = NDArray[np.float64]

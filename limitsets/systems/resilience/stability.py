@@ -1,4 +1,4 @@
-"""Basin stability: the share of all starts that come to an attractor.
+"""How stable a basin is: the share of starts in it, steps until they arrive, and the smallest push out of it.
 
 Source: Menck, Heitzig, Marwan, Kurths, "How basin stability complements the linear-stability paradigm", Nature Physics
 9, 2013; the interval of a sampled share: Clopper and Pearson, Biometrika 26, 1934.
@@ -218,6 +218,7 @@ def _bounds(parted: Colours) -> list[tuple[int | None, float | None]]:
 
 
 # ----------------------------------------------------------------
+# Basin stability: the share of all starts that come to an attractor.
 
 
 # A sampled share lies in its interval with this probability.

@@ -1,4 +1,4 @@
-"""Attractors of a transition graph: their extents (from cells) and their dynamics (from one long orbit)."""
+"""Attractors of a transition graph: extents (from cells), dynamics (from an orbit), cells that are too coarse."""
 
 from __future__ import annotations
 
@@ -60,6 +60,7 @@ def spurious(graph: TransitionGraph, parts: int = 8, **options: Any) -> tuple[Ce
 
 
 # ----------------------------------------------------------------
+# Attractors of a transition graph: their extents (from cells) and their dynamics (from one long orbit).
 
 
 # Steps thrown away before anything is counted.

@@ -1,4 +1,4 @@
-"""Basins: the ends of the paths from each cell."""
+"""Basins: the ends of the paths from each cell, and recurrent cells in which no orbit stays."""
 
 from __future__ import annotations
 
@@ -248,6 +248,7 @@ def _met(axes: list[_Axis], lo: Floats, hi: Floats, some: Integers, pad: int) ->
 
 
 # ----------------------------------------------------------------
+# Basins: the ends of the paths from each cell.
 
 
 # A recurrent set of more cells is hardly one unstable cycle.

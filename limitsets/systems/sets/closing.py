@@ -1,4 +1,4 @@
-"""Orbits that close: Newton's method at all points of a cycle at once, then `image` itself has to run through it.
+"""Periodic orbits as answers, and orbits that close: by Newton's method, and then under `image` itself.
 
 For points x_0 .. x_p-1 with slopes S_j the corrections d_j solve S_j d_j - d_j+1 = x_j+1 - f(x_j), p equations at once,
 so that no point inherits the errors of those before it.  A computed step differs from the exact one by rounding,
@@ -115,6 +115,7 @@ def require_period(up_to: int) -> None:
 
 
 # ----------------------------------------------------------------
+# Orbits that close: Newton's method at all points of a cycle at once, then `image` itself has to run through it.
 
 
 # Rounding of a step in units of the last place; the largest correction, and the largest uncertainty of a point that is

@@ -1,7 +1,7 @@
-"""A limit set by its end points: the intersection of all forward images of the attracting cells.
+"""A limit set by its end points: unions of intervals, their images, and the intersection of all forward images.
 
-In one dimension the attracting cells N are intervals, and F(N), F(F(N)), ... are computed from end points alone
-(this file).  Where the map expands, every end soon becomes a forward image of the one-sided limit
+In one dimension the attracting cells N are intervals, and F(N), F(F(N)), ... are computed from end points alone.
+Where the map expands, every end soon becomes a forward image of the one-sided limit
 at a point inside the limit set, where the map changes its branch or turns; it then no longer moves, and is known to
 the last digits.  Where the map contracts, the ends close in geometrically.
 
@@ -303,6 +303,7 @@ class IntervalMap:
 
 
 # ----------------------------------------------------------------
+# A limit set by its end points: the intersection of all forward images of the attracting cells.
 
 
 # Near a_i of the throw an orbit takes some 1200 throws to get away from 1e-9 of the arm; beyond this the map is no

@@ -1,4 +1,4 @@
-"""Invariant measures by Ulam's method: the stationary distribution of a chain on cells.
+"""Invariant measures by Ulam's method on a chain of cells, and topological entropy by a Markov diagram.
 
 Which share of a cell goes to which cell is a Markov chain on finitely many states.  Its
 stationary distributions are the mixtures of one for each closed class, and each of those is found by repeated steps.
@@ -152,6 +152,7 @@ def ulam_matrix(graph: TransitionGraph, cells: NDArray[np.int64]) -> UlamMatrix:
 
 
 # ----------------------------------------------------------------
+# Invariant measures by Ulam's method: the stationary distribution of a chain on cells.
 
 
 MOST_POWERS = 100_000

@@ -451,9 +451,6 @@ def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> 
     )
 
 
-# ----------------------------------------------------------------
-
-
 MOST_STARTS = 20_000
 
 

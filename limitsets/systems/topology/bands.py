@@ -1,4 +1,4 @@
-"""Bands: an attractor as a union of intervals, the intersection of all images of its cells, and what orbits do there.
+"""Bands: an attractor as a union of intervals, whether it is one attractor, and what orbits do there.
 
 As `limitsets.systems.sets.end_points`, in compiled code: images of intervals come from their ends and from the
 one-sided limits at the ends of pieces.

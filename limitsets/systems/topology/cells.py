@@ -1,4 +1,4 @@
-"""Cells of all sides, each within one piece, their images and what these meet.
+"""Cells of all sides, each within one piece, their images, and the closed components among them.
 
 A piece is monotone, so the image of a cell is the interval between the images of its ends.  Where all of a cell moves
 one way on its own side it is passed: its image counts without the cell itself, which every orbit leaves.

@@ -1,4 +1,4 @@
-"""Orbits that check what cells and intervals say: they stay, and they visit every band.  Means along orbits."""
+"""Orbits that check what cells and intervals say, means along them, and the attracting cycle that a set holds."""
 
 from __future__ import annotations
 

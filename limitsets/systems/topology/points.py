@@ -1,4 +1,4 @@
-"""The topology of the attractors of many parameter points: one compiled loop, finer cells where doubt remains.
+"""The topology of attractors of many parameter points, one compiled loop; and how far they reach at points near by.
 
 Cells find what may be an attractor; its bands, jogs and order come from intervals, and orbits check both.  A point at
 which these do not agree is looked at again on finer cells.  What is in doubt then is undecided, with the reason.
@@ -240,6 +240,7 @@ def reaches(
 
 
 # ----------------------------------------------------------------
+# The topology of the attractors of many parameter points: one compiled loop, finer cells where doubt remains.
 
 
 # Cells and samples a side: from coarse to fine; no edge of some is one of others, for cycles may lie on them.

@@ -1,4 +1,4 @@
-"""Scratch arrays of the topology of one parameter point; made once for a block of points and a number of cells."""
+"""Arrays of the topology of one parameter point: scratch, made once for a block of points, and what is told of each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Orbits that refute a goal: proposed in floats, with the noise chosen at every throw, and proved in intervals.
+"""Orbits and starts that refute a goal: proposed in floats, with the noise chosen at every throw, proved in intervals.
 
 Random throws miss what the noise can do at its worst; reachability, one state per cell, does not.  An orbit found is
 replayed from its start with every decision proved and every state enclosed.

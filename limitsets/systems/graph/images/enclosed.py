@@ -1,4 +1,4 @@
-"""Rigorous images: boxes proved to hold the image of every point of a cell, for every parameter of a box.
+"""Rigorous images: boxes proved to hold the image of every point of a cell, for every parameter of a box, and hulls.
 
 Cells whose branch is not proved are cut along every axis, and in the parameter that is known least, so that within one
 piece the decision and the image use nearly the same parameters; each branch then gets the hull of the pieces on which
@@ -177,6 +177,7 @@ class Hulls:
 
 
 # ----------------------------------------------------------------
+# Rigorous images: boxes proved to hold the image of every point of a cell, for every parameter of a box.
 
 
 # Cells done at a time: few enough for the processor's cache, and for memory that is used again.

@@ -1,4 +1,4 @@
-"""Image methods that sample: from images of points to boxes of target cells.
+"""Image methods that sample points or corners of a cell: from images of points to boxes of target cells.
 
 A cell all of whose points take one branch gets one box, in a compiled pass; the few others are done apart
 (`undecided.py`).
@@ -58,6 +58,7 @@ def end_points(grid: Grid, side: int, **_: Any) -> SamplePoints:
 
 
 # ----------------------------------------------------------------
+# Image methods that sample: from images of points to boxes of target cells.
 
 
 DECIDED, EMPTY, MIXED = 1, 0, 2

@@ -1,4 +1,4 @@
-"""Images of cells on which the branch changes, or the map turns or jumps.
+"""Images of cells on which the branch changes, or the map turns or jumps; and what an image method gives.
 
 In one dimension such a cell is cut into equal parts, where the branch changes and where the image jumps on a branch
 (a floor), and each piece gets its image, from its least value to its greatest.  Otherwise the cell gets the
@@ -61,6 +61,7 @@ class SamplePoints:
 
 
 # ----------------------------------------------------------------
+# Images of cells on which the branch changes, or the map turns or jumps.
 
 
 # Pieces that one cell may be cut into, at first and at last: more than six are rare, more than the last an error.

@@ -1,4 +1,4 @@
-"""The exponential without branch or library call, so that a loop over an array vectorises (math.exp in one does not).
+"""What textbook maps share: their usual domains, the answers of `image_box`, and an exponential that vectorises.
 
 exp x = 2^k exp r with k = round(x / ln 2) and abs(r) <= ln(2)/2; exp r is summed from its series. 2^k is built from
 the bits of k, in two factors because k leaves the range of a double's exponent at either end.
@@ -116,6 +116,8 @@ def plane(a: Pair, side: int, branch: int) -> Plane:
 
 
 # ----------------------------------------------------------------
+# The exponential without branch or library call, so that a loop over an array vectorises (math.exp in one does
+# not).
 
 
 # exp r = 1 + r + r^2 (E2 + E3 r + ...). The first term left out, r^14/14!, is below 5e-18.
