@@ -39,8 +39,9 @@ lint: .venv/dev.stamp  ## ruff: rules and format
 types: .venv/dev.stamp  ## mypy
 	$(PY) -m mypy
 
-contracts: .venv/dev.stamp  ## which room may import which
+contracts: .venv/dev.stamp  ## which wing may import which, and the sizes on record
 	.venv/bin/lint-imports
+	$(PY) -m tests.sizes
 
 bench: .venv/bench.stamp  ## the benchmarks, with their rivals in the same run
 	$(PY) -m pytest tests/bench -s --benchmark-quiet

@@ -1,6 +1,8 @@
-"""The count of lines of code, on files that are counted by hand."""
+"""The count of lines of code and the sizes of the house, on files that are counted by hand."""
 
-from tests import lines
+import ast
+
+from tests import lines, sizes
 
 SOURCE = '''"""A docstring
 of two lines."""
@@ -46,5 +48,58 @@ def test_the_table_has_a_row_for_each_room(tmp_path, capsys):
 
 def test_this_very_package_is_counted():
     rooms = lines.counted(lines.PACKAGE)
-    assert {"thrower", "checker", "."} <= rooms.keys()
+    assert {"feeder", "checker", "."} <= rooms.keys()
     assert 10_000 < sum(sum(files.values()) for files in rooms.values()) < 100_000
+
+
+# By hand: two definitions, four assignments, if, for and its body, return, two calls as statements.
+HOUSE = '''
+"""A docstring."""
+
+@kernel
+def compiled(a, b, c, d, e, f, g):
+    found = compiled(a, b, c, d, e, f, g)
+
+def plain(found, x):
+    """Another."""
+    y = [k for k in x if k and x or k]
+    if found.found is None:
+        for each in x:
+            y = found
+    compiled(1, 2, 3, 4, 5, 6, 7)
+    plain(1, 2, 3, 4, 5, 6, 7, found=8)
+    return y
+
+z = 0
+'''
+
+
+def test_sizes_of_a_file_counted_by_hand(tmp_path):
+    (tmp_path / "house.py").write_text(HOUSE)
+    (tmp_path / "tests").mkdir()
+    sizes_now = sizes.measured(tmp_path, tmp_path / "tests")
+    assert sizes_now["statements"] == 2 + 4 + 1 + 1 + 1 + 2
+    # a comprehension, `and`, `or`, if, for
+    assert sizes_now["largest_complexity"] == 1 + 5
+    # not the call of a kernel, nor the one within it
+    assert sizes_now["calls_with_many_positional_arguments"] == 1
+    # in `compiled` one, in `plain` the argument, found.found, its use, the keyword
+    assert sizes_now["identifiers_found"] == 1 + 1 + 2 + 1 + 1
+    assert sizes_now["entries"] == 2
+
+
+def test_a_size_above_the_record_fails(tmp_path, monkeypatch, capsys):
+    record = tmp_path / "sizes.toml"
+    record.write_text("statements = 3\nfiles = 2\n")
+    monkeypatch.setattr(sizes, "RECORD", record)
+    monkeypatch.setattr(sizes, "measured", lambda: {"statements": 3, "files": 2})
+    assert sizes.main([]) == 0
+    monkeypatch.setattr(sizes, "measured", lambda: {"statements": 4, "files": 1})
+    assert sizes.main([]) == 1
+    assert "larger than tests/sizes.toml allows (3)" in capsys.readouterr().out
+    assert sizes.main(["--write"]) == 0
+    assert record.read_text() == "statements = 4\nfiles = 1\n"
+
+
+def test_a_docstring_is_no_statement():
+    assert sizes.statements(ast.parse('"""Text."""\nx = """Text."""\n')) == 1
