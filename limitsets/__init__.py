@@ -16,9 +16,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
-from importlib.util import spec_from_loader
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -173,14 +171,18 @@ __all__ = [
 ]
 
 
-class _Rooms(MetaPathFinder, Loader):
-    """Find a room, and what is in it, under its public name: the module itself, never a second copy."""
+class _Rooms:
+    """Find a room, and what is in it, under its public name: the module itself, never a second copy.
+
+    A finder and loader without their base classes: `importlib.abc` takes longer to import than the rest of this file.
+    """
 
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
         package, _, name = fullname.partition(".")
         room = name.partition(".")[0]
         known = package == __name__ and room in _PUBLIC and ":" not in _PUBLIC[room]
-        return spec_from_loader(fullname, self) if known else None
+        loader: Any = self
+        return ModuleSpec(fullname, loader) if known else None
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         room, _, rest = spec.name.removeprefix(f"{__name__}.").partition(".")
@@ -190,8 +192,8 @@ class _Rooms(MetaPathFinder, Loader):
 
     def exec_module(self, module: ModuleType) -> None:
         """Give the module its own name back: the import machinery has just set that of the alias."""
-        spec = module.__spec__
-        if spec is not None and spec.loader is self:
+        spec: Any = module.__spec__
+        if spec.loader is self:
             module.__spec__ = spec.loader_state
 
 
