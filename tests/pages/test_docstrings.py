@@ -10,7 +10,6 @@ import re
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 
 import pytest
 
@@ -18,23 +17,22 @@ import limitsets
 
 GALLERY = (Path(__file__).resolve().parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8")
 NAMESPACES = ("plot", "maps", "resilience", "engine")
-INNER = {"__main__", "cli", "files", "progress", "tables"}  # no public names
+INNER = {"cli", "files", "progress", "tables"}  # no public names
 
 
-def names_of(module):
+def names_of(module, short):
     """The public names of a module that are no modules themselves, with what they stand for."""
-    found = ((name, getattr(module, name)) for name in module.__all__)
-    short = module.__name__.replace("limitsets", "ls")
-    return {f"{short}.{name}": thing for name, thing in found if not inspect.ismodule(thing)}
+    things = ((name, getattr(module, name)) for name in module.__all__)
+    return {f"{short}.{name}": thing for name, thing in things if not inspect.ismodule(thing)}
 
 
-TOP = names_of(limitsets)
+TOP = names_of(limitsets, "ls")
 for space in NAMESPACES:
-    TOP |= names_of(import_module(f"limitsets.{space}"))
+    TOP |= names_of(import_module(f"limitsets.{space}"), f"ls.{space}")
 ROOMS = dict(TOP)
-for each in iter_modules(limitsets.__path__):
-    if each.name not in INNER and hasattr(import_module(f"limitsets.{each.name}"), "__all__"):
-        ROOMS |= names_of(import_module(f"limitsets.{each.name}"))
+for room, place in limitsets._PUBLIC.items():
+    if ":" not in place and room not in INNER and hasattr(import_module(f"limitsets.{place}"), "__all__"):
+        ROOMS |= names_of(import_module(f"limitsets.{place}"), f"ls.{room}")
 CLASSES = {name: thing for name, thing in ROOMS.items() if inspect.isclass(thing)}
 FUNCTIONS = {name: thing for name, thing in TOP.items() if inspect.isfunction(inspect.unwrap(thing))}
 
