@@ -165,10 +165,10 @@ class Audit(Tabled):
         return [finding.to_json() for finding in self.findings]
 
 
-def _worst(row: Row, found: Mapping[int, Array], samples: Mapping[int, Sample]) -> dict[str, Any]:
+def _worst(row: Row, enclosures: Mapping[int, Array], samples: Mapping[int, Sample]) -> dict[str, Any]:
     """Find the throw whose number is farthest beyond its limit, or nearest to it."""
     best: tuple[float, dict[str, Any]] = (-math.inf, {})
-    for side, seen in found.items():
+    for side, seen in enclosures.items():
         reached = row.reached(seen)
         known = ~np.isnan(reached) & ~(np.isneginf(reached) if row.about.below else np.isposinf(reached))
         if not known.any():
@@ -201,14 +201,16 @@ def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[
     return {"jogs": count(codes.JOG), "flips": count(codes.FLIP), "others": count(codes.ROLL)}
 
 
-def _ranges(box: ParameterBox, row: Row, found: Mapping[int, Array], domain: Mapping[int, Sample]) -> Extents:
+def _ranges(
+    box: ParameterBox, row: Row, enclosures: Mapping[int, Array], domain: Mapping[int, Sample]
+) -> Extents:
     ranges = {}
     for side, sample in domain.items():
 
         def broken(x: Array, side: int = side) -> Flags:
             return row.broken(enclosed_at(box, side, x), side)
 
-        ranges[side] = where(broken, sample.x, row.broken(found[side], side))
+        ranges[side] = where(broken, sample.x, row.broken(enclosures[side], side))
     return {side: parts for side, parts in ranges.items() if parts}
 
 
@@ -219,8 +221,8 @@ def _findings(
     limit = place == "limit-set"
     samples, cells = (sites.orbits, sites.limit_cells) if limit else (sites.domain, sites.domain_cells)
     sound = sites.enclosed or not limit
-    found = {side: enclosed_at(box, side, sample.x) for side, sample in samples.items()}
-    broken = [{side: row.broken(seen, side) for side, seen in found.items()} for row in rows]
+    enclosures = {side: enclosed_at(box, side, sample.x) for side, sample in samples.items()}
+    broken = [{side: row.broken(seen, side) for side, seen in enclosures.items()} for row in rows]
     hit = [any(flags.any() for flags in each.values()) for each in broken]
     hopeful = [k for k, row in enumerate(rows) if not hit[k] and row.terms.limit is not None and bool(cells)]
     proved = dict(zip(hopeful, all_hold(box, cells, [rows[k] for k in hopeful]), strict=True))
@@ -234,9 +236,9 @@ def _findings(
                 place,
                 called,
                 "proved" if sure else "sampled",
-                **_worst(row, found, samples),
+                **_worst(row, enclosures, samples),
                 missing=row.terms.missing,
-                ranges={} if limit or not hit[k] else _ranges(box, row, found, samples),
+                ranges={} if limit or not hit[k] else _ranges(box, row, enclosures, samples),
                 **_shares(broken[k], samples),
                 simulated=row.about.effect in scene.effects.on(),
             )
@@ -291,7 +293,7 @@ def audited(model: Model, scene: Scene) -> Model:
         for row in rows
         if row.about.effect not in model.simulated
         and (row.about.effect != "spread" or "scatter" in model.left_out)  # else noise covers the scatter
-        and any(row.broken(found, side).any() for side, found in seen.items())
+        and any(row.broken(enclosed, side).any() for side, enclosed in seen.items())
     ]
     return replace(model, broken=tuple(broken)) if seen else model
 
@@ -321,10 +323,10 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
     Examples
     --------
     >>> import limitsets as ls
-    >>> found = ls.audit("paper-initial")
-    >>> [(each.effect, each.how) for each in found.on("limit-set") if each.called_for]
+    >>> audited = ls.audit("paper-initial")
+    >>> [(each.effect, each.how) for each in audited.on("limit-set") if each.called_for]
     [('pivot', 'sampled'), ('pivot', 'sampled'), ('roll', 'sampled')]
-    >>> [(each.effect, each.how) for each in found.on("limit-set") if each.called_for is False]
+    >>> [(each.effect, each.how) for each in audited.on("limit-set") if each.called_for is False]
     [('release', 'proved'), ('landing', 'proved'), ('slip', 'proved'), ('arm', 'proved')]
     """
     from limitsets.feeder.scene import load

@@ -155,9 +155,9 @@ class AbsorptionBrackets(Tabled):
         >>> import limitsets as ls
         >>> from limitsets.robust import Scattering, Uniform, absorption_brackets
         >>> noise = Scattering(landing=Uniform(0.1))
-        >>> found = absorption_brackets("paper-initial", noise, right=(20, 2), cells=300, throws=3, mean=False)
+        >>> brackets = absorption_brackets("paper-initial", noise, right=(20, 2), cells=300, throws=3, mean=False)
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     ls.recheck(found.save(f"{folder}/initial.proof.zip")).verdict
+        ...     ls.recheck(brackets.save(f"{folder}/initial.proof.zip")).verdict
         'proved'
         """
         from limitsets.proofs.chances.chain import write
@@ -229,19 +229,19 @@ def within_brackets(
     """
     fixed = chain.fixed(value), chain.fixed({name: -number for name, number in value.items()})
     bound = [chain.first(each) for each in fixed]
-    found = np.empty((2, throws + 1))
+    brackets = np.empty((2, throws + 1))
     for n in range(throws + 1):
         if n:
             bound = [
                 _at_most(chain.nodes, chain.above(values, each), most)
                 for values, each, most in zip(bound, fixed, (1.0, 0.0), strict=True)
             ]
-        found[:, n] = -_mean_above(row, bound[1]), _mean_above(row, bound[0])
+        brackets[:, n] = -_mean_above(row, bound[1]), _mean_above(row, bound[0])
         if progress is not None:
             progress(n, throws)
     # Having ended is for ever: a bound from below holds later, one from above holds earlier.
-    low = np.maximum.accumulate(np.clip(found[0], 0.0, 1.0))
-    high = np.minimum.accumulate(np.clip(found[1], 0.0, 1.0)[::-1])[::-1]
+    low = np.maximum.accumulate(np.clip(brackets[0], 0.0, 1.0))
+    high = np.minimum.accumulate(np.clip(brackets[1], 0.0, 1.0)[::-1])[::-1]
     return np.stack([low, high]), np.stack([-bound[1], bound[0]])
 
 
@@ -321,8 +321,8 @@ def absorption_brackets(
     --------
     >>> from limitsets.robust import Scattering, Uniform, absorption_brackets
     >>> noise = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
-    >>> found = absorption_brackets("paper-designed", noise, right=(20.5, 2), cells=500, throws=5, mean=False)
-    >>> low, high = found.within["right"][:, 5]
+    >>> brackets = absorption_brackets("paper-designed", noise, right=(20.5, 2), cells=500, throws=5, mean=False)
+    >>> low, high = brackets.within["right"][:, 5]
     >>> bool(low < 0.222 < high < low + 0.05)
     True
     """
@@ -370,22 +370,24 @@ def _places(
     absorbing: Mapping[str, Sequence[Place]] | None,
 ) -> dict[str, list[Place]]:
     """Collect the absorbing places by name."""
-    found: dict[str, list[Place]] = {}
+    absorbers: dict[str, list[Place]] = {}
     if right is not None:
-        found["right"] = [(int(right[1]), float(right[0]), math.inf)]
+        absorbers["right"] = [(int(right[1]), float(right[0]), math.inf)]
     if wrong is not None:
         if right is None:
             raise AnswerError(
                 "the places that are wrong", wrong, "x, with `right`", "say which side is right"
             )
-        found["wrong"] = [(k, float(wrong), math.inf) for k in range(len(scene.sides)) if k != int(right[1])]
+        absorbers["wrong"] = [
+            (k, float(wrong), math.inf) for k in range(len(scene.sides)) if k != int(right[1])
+        ]
     for name, places in (absorbing or {}).items():
-        if name in (*found, ANY, EXITS):
+        if name in (*absorbers, ANY, EXITS):
             raise AnswerError("the name of absorbing places", name, "one that is not taken", "choose another")
-        found[name] = [(int(side), float(lo), float(hi)) for side, lo, hi in places]
-    for name, each in found.items():
+        absorbers[name] = [(int(side), float(lo), float(hi)) for side, lo, hi in places]
+    for name, each in absorbers.items():
         _require(scene, f'a place that is "{name}"', each)
-    return found
+    return absorbers
 
 
 def _require(scene: Scene, thing: str, places: Sequence[Place]) -> None:

@@ -79,13 +79,13 @@ class Nodes:
 
     def cell(self, side: Index, x: Array) -> Index:
         """Return the cells, named by their left nodes, in which places lie."""
-        found = np.empty(x.shape, dtype=np.int64)
+        cells = np.empty(x.shape, dtype=np.int64)
         for k in range(self.first.size - 1):
             here = side == k
             row = self.place[self.of_side(k)]
             inside = np.searchsorted(row, x[here], side="right") - 1
-            found[here] = self.first[k] + np.clip(inside, 0, row.size - 2)
-        return found
+            cells[here] = self.first[k] + np.clip(inside, 0, row.size - 2)
+        return cells
 
 
 def extra(graded: float) -> float:
@@ -222,8 +222,8 @@ class Running(NamedTuple):
 
     def between(self, first: Index, last: Index) -> Array:
         """Bound the sum of the numbers from `first` up to the one before `last` from above."""
-        found: Array = self.total[last] - self.total[first] + self.off
-        return found
+        bound: Array = self.total[last] - self.total[first] + self.off
+        return bound
 
 
 def running(numbers: Array) -> Running:
@@ -369,11 +369,11 @@ class Average:
 
     def _deficit(self, values: Array, slopes: Array, total: Running, n: int) -> Array:
         """How far the mean may lie above the chord, for each cell, named by its left node."""
-        found, best, width = np.zeros(n), np.full(n, np.inf), self.target.width
+        excess, best, width = np.zeros(n), np.full(n, np.inf), self.target.width
         for each in self.swings:
-            found += np.bincount(each.row, _variation(total, each), n)
+            excess += np.bincount(each.row, _variation(total, each), n)
         for gap in self.gaps:
-            found += np.bincount(gap.row, self._difference(gap, values), n)
+            excess += np.bincount(gap.row, self._difference(gap, values), n)
         fall = np.maximum(slopes - np.append(slopes[1:], 0.0), 0.0)  # at the node after each cell
         ordinary = fall <= JUMP * float(np.abs(values).max()) / float(np.median(width))
         falls = running(np.where(ordinary, fall, 0.0))
@@ -409,7 +409,7 @@ class Average:
         close = np.flatnonzero(self.source.width < CLOSE_BY * np.median(self.source.width))
         for _ in range(CLUSTER):
             best[close] = np.maximum(best[close], np.maximum(best[close - 1], best[close + 1]))
-        deficits: Array = found + best
+        deficits: Array = excess + best
         return deficits
 
     def _difference(self, gap: Gaps, values: Array) -> Array:

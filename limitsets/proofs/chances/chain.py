@@ -66,10 +66,10 @@ class Chain:
 
     def fixed(self, value: Mapping[str, float]) -> Array:
         """Return the largest value on absorbing places, -inf where there is none."""
-        found = np.full(self.free.size, -np.inf)
+        largest = np.full(self.free.size, -np.inf)
         for name, nodes in self.absorbs.items():
-            found[nodes] = np.maximum(found[nodes], value[name])
-        return found
+            largest[nodes] = np.maximum(largest[nodes], value[name])
+        return largest
 
     def first(self, fixed: Array) -> Array:
         """Return the function that is 0 where a throw is made."""
@@ -105,7 +105,7 @@ def _special(
     lo, hi = box.bare
     close = CLOSE * hi.arm_length
     below, above = lo.arm_length, hi.arm_length
-    found = []
+    clusters = []
     for side in sides:
         a = side.spans["a"]
         rows = [
@@ -118,8 +118,8 @@ def _special(
         for delta in {float(law.borders[0]), float(law.borders[-1])}:
             for x in crossings(side, a[1] + 8 * close, below - 8 * close, delta):
                 rows.append([x - 2 * close, x - close, x + close, x + 2 * close])
-        found.append(rows)
-    return found
+        clusters.append(rows)
+    return clusters
 
 
 def chain_of(

@@ -286,10 +286,10 @@ class Deficits:
         """Return gaps between such places, on both branches where `both`."""
         return Gaps(cell, much, self.span_of(side, flips, lo, hi), self.span_of(side, flips ^ both, lo, hi))
 
-    def any_way(self, rows: Rows, found: Decided, some: Index, lo: Array, hi: Array) -> None:
+    def any_way(self, rows: Rows, branches: Decided, some: Index, lo: Array, hi: Array) -> None:
         """By all that V may be where throws land."""
         cell = rows.number[:-1][some]
-        below, above = found.cell_below[some], found.cell_above[some]
+        below, above = branches.cell_below[some], branches.cell_above[some]
         gaps = self.gaps_of(cell, np.ones(some.size), rows.side, below, lo[some], hi[some], below != above)
         self.ways.append(Curvature(cell, gaps=(gaps,)))
 
@@ -300,7 +300,7 @@ class Deficits:
     def by_kinks(
         self,
         rows: Rows,
-        found: Decided,
+        branches: Decided,
         all_of: Derivatives,
         some: Index,
         lo: Array,
@@ -314,7 +314,7 @@ class Deficits:
         wide, rate = t.x.absolute().hi, t.delta.absolute().lo
         with np.errstate(divide="ignore"):
             share = np.ones(some.size) if law.certain else np.minimum(density * wide * h / rate, 1.0)
-        below, above = found.cell_below[some], found.cell_above[some]
+        below, above = branches.cell_below[some], branches.cell_above[some]
         split = np.flatnonzero(below != above)
         much, bow = MORE * 0.25 * h * wide * share, MORE * h * h / 8.0 * t.x_x.absolute().hi
         # A function that is affine between nodes at most d apart, and whose slope falls by at most L per length, lies
@@ -333,7 +333,7 @@ class Deficits:
             even_too = MORE * (length[split] ** 2 / 8.0 + length[split] * self._widest(other) / 4.0)
             kinks.append(Kinks(cell[at], much[split], even_too, bow[split], other))
             # Along a border that moves with x: p g' (2 T_x + g' T_delta) G'.
-            drift = (found.cut[at + 1] - found.cut[at]) / h[split]
+            drift = (branches.cut[at + 1] - branches.cut[at]) / h[split]
             moving = Intervals(drift, drift)
             by = h[split] ** 2 / 8.0 * density
             turned = moving * (2.0 * t.x[split] + moving * t.delta[split]) * Intervals(0.0 * by, by)
@@ -347,7 +347,7 @@ class Deficits:
     def by_borders(
         self,
         rows: Rows,
-        found: Decided,
+        branches: Decided,
         all_of: Derivatives,
         some: Index,
         lo: Array,
@@ -365,8 +365,8 @@ class Deficits:
         ratio = t.x * one
         by_delta = (2.0 * t.x_delta - ratio * t.delta_delta) * ratio
         inner = ((t.x_x - by_delta) * one).absolute().hi * density * h * h / 8.0
-        below, above = found.cell_below[some], found.cell_above[some]
-        one_cut, two_cut = found.cut[some], found.cut[some + 1]
+        below, above = branches.cell_below[some], branches.cell_above[some]
+        one_cut, two_cut = branches.cut[some], branches.cut[some + 1]
         least, most = np.minimum(one_cut, two_cut), np.maximum(one_cut, two_cut)
         below = np.where(most <= law.borders[0], above, below)
         above = np.where(least >= law.borders[-1], below, above)
@@ -398,16 +398,16 @@ class Deficits:
                 )
         here = np.flatnonzero(split)
         if here.size:
-            bends += self._moving(rows, found, some, here, below, above)
+            bends += self._moving(rows, branches, some, here, below, above)
         self.ways.append(Curvature(cell[some], tuple(bends), tuple(swings), gaps=tuple(gaps)))
 
     def _moving(
-        self, rows: Rows, found: Decided, some: Index, here: Index, below: Flags, above: Flags
+        self, rows: Rows, branches: Decided, some: Index, here: Index, below: Flags, above: Flags
     ) -> list[Bends]:
         """Return what the border between the branches bends."""
         law, side = self.law, rows.side
         h = np.diff(rows.x)[some]
-        one_cut, two_cut = found.cut[some], found.cut[some + 1]
+        one_cut, two_cut = branches.cut[some], branches.cut[some + 1]
         least, most = np.minimum(one_cut, two_cut), np.maximum(one_cut, two_cut)
         x_one, x_two = rows.x[some], rows.x[some + 1]
         first, last = landed(side, x_one, least).phi, landed(side, x_two, most).phi

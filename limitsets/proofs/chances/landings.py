@@ -315,14 +315,14 @@ def margin(
     formulas = Formulas(side.flight, side.flip)
     if not steep:
         n, part = _numbers(side, kappa)
-        found = formulas.margin(n, part, angle(phi), x)
-        return found, found, found
+        enclosure = formulas.margin(n, part, angle(phi), x)
+        return enclosure, enclosure, enclosure
     n, part = _numbers(side, variable(kappa, 1, 3))
-    found = formulas.margin(n, part, angle(variable(phi, 0, 3)), variable(x, 2, 3))
-    by_phi, by_kappa, by_x = found.derivatives
+    enclosure = formulas.margin(n, part, angle(variable(phi, 0, 3)), variable(x, 2, 3))
+    by_phi, by_kappa, by_x = enclosure.derivatives
     along = slopes(side, phi, delta)
     by_delta = (by_kappa + by_phi * along.phi_kappa) * (-2.0 * (kappa / factor))
-    return found.value, by_x + by_phi * along.phi_x, by_delta
+    return enclosure.value, by_x + by_phi * along.phi_x, by_delta
 
 
 def _at(side: OneSide, x: Array, delta: Array) -> Intervals:
@@ -367,8 +367,8 @@ def decided(side: OneSide, x: Array, pieces: Sequence[Piece]) -> Decided:
     flips = middle.lo + middle.hi > 0.0
     cut, below, above = np.full(n, last), flips.copy(), flips.copy()
     box = Intervals(x[:-1], x[1:])
-    found = hull(margin(side, box, each.phi, each.delta)[0] for each in pieces)
-    yes, no = found.lo > 0.0, found.hi <= 0.0
+    margins = hull(margin(side, box, each.phi, each.delta)[0] for each in pieces)
+    yes, no = margins.lo > 0.0, margins.hi <= 0.0
     anywhere = last - first if last > first else 1.0
     beta = np.where(yes | no, 0.0, anywhere)
     cell_below, cell_above = yes.copy(), yes.copy()

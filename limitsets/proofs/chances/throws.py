@@ -137,8 +137,8 @@ class _Parts(Deficits):
             pieces.append(Piece(float(law.borders[first]), float(law.borders[last]), phi))
         places = x.copy()
         places[:begin] = self.source.place[numbers[:begin]]
-        found = decided(side, places, pieces)
-        at_cut = landed(side, x, np.full(n, law.borders[0]) if law.certain else found.cut)
+        branches = decided(side, places, pieces)
+        at_cut = landed(side, x, np.full(n, law.borders[0]) if law.certain else branches.cut)
         rows = rows._replace(
             error=np.maximum(rows.error, np.maximum(at_cut.phi_error, at_cut.error)),
             good=rows.good & at_cut.good,
@@ -146,19 +146,19 @@ class _Parts(Deficits):
         all_of = Derivatives(
             *map(hull, zip(*(slopes(side, each.phi, each.delta) for each in pieces), strict=True))
         )
-        self._nodes(rows, found, all_of, at_cut.place)
-        self._cells(rows, found, all_of, begin)
+        self._nodes(rows, branches, all_of, at_cut.place)
+        self._cells(rows, branches, all_of, begin)
 
     # ------------------------------------------------------------ nodes
 
-    def _nodes(self, rows: Rows, found: Decided, all_of: Derivatives, at_cut: Array) -> None:
+    def _nodes(self, rows: Rows, branches: Decided, all_of: Derivatives, at_cut: Array) -> None:
         """Segments between the places of borders, and how far the places between them may be off a line."""
         law, side, n = self.law, rows.side, rows.x.size
         if law.certain:
-            number, place = self.landing(side, found.below, rows.place[:, 0])
+            number, place = self.landing(side, branches.below, rows.place[:, 0])
             self.segments.append((rows.number, np.ones(n), number, place, place))
             span = self.span_of(
-                side, found.below, rows.place[:, 0] - rows.error, rows.place[:, 0] + rows.error
+                side, branches.below, rows.place[:, 0] - rows.error, rows.place[:, 0] + rows.error
             )
             # Of the variation on a cell no more is met than the share of it that the error makes.
             narrowest = Windows(span).ends(self.target.width)[0]
@@ -168,10 +168,10 @@ class _Parts(Deficits):
         step = np.diff(law.borders)
         bend = all_of.delta_delta.absolute().hi
         bend = np.nan_to_num(np.maximum(np.append(bend, bend[-1]), np.insert(bend, 0, bend[0])), nan=np.inf)
-        for flips, is_below in ((found.below, True), (found.above, False)):
+        for flips, is_below in ((branches.below, True), (branches.above, False)):
             lo = np.broadcast_to(law.borders[:-1], (n, step.size))
             hi = np.broadcast_to(law.borders[1:], (n, step.size))
-            cut = found.cut[:, None]
+            cut = branches.cut[:, None]
             begin, end = (lo, np.minimum(hi, cut)) if is_below else (np.maximum(lo, cut), hi)
             one, two = rows.place[:, :-1], rows.place[:, 1:]
             if is_below:
@@ -206,7 +206,7 @@ class _Parts(Deficits):
 
     # ------------------------------------------------------------ cells
 
-    def _cells(self, rows: Rows, found: Decided, all_of: Derivatives, begin: int) -> None:
+    def _cells(self, rows: Rows, branches: Decided, all_of: Derivatives, begin: int) -> None:
         """Deficits between nodes."""
         law, side = self.law, rows.side
         cell = rows.number[:-1]
@@ -223,49 +223,49 @@ class _Parts(Deficits):
         # At the joint: whatever lies between it and where the first place beyond it lands.
         lo[:begin] = np.minimum(lo[:begin], side.spans["a"][0])
         density = 1.0 if law.certain else float(law.density.max())
-        self._undecided(rows, found, lo, hi, density, known)
+        self._undecided(rows, branches, lo, hi, density, known)
         if begin:
             at = np.arange(begin)
-            both = found.beta[at] > 0.0
+            both = branches.beta[at] > 0.0
             self.gaps.append(
-                self.gaps_of(cell[at], np.ones(begin), side, found.cell_below[at], lo[at], hi[at], both)
+                self.gaps_of(cell[at], np.ones(begin), side, branches.cell_below[at], lo[at], hi[at], both)
             )
         live = np.flatnonzero(known & (np.arange(h.size) >= begin) & (h > 0.0))
         if law.ripple:
-            for flips in (found.cell_below, found.cell_above):
+            for flips in (branches.cell_below, branches.cell_above):
                 span = self.span_of(side, flips[live], lo[live], hi[live])
                 self.swings.append(Swings(cell[live], np.full(live.size, law.ripple), span))
-        self.any_way(rows, found, live, lo, hi)
-        self.by_kinks(rows, found, all_of, live, lo, hi, density)
+        self.any_way(rows, branches, live, lo, hi)
+        self.by_kinks(rows, branches, all_of, live, lo, hi, density)
         # Where the speed moves the landing place by less than a cell its derivative says nothing, if it has a sign.
         rate = all_of.delta.absolute()
         spread = float(law.borders[-1] - law.borders[0]) * rate.lo
         curved = live[((spread > h) & (rate.lo > 0.0))[live]]
         if curved.size:
-            self.by_borders(rows, found, all_of, curved, lo, hi, density)
+            self.by_borders(rows, branches, all_of, curved, lo, hi, density)
 
     def _undecided(
-        self, rows: Rows, found: Decided, lo: Array, hi: Array, density: float, known: Flags
+        self, rows: Rows, branches: Decided, lo: Array, hi: Array, density: float, known: Flags
     ) -> None:
         """Where the branch is open, or not that of the node's row; where nothing is proved anything may be."""
         law, cell = self.law, rows.number[:-1]
         first, last = law.borders[0], law.borders[-1]
         off = np.zeros(cell.size)
         for k in (slice(None, -1), slice(1, None)):
-            cut = found.cut[k]
+            cut = branches.cut[k]
             if law.certain:
-                wrong = np.where(found.below[k] != found.cell_below, 1.0, 0.0)
+                wrong = np.where(branches.below[k] != branches.cell_below, 1.0, 0.0)
             else:
                 low, high = cut - first, last - cut
-                wrong = np.where(found.below[k] != found.cell_below, low, 0.0)
-                wrong = wrong + np.where(found.above[k] != found.cell_above, high, 0.0)
+                wrong = np.where(branches.below[k] != branches.cell_below, low, 0.0)
+                wrong = wrong + np.where(branches.above[k] != branches.cell_above, high, 0.0)
             off = np.maximum(off, wrong)
-        much = np.minimum(density * (found.beta + off), 1.0)
+        much = np.minimum(density * (branches.beta + off), 1.0)
         if law.ripple:
-            much = much + np.where(found.cell_below == found.cell_above, 0.0, law.cut_ripple)
+            much = much + np.where(branches.cell_below == branches.cell_above, 0.0, law.cut_ripple)
         some = np.flatnonzero((much > 0.0) & known)
         if some.size:
-            below, both = found.cell_below[some], np.ones(some.size, bool)
+            below, both = branches.cell_below[some], np.ones(some.size, bool)
             self.gaps.append(
                 self.gaps_of(cell[some], MORE * much[some], rows.side, below, lo[some], hi[some], both)
             )

@@ -149,17 +149,17 @@ def _cells(
 
 def _starts(scene: Scene, cells: Grid, starts: Starts, noise: dict[str, str]) -> tuple[Mask, str]:
     """Give the cells of the starts, and how they are named."""
-    found = np.zeros(cells.n_cells, dtype=bool)
+    mask = np.zeros(cells.n_cells, dtype=bool)
     if starts is None:
         graph = cover_on(parameter_box(scene, noise=noise), cells).graph
         sets = graph.recurrent_components()
         good = attracting_of(graph.ranges, graph.components(), sets)
         for each in (part for part, attracts in zip(sets, good, strict=True) if attracts):
-            found[each] = True
-        if not found.any():
+            mask[each] = True
+        if not mask.any():
             remedy = "name the starts"
             raise AnswerError("the limit sets of the scene's own throw", "none on these cells", "one", remedy)
-        return found, "the limit sets of the scene's own throw"
+        return mask, "the limit sets of the scene's own throw"
     by_side: Mapping[int, tuple[float, float]]
     if isinstance(starts, Mapping):
         by_side, words = starts, "those named"
@@ -175,5 +175,5 @@ def _starts(scene: Scene, cells: Grid, starts: Starts, noise: dict[str, str]) ->
             allowed = f"from {edges[0]:.9g} to {edges[-1]:.9g} {scene.unit} on side {side}"
             raise AnswerError("the starts", (lo, hi), allowed, "name places where the part can rest")
         inside = (edges[1:] > lo) & (edges[:-1] < hi)
-        found[cells.of_side(side)] = inside if lo < hi else (edges[1:] >= lo) & (edges[:-1] <= hi)
-    return found, words
+        mask[cells.of_side(side)] = inside if lo < hi else (edges[1:] >= lo) & (edges[:-1] <= hi)
+    return mask, words

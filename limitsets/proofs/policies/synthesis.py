@@ -264,8 +264,8 @@ class Synthesis(Board, Tabled):
 def _play(board: Board, sensor: Sensor | None, limits: Limits, progress: Progress = None) -> Synthesis:
     own = {each.name: getattr(board, each.name) for each in fields(Board)}
     game = board.game.asking(None if sensor is None else sensor.answers(board.starts.grid))
-    found = search(game, board.starts.mask, **limits._asdict(), progress=progress)
-    return Synthesis(**{**own, "game": game}, sensor=sensor, limits=limits, found=found)
+    outcome = search(game, board.starts.mask, **limits._asdict(), progress=progress)
+    return Synthesis(**{**own, "game": game}, sensor=sensor, limits=limits, found=outcome)
 
 
 @shown_in_notebooks
@@ -338,8 +338,8 @@ def feedback(
     ...     "sensor": {"beyond": "20 in"},
     ...     "throws": [{"name": "own", "kappa": "25.3778518 in"}],
     ... }
-    >>> found = ls.feedback(ls.load(scene), starts={2: (16.0, 16.5)}, cells=256)
-    >>> found.found.verdict, found.found.throws
+    >>> answer = ls.feedback(ls.load(scene), starts={2: (16.0, 16.5)}, cells=256)
+    >>> answer.found.verdict, answer.found.throws
     ('solved', 2)
     """
     chosen = load(scene)
@@ -369,16 +369,16 @@ def places(
         One for each place.
     """
     sensors = [BeyondSensor(x, error) for x in at]
-    found: list[Synthesis] = []
+    syntheses: list[Synthesis] = []
     for k, sensor in enumerate(sensors):
         if progress is not None:
             progress("places of the sensor", k, len(at))
-        if found:
-            found.append(found[0].asking(sensor))
+        if syntheses:
+            syntheses.append(syntheses[0].asking(sensor))
         else:
             cuts = [cut for each in sensors for cut in each.cuts]
-            found.append(feedback(scene, sensor, **{**options, "cuts": cuts}))
-    return tuple(found)
+            syntheses.append(feedback(scene, sensor, **{**options, "cuts": cuts}))
+    return tuple(syntheses)
 
 
 def _sensor_of(scene: Scene, sensor: Sensor | str | None) -> Sensor | None:

@@ -342,14 +342,14 @@ class Cover:
         return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
 
 
-def _widened(found: Enclosures, edges: NDArray[np.float64], landing: float) -> Enclosures:
+def _widened(enclosed: Enclosures, edges: NDArray[np.float64], landing: float) -> Enclosures:
     """Widen the images by the slack and by the scatter of the landing place, which no decision depends on."""
     more = np.nextafter(landing + SLACK_OF_IMAGE * np.diff(edges), np.inf)
     hulls = {
         key: (np.nextafter(lo - more, -np.inf), np.nextafter(hi + more, np.inf))
-        for key, (lo, hi) in found.hulls.items()
+        for key, (lo, hi) in enclosed.hulls.items()
     }
-    return Enclosures(hulls, found.witness, found.lost)
+    return Enclosures(hulls, enclosed.witness, enclosed.lost)
 
 
 def cover(
@@ -401,18 +401,18 @@ def cover_on(
     box: ParameterBox, cells: Grid, pieces: int | None = None, points: tuple[FixedPoint, ...] = ()
 ) -> Cover:
     """Enclose the images of cells that are given; `pieces` as in `cover`, `points` where the cells begin there."""
-    found = tuple(
+    enclosed = tuple(
         _widened(enclosures(box.lo, box.hi, edges, side, pieces), edges, box.landing)
         for side, (edges,) in enumerate(cells.edges)
     )
-    return Cover(box, cells, found, _graph(box, cells, found), points)
+    return Cover(box, cells, enclosed, _graph(box, cells, enclosed), points)
 
 
-def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> TransitionGraph:
+def _graph(box: ParameterBox, cells: Grid, enclosed: Sequence[Enclosures]) -> TransitionGraph:
     exits = kind_of(box.lo).exits
     target = Target.of(cells, exits)
     # the arm's end as it is known, not the last border: what may land beyond it leaves
-    parts = [boxes_of(images, target, len(exits)) for images in found]
+    parts = [boxes_of(images, target, len(exits)) for images in enclosed]
     cell = np.concatenate([part.cell + cells.offset[k] for k, part in enumerate(parts)])
     joined = [
         np.concatenate([getattr(part, name) for part in parts]) for name in ("side", "lo", "hi", "exits")
@@ -420,7 +420,7 @@ def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> Trans
     first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=cells.n_cells))])
     leaving = joined[3]
     outward = np.uint8(1 << list(exits).index("outward"))
-    for side, images in enumerate(found):
+    for side, images in enumerate(enclosed):
         for lo, hi in images.hulls.values():
             beyond = (lo <= hi) & (hi > box.lo.arm_length)
             leaving[cells.of_side(side)] |= np.where(beyond, outward, 0).astype(np.uint8)
@@ -428,21 +428,23 @@ def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> Trans
     return TransitionGraph(box.lo, cells, ranges, "boxes")
 
 
-def everywhere(found: Cover) -> list[NDArray[np.int32]]:
+def everywhere(covered: Cover) -> list[NDArray[np.int32]]:
     """First and last target cells, as `targets`, of every branch and every number of sides that it turns."""
-    sides = found.grid.sides
-    keys = {((to - side) % sides, of) for side, images in enumerate(found.images) for to, of in images.hulls}
-    return [targets(found, branch, turned) for turned, branch in sorted(keys)]
+    sides = covered.grid.sides
+    keys = {
+        ((to - side) % sides, of) for side, images in enumerate(covered.images) for to, of in images.hulls
+    }
+    return [targets(covered, branch, turned) for turned, branch in sorted(keys)]
 
 
-def targets(found: Cover, branch: int, turned: int | None = None) -> NDArray[np.int32]:
+def targets(covered: Cover, branch: int, turned: int | None = None) -> NDArray[np.int32]:
     """First and last target cell of one branch, -1 -1 where it is impossible.
 
     A branch that leads to several sides is asked for with the number of sides it turns.
     """
-    grid = found.grid
+    grid = covered.grid
     out = np.full((grid.n_cells, 2), -1, dtype=np.int32)
-    for side, images in enumerate(found.images):
+    for side, images in enumerate(covered.images):
         for (to, of_branch), (lo, hi) in images.hulls.items():
             if of_branch != branch or (turned is not None and (to - side) % grid.sides != turned):
                 continue

@@ -102,8 +102,8 @@ class RationalInterval:
             return NotImplemented
         if b.lo <= 0 <= b.hi:
             raise ZeroDivisionError
-        found: RationalInterval = self * RationalInterval(1 / b.hi, 1 / b.lo)
-        return found
+        quotient: RationalInterval = self * RationalInterval(1 / b.hi, 1 / b.lo)
+        return quotient
 
     def __rtruediv__(self, other: int) -> RationalInterval:
         return RationalInterval.of(other) / self
@@ -401,8 +401,8 @@ def root(x: Jet | Number) -> Any:
         return x.square_root()
     if isinstance(x, RationalInterval):
         return square_root(x)
-    found = root(x.value)
-    return Jet(found, tuple(d / (2 * found) for d in x.derivatives))
+    half_power = root(x.value)
+    return Jet(half_power, tuple(d / (2 * half_power) for d in x.derivatives))
 
 
 def about(

@@ -87,17 +87,19 @@ def once(orbit: tuple[State, ...], reason: str = "") -> Answer:
     return against(Refutation(orbit, "every", {"once": True}) if orbit else Refutation(), reason)
 
 
-def common(found: Attraction, *, anywhere: bool) -> str:
+def common(attraction: Attraction, *, anywhere: bool) -> str:
     """Say what is missing that every goal needs: attracting cells, or that no start leaves; empty if nothing."""
     if not anywhere:
-        return "" if (found.component >= 0).any() else "there are no attracting cells"
-    if found.cover.points:
+        return "" if (attraction.component >= 0).any() else "there are no attracting cells"
+    if attraction.cover.points:
         return BELOW
-    for side, near in enumerate(found.joint):
+    for side, near in enumerate(attraction.joint):
         if not near.proved:
             return f"near the joint on side {side}: {near.reason}"
-    leaving = np.flatnonzero(found.cover.graph.ranges.exits)
-    return f"the image of {found.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
+    leaving = np.flatnonzero(attraction.cover.graph.ranges.exits)
+    return (
+        f"the image of {attraction.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
+    )
 
 
 def begins(section: Mapping[str, Any]) -> str:
@@ -106,14 +108,14 @@ def begins(section: Mapping[str, Any]) -> str:
     return "where they are laid down" if laid else "anywhere on the arm"
 
 
-def thrown_into(found: Attraction, bad: Mask) -> str:
+def thrown_into(attraction: Attraction, bad: Mask) -> str:
     """Name a cell from which a throw may land in one of some cells; empty if there is none."""
     number = np.concatenate([[0], np.cumsum(bad)])
-    for ends in everywhere(found.cover):
+    for ends in everywhere(attraction.cover):
         cells = np.flatnonzero(ends[:, 0] >= 0)
         hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
         if hit.size:
-            return found.cover.place(int(hit[0]))
+            return attraction.cover.place(int(hit[0]))
     return ""
 
 
@@ -136,13 +138,13 @@ def above(x: float) -> float:
 
 
 def throws_to_reach(
-    found: Attraction, cells: Mask, wanted: Mask, branch: int | None = None
+    attraction: Attraction, cells: Mask, wanted: Mask, branch: int | None = None
 ) -> tuple[int, NDArray[np.int64]]:
     """Count the throws after which every orbit from the cells has come to those wanted.
 
     Parameters
     ----------
-    found : Attraction
+    attraction : Attraction
         Cells and images.
     cells : ndarray of bool, shape (n_cells,)
         Where orbits begin.
@@ -158,7 +160,7 @@ def throws_to_reach(
     ndarray of int64
         Cells from which it is not proved.
     """
-    ranges = found.cover.graph.ranges if branch is None else _of_branch(found, branch)
+    ranges = attraction.cover.graph.ranges if branch is None else _of_branch(attraction, branch)
     owner = np.repeat(np.arange(cells.size), np.diff(ranges.first))
     ranges = ranges._replace(box=ranges.box.copy())
     ranges.box[wanted[owner], RUN] = 0  # what has arrived goes no farther
@@ -171,11 +173,11 @@ def throws_to_reach(
     return throws + (0 if branch is None else 1), np.flatnonzero(cells & late)
 
 
-def _of_branch(found: Attraction, branch: int) -> Ranges:
+def _of_branch(attraction: Attraction, branch: int) -> Ranges:
     """Target cells of one branch as ranges, with the exits of all."""
-    grid, ends = found.cover.grid, targets(found.cover, branch)
+    grid, ends = attraction.cover.grid, targets(attraction.cover, branch)
     some = ends[:, 0] >= 0
     side = grid.side_of(ends[some, 0]).astype(np.int32)
     lo, hi = (((ends[some, k] - grid.offset[side])[:, None]).astype(np.int32) for k in (0, 1))
     first = np.concatenate([[0], np.cumsum(some)])
-    return build(grid, first, side, lo, hi, found.cover.graph.ranges.exits)
+    return build(grid, first, side, lo, hi, attraction.cover.graph.ranges.exits)
