@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene.facts import NOT_TIPPING, TIPPING
 from limitsets.feeder.scene.left_out import Model
 from limitsets.proofs.auditing.assumptions import ASSUMPTIONS, Assumption
-from limitsets.proofs.auditing.judging import Places, Row, Sample, all_hold, enclosed_at, places, where
+from limitsets.proofs.auditing.judging import Cells, Places, Row, Sample, all_hold, enclosed_at, places, where
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
@@ -214,6 +214,12 @@ def _ranges(
     return {side: parts for side, parts in ranges.items() if parts}
 
 
+def _proved(box: ParameterBox, cells: Cells, rows: list[Row], hit: Sequence[bool]) -> dict[int, bool]:
+    """For each assumption that no sampled throw breaks, whether it is proved to hold on all cells."""
+    unbroken = [k for k, row in enumerate(rows) if not hit[k] and row.terms.limit is not None and bool(cells)]
+    return dict(zip(unbroken, all_hold(box, cells, [rows[k] for k in unbroken]), strict=True))
+
+
 def _findings(
     place: str, scene: Scene, box: ParameterBox, rows: list[Row], sites: Places
 ) -> tuple[Finding, ...]:
@@ -224,8 +230,7 @@ def _findings(
     enclosures = {side: enclosed_at(box, side, sample.x) for side, sample in samples.items()}
     broken = [{side: row.broken(seen, side) for side, seen in enclosures.items()} for row in rows]
     hit = [any(flags.any() for flags in each.values()) for each in broken]
-    hopeful = [k for k, row in enumerate(rows) if not hit[k] and row.terms.limit is not None and bool(cells)]
-    proved = dict(zip(hopeful, all_hold(box, cells, [rows[k] for k in hopeful]), strict=True))
+    proved = _proved(box, cells, rows, hit)
     findings = []
     for k, row in enumerate(rows):
         called = True if hit[k] else (None if row.terms.limit is None or not samples else False)

@@ -166,10 +166,10 @@ class AbsorptionBrackets(Tabled):
             path,
             self.source,
             self.scatter,
-            (self.starts, self.absorbing),
-            self.nodes,
-            self.within,
-            self.mean,
+            places=(self.starts, self.absorbing),
+            nodes=self.nodes,
+            within=self.within,
+            mean=self.mean,
             allowance=allowance,
             finer=finer,
             recheck=recheck,
@@ -193,7 +193,13 @@ def _start_row(nodes: Nodes, starts: Sequence[Place]) -> Any:
     length = (hi - lo).astype(np.float64)
     row = np.zeros(side.size, dtype=np.int64)
     return mean_matrix(
-        1, nodes, row, length / length.sum(), side.astype(np.int64), lo.astype(float), hi.astype(float)
+        1,
+        nodes,
+        row,
+        weight=length / length.sum(),
+        side=side.astype(np.int64),
+        one=lo.astype(float),
+        two=hi.astype(float),
     )
 
 
@@ -351,15 +357,15 @@ def absorption_brackets(
         read,
         read.name,
         read.unit,
-        noise,
-        {name: tuple(each) for name, each in places.items()},
-        begin,
-        chain.nodes,
-        {"speed": chain.speed.borders, "landing": chain.landing_law.borders},
-        within,
-        values,
-        means,
-        time.perf_counter() - begun,
+        scatter=noise,
+        absorbing={name: tuple(each) for name, each in places.items()},
+        starts=begin,
+        nodes=chain.nodes,
+        strata={"speed": chain.speed.borders, "landing": chain.landing_law.borders},
+        within=within,
+        values=values,
+        mean=means,
+        seconds=time.perf_counter() - begun,
     )
 
 

@@ -122,6 +122,26 @@ def _special(
     return clusters
 
 
+def _nodes_on_arm(
+    ends: list[tuple[float, float]],
+    special: list[list[list[float]]],
+    absorbing: Mapping[str, Sequence[Place]],
+    cells: int,
+    *,
+    far: float,
+    graded: float,
+) -> tuple[Nodes, float]:
+    """Spread the cells over the sides, none of them on places that absorb; with the width of a cell."""
+    flat = [[x for row in rows for x in row] for rows in special]
+    gone = [
+        [(x, min(y, above)) for places in absorbing.values() for k, x, y in places if k == number]
+        for number, (_, above) in enumerate(ends)
+    ]
+    length = sum(y - x + extra(graded) for x, y in ends) - sum(y - x for row in gone for x, y in row)
+    width = length / (cells * len(ends))
+    return nodes_of(ends, width, flat, far, gone, graded), width
+
+
 def chain_of(
     box: ParameterBox, scatter: Scattering, absorbing: Mapping[str, Sequence[Place]], cells: int
 ) -> Chain:
@@ -168,16 +188,8 @@ def chain_of(
     arm, close = hi.arm_length, CLOSE * hi.arm_length
     special = _special(sides, box, absorbing, speed)
     ends = [(side.spans["a"][0] - close, arm + close) for side in sides]
-    flat = [[x for row in rows for x in row] for rows in special]
-    # No cells are spent on places that absorb.
-    gone = [
-        [(x, min(y, above)) for places in absorbing.values() for k, x, y in places if k == side.number]
-        for side, (_, above) in zip(sides, ends, strict=True)
-    ]
     graded = GRADED * arm if landing.certain else 0.0
-    length = sum(y - x + extra(graded) for x, y in ends) - sum(y - x for row in gone for x, y in row)
-    width = length / (cells * len(sides))
-    nodes = nodes_of(ends, width, flat, FAR * arm, gone, graded)
+    nodes, width = _nodes_on_arm(ends, special, absorbing, cells, far=FAR * arm, graded=graded)
     target, average = nodes, None
     if not landing.certain:
         reach = float(landing.borders[-1])
@@ -193,7 +205,7 @@ def chain_of(
     breaks = np.flatnonzero(np.diff(numbers) > 1) + 1
     runs = [run for run in np.split(numbers, breaks) if run.size > 1]
     throw = throw_average(sides, nodes, target, speed, runs)
-    return Chain(nodes, throw, average, free, absorbs, speed, landing)
+    return Chain(nodes, throw, average, free=free, absorbs=absorbs, speed=speed, landing_law=landing)
 
 
 # ----------------------------------------------------------------

@@ -179,10 +179,10 @@ def landing_average(target: Nodes, source: Nodes, law: Staircase) -> Average:
         n,
         target,
         row,
-        np.tile(law.weight, n),
-        np.repeat(side, strata),
-        ends[:, :-1].ravel(),
-        ends[:, 1:].ravel(),
+        weight=np.tile(law.weight, n),
+        side=np.repeat(side, strata),
+        one=ends[:, :-1].ravel(),
+        two=ends[:, 1:].ravel(),
     )
     cells = np.flatnonzero(np.isfinite(source.width))
     h = np.maximum(y[cells + 1] - y[cells], 0.0)
@@ -290,7 +290,9 @@ class Deficits:
         """By all that V may be where throws land."""
         cell = rows.number[:-1][some]
         below, above = branches.cell_below[some], branches.cell_above[some]
-        gaps = self.gaps_of(cell, np.ones(some.size), rows.side, below, lo[some], hi[some], below != above)
+        gaps = self.gaps_of(
+            cell, np.ones(some.size), rows.side, flips=below, lo=lo[some], hi=hi[some], both=below != above
+        )
         self.ways.append(Curvature(cell, gaps=(gaps,)))
 
     def _widest(self, span: Span) -> Array:
@@ -387,14 +389,22 @@ class Deficits:
             for flips, here in ((below, lower | between), (above, ~lower)):
                 low = np.where(between, min(jumps[b], 0.0), jumps[b])
                 high = np.where(between, max(jumps[b], 0.0), jumps[b])
-                border = _Border(level, level, first, last, ends, still, low, high)
+                border = _Border(level, level, first, last=last, ends=ends, drift=still, low=low, high=high)
                 bends += self._border(rows, some, np.flatnonzero(here), flips, border)
             at = np.flatnonzero(between)
             if at.size:
                 much = MORE * 0.25 * abs(jumps[b]) * (most - least)[at]
                 both = np.ones(at.size, dtype=bool)
                 gaps.append(
-                    self.gaps_of(cell[some[at]], much, side, below[at], lo[some[at]], hi[some[at]], both)
+                    self.gaps_of(
+                        cell[some[at]],
+                        much,
+                        side,
+                        flips=below[at],
+                        lo=lo[some[at]],
+                        hi=hi[some[at]],
+                        both=both,
+                    )
                 )
         here = np.flatnonzero(split)
         if here.size:
@@ -421,7 +431,7 @@ class Deficits:
             low, high = window.ends(law.density)
         else:
             low = high = np.full(some.size, law.density[0])
-        border = _Border(least, most, first, last, ends, drift, low, high)
+        border = _Border(least, most, first, last=last, ends=ends, drift=drift, low=low, high=high)
         other = border._replace(low=-high, high=-low)
         return self._border(rows, some, here, below, border) + self._border(rows, some, here, above, other)
 

@@ -146,7 +146,19 @@ def one_side(lo: Any, hi: Any, number: int) -> OneSide:
     middle = {name: 0.5 * (ends[0] + ends[1]) for name, ends in spans.items()}
     slack = max(ends[1] - ends[0] for ends in spans.values())
     a, d, h, kappa, shift = (float(middle[name]) for name in ("a", "d", "h", "kappa", "shift"))
-    return OneSide(number, after, a, d, h, kappa, shift, spans, float(slack), lo.flight, lo.flip)
+    return OneSide(
+        number,
+        after,
+        a,
+        d=d,
+        h=h,
+        kappa=kappa,
+        shift=shift,
+        spans=spans,
+        slack=float(slack),
+        flight=lo.flight,
+        flip=lo.flip,
+    )
 
 
 def kappa_of(side: OneSide, delta: Array) -> Array:
@@ -235,10 +247,10 @@ def slopes(side: OneSide, phi: Intervals, delta: Intervals) -> Derivatives:
         1.0 + rate * one,
         by_kappa * first,
         turn * square + rate * phi_xx,
-        x_kappa * first,
-        kappa_kappa * first * first + by_kappa * second,
-        one,
-        phi_kappa,
+        x_delta=x_kappa * first,
+        delta_delta=kappa_kappa * first * first + by_kappa * second,
+        phi_x=one,
+        phi_kappa=phi_kappa,
     )
 
 
@@ -377,17 +389,26 @@ def decided(side: OneSide, x: Array, pieces: Sequence[Piece]) -> Decided:
         steep = [margin(side, box[open_], each.phi[open_], each.delta[open_], steep=True) for each in pieces]
         by_x, by_delta = (hull(each[k] for each in steep) for k in (1, 2))
         rising, falling = by_delta.lo > 0.0, by_delta.hi < 0.0
-        _by_corners(side, x, open_, by_x, rising, falling, bounds, (yes, no, beta, cell_below, cell_above))
+        _by_corners(
+            side,
+            x,
+            open_,
+            by_x=by_x,
+            rising=rising,
+            falling=falling,
+            bounds=bounds,
+            cells=(yes, no, beta, cell_below, cell_above),
+        )
         if last > first:
             _by_border(
                 side,
                 x,
                 open_,
-                by_x,
-                by_delta,
-                bounds,
-                (cut, below, above),
-                (yes, no, beta, cell_below, cell_above),
+                by_x=by_x,
+                by_delta=by_delta,
+                bounds=bounds,
+                nodes=(cut, below, above),
+                cells=(yes, no, beta, cell_below, cell_above),
             )
         else:
             cell_below[open_] |= flips[open_] & ~no[open_]

@@ -102,11 +102,11 @@ class _Parts(Deficits):
             self.source,
             self.target,
             matrix,
-            self.law.beyond,
-            tuple(self.at_nodes),
-            tuple(self.swings),
-            tuple(self.gaps),
-            tuple(self.ways),
+            beyond=self.law.beyond,
+            at_nodes=tuple(self.at_nodes),
+            swings=tuple(self.swings),
+            gaps=tuple(self.gaps),
+            ways=tuple(self.ways),
         )
 
     def add(self, side: OneSide, numbers: Index) -> None:
@@ -122,10 +122,10 @@ class _Parts(Deficits):
             side,
             numbers,
             x,
-            table[2],
-            table[0],
-            np.maximum(table[1], table[3]).max(axis=1),
-            table[4].all(axis=1),
+            place=table[2],
+            phi=table[0],
+            error=np.maximum(table[1], table[3]).max(axis=1),
+            good=table[4].all(axis=1),
         )
         slack = np.maximum(rows.error[:-1], rows.error[1:])
         pieces = []
@@ -228,7 +228,15 @@ class _Parts(Deficits):
             at = np.arange(begin)
             both = branches.beta[at] > 0.0
             self.gaps.append(
-                self.gaps_of(cell[at], np.ones(begin), side, branches.cell_below[at], lo[at], hi[at], both)
+                self.gaps_of(
+                    cell[at],
+                    np.ones(begin),
+                    side,
+                    flips=branches.cell_below[at],
+                    lo=lo[at],
+                    hi=hi[at],
+                    both=both,
+                )
             )
         live = np.flatnonzero(known & (np.arange(h.size) >= begin) & (h > 0.0))
         if law.ripple:
@@ -236,13 +244,13 @@ class _Parts(Deficits):
                 span = self.span_of(side, flips[live], lo[live], hi[live])
                 self.swings.append(Swings(cell[live], np.full(live.size, law.ripple), span))
         self.any_way(rows, branches, live, lo, hi)
-        self.by_kinks(rows, branches, all_of, live, lo, hi, density)
+        self.by_kinks(rows, branches, all_of, some=live, lo=lo, hi=hi, density=density)
         # Where the speed moves the landing place by less than a cell its derivative says nothing, if it has a sign.
         rate = all_of.delta.absolute()
         spread = float(law.borders[-1] - law.borders[0]) * rate.lo
         curved = live[((spread > h) & (rate.lo > 0.0))[live]]
         if curved.size:
-            self.by_borders(rows, branches, all_of, curved, lo, hi, density)
+            self.by_borders(rows, branches, all_of, some=curved, lo=lo, hi=hi, density=density)
 
     def _undecided(
         self, rows: Rows, branches: Decided, lo: Array, hi: Array, density: float, known: Flags
@@ -267,7 +275,9 @@ class _Parts(Deficits):
         if some.size:
             below, both = branches.cell_below[some], np.ones(some.size, bool)
             self.gaps.append(
-                self.gaps_of(cell[some], MORE * much[some], rows.side, below, lo[some], hi[some], both)
+                self.gaps_of(
+                    cell[some], MORE * much[some], rows.side, flips=below, lo=lo[some], hi=hi[some], both=both
+                )
             )
         lost = cell[~known]
         if lost.size:

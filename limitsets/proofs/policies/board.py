@@ -126,7 +126,16 @@ def board_of(
         begin &= ~beyond
     if not begin.any():
         raise AnswerError("the starts", words, "some that are not caught at once", "name others")
-    return Board(scene, covers, (x, side), mode, noises, CellSet(cells_of, begin), words, game)
+    return Board(
+        scene,
+        covers,
+        (x, side),
+        mode=mode,
+        noise=noises,
+        starts=CellSet(cells_of, begin),
+        starts_are=words,
+        game=game,
+    )
 
 
 def _cells(

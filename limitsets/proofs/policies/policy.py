@@ -109,10 +109,10 @@ def policy_of(
         answers,
         game.throws,
         np.array([order.get(each, NONE) for each in roots], dtype=np.int64),
-        belief,
-        np.array([choices[number][0] for number in kept], dtype=np.int64),
-        after,
-        solved.throws[kept].copy(),
+        belief=belief,
+        throw=np.array([choices[number][0] for number in kept], dtype=np.int64),
+        after=after,
+        left=solved.throws[kept].copy(),
     )
 
 

@@ -345,7 +345,9 @@ def feedback(
     chosen = load(scene)
     asked = _sensor_of(chosen, sensor)
     own = asked.cuts if isinstance(asked, BeyondSensor) else ()
-    board = board_of(chosen, mode, goal, starts, cells, noise, (*cuts, *own), progress)
+    board = board_of(
+        chosen, mode, goal, starts=starts, cells=cells, noise=noise, cuts=(*cuts, *own), progress=progress
+    )
     return _play(board, asked, Limits(throws, seconds, beliefs), progress)
 
 

@@ -230,7 +230,9 @@ def _beyond(cover: Cover, side: int, x: float) -> NearHinge:
     q, reason = leaves(cover.box, side, point, x)
     reason = SCATTERED_BEYOND if cover.box.landing > 0.0 else reason
     # R' grows with R there, by a factor of q at least
-    return NearHinge(x, q, np.inf, not reason, not reason, reason, (point.lo, point.hi))
+    return NearHinge(
+        x, q, np.inf, rises=not reason, proved=not reason, reason=reason, fixed_point=(point.lo, point.hi)
+    )
 
 
 # ----------------------------------------------------------------
@@ -420,8 +422,8 @@ def basin(cover: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
         start,
         explained,
         *shares_of(cover, joint, shut, near, start, explained),
-        missing,
-        thin,
+        missing=missing,
+        thin=thin,
     )
 
 

@@ -560,7 +560,7 @@ def certify_map(
     if progress is not None:
         progress("transitions", 0, 1)
     graph = transitions(lower, grid, "boxes", upper=upper)
-    proof = ProofOfMap(lower, upper, graph, _components(graph), (), (), 0.0)
+    proof = ProofOfMap(lower, upper, graph, component=_components(graph), claims=(), cycles=(), seconds=0.0)
     orbits: tuple[CycleOfMap, ...] = ()
     answers = []
     for word in wanted:

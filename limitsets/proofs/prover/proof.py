@@ -307,11 +307,7 @@ class Proof(Tabled):
             reason=claim.reason or None,
             recurs=claim.recurs or None,
             counterexample=[self._state(claim, state) for state in claim.counterexample] or None,
-            parameters=self.values(),
-            effects=self.effects or None,
-            noise=self.noise or None,
-            tolerance=self.tolerance or None,
-            laid=by_side(self.laid) or None,
+            **self._conditions(),
             max_throws=self.max_throws() if proved and claim.claim == "attracts-all" else None,
             jog_fixed_points=claim.jog_fixed_points,
             extents=self._extents(claim) if proved else None,
@@ -324,6 +320,16 @@ class Proof(Tabled):
             unresolved=_by_side(each.unresolved.extents() for each in attractions),
             timings={"certify": self.seconds},
         )
+
+    def _conditions(self) -> dict[str, Any]:
+        """Give the scenes and the starts for which the claims are made."""
+        return {
+            "parameters": self.values(),
+            "effects": self.effects or None,
+            "noise": self.noise or None,
+            "tolerance": self.tolerance or None,
+            "laid": by_side(self.laid) or None,
+        }
 
     def values(self) -> dict[str, str | list[str]]:
         """Name every quantity of the scene with its text: the two ends where it is fixed but unknown."""

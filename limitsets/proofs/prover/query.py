@@ -128,7 +128,9 @@ def worst_orbit(attractors: Attraction, wrong: Wrong) -> Refutation:
         known |= good
         begin = np.flatnonzero((here >= 0) & levels[back][here])
         begin = begin[begin >= BEFORE][:KEPT]
-        refutation = _followed(attractors, wrong, raster, levels, path, begin, options)
+        refutation = _followed(
+            attractors, wrong, raster, levels=levels, path=path, begin=begin, options=options
+        )
         if refutation.states:
             return refutation
     return Refutation()
@@ -182,17 +184,7 @@ STARTS = ("every", "within", "almost-every", "from", "cells")
 def weakest_of(claims: Sequence[Claim], attractions: Sequence[Attraction]) -> Claim:
     """Join one claim, proved on every piece by its cells: with the weakest of the numbers, for the fewest starts."""
     sections = [claim.section for claim in claims]
-    section = dict(sections[0])
-    near = [other["near_joint"] for other in sections if "near_joint" in other]
-    section.pop("near_joint", None)
-    if len(near) == len(sections):
-        section["near_joint"] = {side: _weakest([other[side] for other in near]) for side in near[0]}
-    for count in ("max_rank", "throws", "jogs", "thinning"):
-        counts = [other[count] for other in sections if count in other]
-        if counts:
-            section[count] = max(counts)
-    if "least_slope" in section:
-        section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
+    section = _weakest_numbers(sections)
     if claims[0].starts is None:
         return Claim(claims[0].claim, "proved", "", section)
     words = [one.starts if isinstance(one.starts, str) else next(iter(one.starts)) for one in claims]
@@ -200,11 +192,7 @@ def weakest_of(claims: Sequence[Claim], attractions: Sequence[Attraction]) -> Cl
     starts = weakest.starts
     section.pop("lost", None)
     if isinstance(starts, dict) and "from" in starts:
-        given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
-        if len(near) < len(sections):  # of starts before the cells nothing is claimed then
-            first = [[float(edges[0]) for (edges,) in one.cover.grid.edges] for one in attractions]
-            given += [{side: cells[int(side)] for side in given[0]} for cells in first]
-        starts = {"from": {side: max(each[side] for each in given) for side in given[0]}}
+        starts = {"from": _farthest_start(claims, attractions, below_cells="near_joint" in section)}
         section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
         lost = [other["lost"] for other in sections if "lost" in other]
         if len(lost) == len(claims):
@@ -228,6 +216,34 @@ def weakest_of(claims: Sequence[Claim], attractions: Sequence[Attraction]) -> Cl
         f" of {share:g} % of the starts the same is not proved for all, and 1 % may be"
     )
     return replace(joined, verdict="proved-on-cells", reason=reason)
+
+
+def _weakest_numbers(sections: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Join the sections of one claim: the largest counts, the least slope, the least expansion near the joint."""
+    section = dict(sections[0])
+    near = [other["near_joint"] for other in sections if "near_joint" in other]
+    section.pop("near_joint", None)
+    if len(near) == len(sections):
+        section["near_joint"] = {side: _weakest([other[side] for other in near]) for side in near[0]}
+    for count in ("max_rank", "throws", "jogs", "thinning"):
+        counts = [other[count] for other in sections if count in other]
+        if counts:
+            section[count] = max(counts)
+    if "least_slope" in section:
+        section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
+    return section
+
+
+def _farthest_start(
+    claims: Sequence[Claim], attractions: Sequence[Attraction], *, below_cells: bool
+) -> dict[str, float]:
+    """Return by side from where on the goal holds on all pieces; only on their cells, unless `below_cells` too."""
+    given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
+    if not below_cells:
+        given += [
+            {side: float(one.cover.grid.edges[int(side)][0][0]) for side in given[0]} for one in attractions
+        ]
+    return {side: max(each[side] for each in given) for side in given[0]}
 
 
 def _weakest(near: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -445,7 +461,14 @@ class Query:
             answer = self._against(attractors, goal)
             if answer.verdict == "refuted":
                 return Outcome(
-                    "refuted", answer.reason, attractors, (answer,), goal, answer.counterexample, piece, noise
+                    "refuted",
+                    answer.reason,
+                    attractors,
+                    answers=(answer,),
+                    refuted=goal,
+                    counterexample=answer.counterexample,
+                    piece=piece,
+                    noise=noise,
                 )
             reason = answer.reason or reason
         return Outcome("undecided", reason, attractors, piece=piece, noise=noise)
