@@ -37,7 +37,7 @@ class Terms:
     missing : str
         The fact that is missing, empty if none.
     matters : callable
-        From the worst value to the value of the missing fact at which it would matter; None where there is no such.
+        From the worst value to the value of the missing fact at which the assumption breaks; None where none breaks it.
     """
 
     limit: float | NDArray[np.float64] | None
@@ -56,7 +56,7 @@ class Assumption:
     effect : str
         The effect that lifts it, or "release" and "arm", which no effect does.
     what : str
-        Which of the effect's assumptions.
+        Name of the assumption among those that the effect lifts.
     name : str
         The assumption in three or four words.
     words : str

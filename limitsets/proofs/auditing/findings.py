@@ -34,18 +34,18 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Extents = dict[int, list[tuple[float, float]]]
 
-# Throws that are looked at for a count alone: a second's worth.
+# Throws that are evaluated where only a count is wanted: about a second.
 MOST_THROWS = 200_000
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What became of one assumption in one place.
+    """The verdict on one assumption in one place.
 
     Attributes
     ----------
     about : Assumption
-        Which: its effect, words, dimension.
+        The assumption: its effect, words and dimension.
     place : str
         "limit-set" or "domain".
     called_for : bool or None
@@ -53,9 +53,9 @@ class Finding:
     how : str
         "proved" or "sampled".
     side, x : int or None, float or None
-        Of the throw that is worst, or nearest to the limit [length].
+        Start of the throw whose number is worst, or nearest to the limit [length].
     worst : float or None
-        The number there; None where it is beyond all bounds, or nothing was looked at.
+        The number there; None where it has no bound, or no throw was evaluated.
     threshold : float or None
         Its limit on that side; where a fact is missing, the value of the fact at which it would begin to matter.
     missing : str
@@ -63,7 +63,7 @@ class Finding:
     ranges : dict of int to list of (lo, hi)
         Per side where on the domain the assumption is broken [length]; empty for the limit set.
     jogs, flips, others : (int, int)
-        On the orbits: how many such throws break it, of how many; others are rolls.
+        On the orbits: how many jogs, flips and rolls break the assumption, and how many of them there are.
     simulated : bool
         Whether the scene simulates the effect.
     """
@@ -223,7 +223,7 @@ def _proved(box: ParameterBox, cells: Cells, rows: list[Row], hit: Sequence[bool
 def _findings(
     place: str, scene: Scene, box: ParameterBox, rows: list[Row], sites: Places
 ) -> tuple[Finding, ...]:
-    """Every assumption in one place."""
+    """Judge every assumption in one place."""
     limit = place == "limit-set"
     samples, cells = (sites.orbits, sites.limit_cells) if limit else (sites.domain, sites.domain_cells)
     sound = sites.enclosed or not limit
@@ -252,11 +252,11 @@ def _findings(
 
 
 def _prepared(scene: Scene) -> tuple[ParameterBox, list[Row], Places]:
-    """Give what every finding is made of: parameters, assumptions with the scene's facts, throws to look at."""
+    """Collect the parameters, the assumptions with the scene's facts, and the throws at which they are evaluated."""
     from limitsets.feeder.scene import load
     from limitsets.proofs.prover.parameters import parameter_box
 
-    # what the minimal model assumes is asked of its throws, whichever effects are on
+    # the assumptions are those of the minimal model, so its throws are evaluated, whichever effects are on
     without = {} if scene.sides.rests.all() else dict.fromkeys(TIPPING, True)
     box = parameter_box(load({**scene.as_dict(), "effects": without}))
     return box, [Row(about, about.terms(scene, box)) for about in ASSUMPTIONS], places(scene, box)
@@ -277,7 +277,7 @@ def audited(model: Model, scene: Scene) -> Model:
     Returns
     -------
     Model
-        As it was where no limit set is found.
+        Unchanged where there is no limit set.
 
     Examples
     --------
@@ -289,7 +289,7 @@ def audited(model: Model, scene: Scene) -> Model:
     """
     try:
         box, rows, sites = _prepared(scene)
-    except LimitsetsError:  # of this scene nothing is enclosed, so that nobody can look
+    except LimitsetsError:  # no throw of this scene can be enclosed
         return model
     step = -(-sum(sample.x.size for sample in sites.orbits.values()) // MOST_THROWS)
     seen = {side: enclosed_at(box, side, sample.x[::step]) for side, sample in sites.orbits.items()}
@@ -346,7 +346,7 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
 # `[effects] auto = true`: switch on the effects that the limit set calls for, and name those that cannot be.
 
 
-# What no effect lifts: a scene that breaks it has to be changed.
+# Assumptions that no effect lifts: a scene that breaks one has to be changed.
 NO_EFFECT = ("release", "arm")
 
 

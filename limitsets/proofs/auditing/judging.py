@@ -39,14 +39,14 @@ SAMPLES = 4096
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Throws to look at on one side.
+    """Throws on one side at which assumptions are evaluated.
 
     Attributes
     ----------
     x : ndarray, shape (n,)
         Where they start, ascending on the domain [length].
     code : ndarray of int, shape (n,)
-        What they do (`limitsets.systems.maps.codes`); empty where nobody asks.
+        Branch of each throw (`limitsets.systems.maps.codes`); empty where it is not needed.
     """
 
     x: Array
@@ -55,7 +55,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """What to look at.
+    """Cells and throws at which assumptions are evaluated.
 
     Attributes
     ----------
@@ -134,7 +134,7 @@ def _orbits(scene: Scene, sets: list[CellSet]) -> dict[int, Sample]:
 
 
 def places(scene: Scene, box: ParameterBox) -> Places:
-    """Find what to look at.
+    """Collect the cells and throws at which assumptions are evaluated.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def places(scene: Scene, box: ParameterBox) -> Places:
 
 Flags = NDArray[np.bool_]
 
-# A cell on which an assumption is not proved is halved this often, as long as there are no more cells than these.
+# A cell on which an assumption is not proved is halved so many times, while there are no more than so many cells.
 HALVINGS, MOST_CELLS = 10, 200_000
 
 
@@ -192,11 +192,11 @@ class Row:
         return wider
 
     def reached(self, enclosed: Array) -> Array:
-        """Give what is surely reached: the end of the enclosure that breaks the least."""
+        """Give the value that is certainly reached: the end of the enclosure that breaks the limit least."""
         return self.values(enclosed)[:, 0 if self.about.below else 1]
 
     def broken(self, enclosed: Array, side: int) -> Flags:
-        """Whether it is proved to be broken; never where nothing is known."""
+        """Whether the assumption is proved to be broken; never where a fact is missing."""
         reached = self.reached(enclosed)
         beyond = reached > self.limit(side) if self.about.below else reached < self.limit(side)
         # no value of a missing fact is enough
@@ -204,12 +204,12 @@ class Row:
         return beyond | (hopeless & (self.terms.limit is None))
 
     def kept(self, enclosed: Array, side: int) -> Flags:
-        """Whether it is proved to hold."""
+        """Whether the assumption is proved to hold."""
         values = self.values(enclosed)
         return values[:, 1] <= self.limit(side) if self.about.below else values[:, 0] >= self.limit(side)
 
     def spare(self, enclosed: Array, side: int) -> Array:
-        """Give how far within the limit it is, to the width of the enclosures; below 0 beyond it."""
+        """Give the distance of the number from its limit, to the width of the enclosures; below 0 beyond the limit."""
         inside: Array = (self.limit(side) - self.values(enclosed).mean(axis=1)) * (
             1 if self.about.below else -1
         )

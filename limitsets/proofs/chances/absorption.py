@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------
-# What is proved of where a noisy chain ends, and when.
+# Brackets of where a noisy chain ends, and when.
 
 
 Array = NDArray[np.float64]
 
 # Any absorbing set or exit.
 ANY = "any"
-# A certificate claims a little more than was found, and the checker's cells are finer: see `writing`.
+# A certificate claims slightly wider brackets than the proof gives, and the checker's cells are finer: see `chain`.
 ALLOWANCE, FINER = 1e-6, 2
 
 
@@ -69,7 +69,7 @@ class AbsorptionBrackets(Tabled):
     values : dict of str to ndarray, shape (2, n_nodes)
         By name the bounds at the nodes after the last throw, for starts there.
     mean : (float, float)
-        Bounds of the mean of T; the upper one is infinite where none was found.
+        Bounds of the mean of T; the upper one is infinite where no finite bound is proved.
     seconds : float
         Time it took.
     how : str
@@ -135,9 +135,9 @@ class AbsorptionBrackets(Tabled):
         path : str or Path
             The file, NAME.proof.zip; an older one is replaced whole.
         allowance : float
-            What is claimed is wider by this at both ends; bounds of the mean by as many throws times their number.
+            The claimed brackets are wider by this at both ends; bounds of the mean by this times the number of throws.
         finer : int
-            Into how many each cell is cut for the checker, whose way to bound a throw is a little less narrow.
+            Parts into which each cell is cut for the checker, whose bounds of a throw are slightly wider.
         recheck : bool
             Whether to check it first: from seconds to as long as the proof.
 
@@ -208,7 +208,7 @@ def _mean_above(row: Any, values: Array) -> float:
 
 
 def _at_most(nodes: Nodes, values: Array, most: float) -> Array:
-    """Lower a bound far above what no value exceeds: there and at the next nodes it is that, so at all between."""
+    """Lower bounds far above the largest possible value to this value; raise those at the nodes next to them to it."""
     far = values > most + 0.5
     if not far.any():
         return values

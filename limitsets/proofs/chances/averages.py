@@ -6,16 +6,16 @@ above the chord between two nodes by at most
 
     h^2/8 max(0, -M''),     or    h/4 (oscillation of M'),
 
-of which parts may be bounded by the one and parts by the other.  M'' is a sum of slopes of V at the places where
-densities jump ("bends"), and of terms bounded by the total variation of V where moves land ("swings").  What is not
-decided costs the difference of what it may be ("gaps").
+and parts of M may be bounded by the one, parts by the other.  M'' is a sum of slopes of V at the places where
+densities jump ("bends"), and of terms bounded by the total variation of V where moves land ("swings").  Where
+the branch is not decided, the bound is the difference of the values that V may have ("gaps").
 
 Rounding, with u = 2^-53.  The entries of a row are >= 0 with a sum of 1, each computed by fewer than 12 operations from
 places that are doubles, a share 1 - s of a node to u rather than to u (1 - s); entries of one node are merged, at most
 four from each of two runs of 192 strata; so in whatever order scipy adds them up, a mean of k entries is off by less
 than (k + 768 + 12) u times the largest |V|: `rounding_of`, never below `ROUNDING`, which covers the few additions after
 it.  Slopes and extremes have one rounding of their own size, which `MORE` inflates; running sums of n terms, whose
-differences stand for sums over spans, are off by less than n u times the whole sum, which is added (`spans.running`).
+differences stand for sums over spans, are off by less than n u times the whole sum, which is added (`running`).
 Slopes across the nodes of a jump are so large that running sums would lose the others: they are counted, not added.
 """
 
@@ -119,7 +119,7 @@ def nodes_of(
     without: Sequence[Sequence[tuple[float, float]]] | None = None,
     graded: float = 0.0,
 ) -> Nodes:
-    """Place nodes at distances of about `width`, less near the joint, and at special places besides.
+    """Place nodes at distances of about `width`, closer near the joint, and at the special places.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def nodes_of(
 
 
 # ----------------------------------------------------------------
-# Cells of the function that is averaged, from one to another, and what of it on them bounds a mean.
+# Spans of cells of the averaged function, and the quantities of the function on them that bound a mean.
 
 
 class Span(NamedTuple):
@@ -194,7 +194,7 @@ class Gaps(NamedTuple):
 class Kinks(NamedTuple):
     """To `cell`'s deficit comes `much` times the sum of what the slope of V falls by at the nodes within a span.
 
-    Or `even` times the most that it falls by per length, where that is less; and `bow` times the largest slope there.
+    Or `even` times the largest fall of the slope per length, where that is less; and `bow` times the largest slope.
     """
 
     cell: Index
@@ -205,7 +205,7 @@ class Kinks(NamedTuple):
 
 
 class Curvature(NamedTuple):
-    """One way to bound the deficit by curvature, for the cells that it knows."""
+    """One way to bound the deficits of some cells by curvature."""
 
     cells: Index
     bends: tuple[Bends, ...] = ()
@@ -215,7 +215,7 @@ class Curvature(NamedTuple):
 
 
 class Running(NamedTuple):
-    """Running sums of numbers >= 0, from 0 on, and how far a difference of two may be off."""
+    """Running sums of numbers >= 0, from 0 on, and a bound of the rounding of a difference of two."""
 
     total: Array
     off: float
@@ -312,13 +312,13 @@ class Average:
     matrix : csr_array, shape (n, m)
         From values at the nodes of the target to means at those of the source.
     beyond : float
-        Weight of which nothing is known.
+        Weight of the deviations outside the strata.
     at_nodes : tuple of Swings
         How far the means at nodes may be off.
     swings, gaps : tuple of Swings, tuple of Gaps
-        The same of means anywhere in a cell.
+        How far the means anywhere in a cell may be off.
     ways : tuple of Curvature
-        Deficits of the chord, h included; of several ways the best counts, for each cell.
+        Bounds of the deficits of the chord, h included; the least bound counts for each cell.
     """
 
     source: Nodes
@@ -368,7 +368,7 @@ class Average:
         return bound
 
     def _deficit(self, values: Array, slopes: Array, total: Running, n: int) -> Array:
-        """How far the mean may lie above the chord, for each cell, named by its left node."""
+        """Bound how far the mean may lie above the chord, for each cell, named by its left node."""
         excess, best, width = np.zeros(n), np.full(n, np.inf), self.target.width
         for each in self.swings:
             excess += np.bincount(each.row, _variation(total, each), n)
@@ -405,7 +405,7 @@ class Average:
             known[way.cells] = True
             best[way.cells] = np.minimum(best[way.cells], deficit[way.cells])
         best[~known] = 0.0
-        # Nodes close together are lifted alike: a difference would be a slope without end.
+        # Nodes close together are lifted by the same amount: a difference would be a very large slope.
         close = np.flatnonzero(self.source.width < CLOSE_BY * np.median(self.source.width))
         for _ in range(CLUSTER):
             best[close] = np.maximum(best[close], np.maximum(best[close - 1], best[close + 1]))

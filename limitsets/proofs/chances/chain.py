@@ -27,10 +27,10 @@ Array = NDArray[np.float64]
 Place = tuple[int, float, float]
 
 EXITS = "exits"
-# Into how many strata each law is cut: a uniform one needs them for the curvature of the landing place alone.
+# Number of strata into which each law is cut: a uniform law needs them only for the curvature of the landing place.
 SPEED_STRATA, LANDING_STRATA = 16, 1
 NORMAL_SPEED, NORMAL_LANDING = 96, 192
-# Cells of the function of the landing place for one of the function of the start.
+# Number of cells of the function of the landing place for each cell of the function of the start.
 FINER = 4
 # Cells are narrower near the joint, up to this share of the arm, where no scatter of the landing smooths functions.
 GRADED = 0.43
@@ -43,11 +43,11 @@ class Chain:
     Attributes
     ----------
     nodes : Nodes
-        Of the functions.
+        Nodes of the functions.
     throw : Average
-        Over the speed.
+        Average over the speed.
     landing : Average or None
-        Over the landing place; None where it does not deviate.
+        Average over the landing place; None where it does not deviate.
     free : ndarray of bool, shape (n,)
         Nodes from which a throw is made, or at the border of such places.
     absorbs : dict of str to ndarray of bool, shape (n,)
@@ -101,7 +101,7 @@ def _absorbing(
 def _special(
     sides: list[OneSide], box: ParameterBox, absorbing: Mapping[str, Sequence[Place]], law: Staircase
 ) -> list[list[list[float]]]:
-    """Per side clusters of nodes: where functions jump, and where the speed begins and ceases to decide."""
+    """Per side clusters of nodes: where functions jump, and where the speed begins and ceases to decide the branch."""
     lo, hi = box.bare
     close = CLOSE * hi.arm_length
     below, above = lo.arm_length, hi.arm_length
@@ -212,8 +212,8 @@ def chain_of(
 # The certificate of brackets: laws, starts, places that absorb, nodes; the checker makes the steps itself.
 #
 # The checker bounds a throw in its own way, which needs somewhat finer cells for the same width: the certificate cuts
-# each cell, and claims what was found, widened by an allowance.  The file is laid out as
-# every certificate (docs/certificates.md).
+# each cell, and claims the proved brackets, widened by an allowance.  The file has the layout of every certificate
+# (docs/certificates.md).
 
 
 # Strata of the speed for the checker: between their ends it takes landing places to be linear.

@@ -1,7 +1,7 @@
 """How far the mean after a throw may lie above its chord on a cell, for laws given as staircases.
 
-By the borders of strata and branches, where the density of the speed jumps; by the nodes at which the slope of the
-averaged function falls; and by all that this function may be where throws land.
+There are three bounds: from the borders of strata and branches, where the density of the speed jumps; from the nodes
+at which the slope of the averaged function falls; and from the range of this function where throws land.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from limitsets.proofs.prover.numbers import Intervals, RationalInterval, pi, squ
 # ----------------------------------------------------------------
 # Laws as staircases: a density that is constant on strata, and how far the law itself may be from it.
 #
-# A uniform law is one.  For a normal law the steps have its exact masses, enclosed in rationals, so that of a
-# function V only its variation within a stratum meets the difference: with osc the change of the density on a stratum
-# of width w,
+# A uniform law is a staircase.  For a normal law the steps have its exact masses, enclosed in rationals, so that only
+# the variation of a function V within a stratum contributes to the difference: with osc the change of the density on a
+# stratum of width w,
 #
 #     | int (p - step) V | = | int (p - step) (V - c) | <= (osc w / 4) (total variation of V there).
 #
-# What lies beyond six standard deviations is a weight of which nothing is known.
+# The weight beyond six standard deviations may lie anywhere.
 
 
 Array = NDArray[np.float64]
@@ -96,9 +96,9 @@ def staircase(law: Any, strata: int, name: str) -> Staircase:
     law : Uniform, Gaussian or None
         The law; None for a deviation of 0.
     strata : int
-        How many; of a normal law a multiple of 12.
+        Number of strata; a multiple of 12 for a normal law.
     name : str
-        What deviates, for the error.
+        The quantity that deviates, for the message of an error.
 
     Raises
     ------
@@ -162,16 +162,16 @@ def landing_average(target: Nodes, source: Nodes, law: Staircase) -> Average:
     Parameters
     ----------
     target : Nodes
-        Of V.
+        Nodes of V.
     source : Nodes
-        Of y; the outermost nodes lie as far out.
+        Nodes of y; the outermost nodes lie as far out as those of V.
     law : Staircase
-        Of e.
+        The law of e.
     """
     n, strata = source.place.size, law.weight.size
     side, y = source.side(), source.place
     reach = max(law.borders[-1], -law.borders[0])
-    # Far out V is constant, and stays so within reach.
+    # Far out V is constant, also within the reach of the law.
     y = np.clip(y, target.place[0] + reach, target.place[-1] - reach)
     row = np.repeat(np.arange(n), strata)
     ends = y[:, None] + law.borders
@@ -190,7 +190,7 @@ def landing_average(target: Nodes, source: Nodes, law: Staircase) -> Average:
     jumps = -np.diff(law.density, prepend=0.0, append=0.0)
     bends, swings = [], []
     for border, jump in zip(law.borders, jumps, strict=True):
-        # A tenth of a rounding: where nothing jumps nothing bends.
+        # A jump below rounding is none, and bends nothing.
         if abs(jump) > 1e-12 * law.density.max():
             span = _span(target, side[cells], y[cells] + border, y[cells + 1] + border)
             much = h * h / 8.0 * jump
@@ -226,7 +226,7 @@ Flags = NDArray[np.bool_]
 
 # Inflates coefficients against the rounding of the few operations that make them.
 MORE = 1.0 + 2.0**-40
-# A cap that is none.
+# Stands for the absence of a cap.
 NEVER = 1e200
 
 
@@ -271,7 +271,7 @@ class Deficits:
         self.ways: list[Curvature] = []
 
     def landing(self, side: OneSide, flips: Flags, place: Array) -> tuple[Index, Array]:
-        """Return the side on which throws land, and where, of the places of jogs."""
+        """Return the side and the place where throws land, from the places where jogs land."""
         return np.where(flips, side.after, side.number), np.where(flips, place - side.shift, place)
 
     def span_of(self, side: OneSide, flips: Flags, lo: Array, hi: Array) -> Span:
@@ -283,11 +283,11 @@ class Deficits:
     def gaps_of(
         self, cell: Index, much: Array, side: OneSide, flips: Flags, lo: Array, hi: Array, both: Flags
     ) -> Gaps:
-        """Return gaps between such places, on both branches where `both`."""
+        """Return gaps over the cells between two places of jogs, on both branches where `both`."""
         return Gaps(cell, much, self.span_of(side, flips, lo, hi), self.span_of(side, flips ^ both, lo, hi))
 
     def any_way(self, rows: Rows, branches: Decided, some: Index, lo: Array, hi: Array) -> None:
-        """By all that V may be where throws land."""
+        """Bound deficits by the range of V where throws land."""
         cell = rows.number[:-1][some]
         below, above = branches.cell_below[some], branches.cell_above[some]
         gaps = self.gaps_of(
@@ -309,7 +309,7 @@ class Deficits:
         hi: Array,
         density: float,
     ) -> None:
-        """By what the slope of V falls at nodes, each met by a share of the deviations only."""
+        """Bound deficits by the falls of the slope of V at nodes, each met by only a share of the deviations."""
         law, side, cell = self.law, rows.side, rows.number[:-1]
         h = np.diff(rows.x)[some]
         t = Derivatives(*(each[some] for each in all_of))
@@ -356,7 +356,7 @@ class Deficits:
         hi: Array,
         density: float,
     ) -> None:
-        """By the borders of strata and branches, where the densities jump."""
+        """Bound deficits by the borders of strata and branches, where the densities jump."""
         bends: list[Bends] = []
         swings: list[Swings] = []
         gaps: list[Gaps] = []
@@ -414,7 +414,7 @@ class Deficits:
     def _moving(
         self, rows: Rows, branches: Decided, some: Index, here: Index, below: Flags, above: Flags
     ) -> list[Bends]:
-        """Return what the border between the branches bends."""
+        """Return the bends at the border between the branches."""
         law, side = self.law, rows.side
         h = np.diff(rows.x)[some]
         one_cut, two_cut = branches.cut[some], branches.cut[some + 1]
@@ -436,7 +436,7 @@ class Deficits:
         return self._border(rows, some, here, below, border) + self._border(rows, some, here, above, other)
 
     def _border(self, rows: Rows, some: Index, here: Index, flips: Flags, border: _Border) -> list[Bends]:
-        """Return what the jump of the density at a border, fixed or moving with x, bends."""
+        """Return the bends by the jump of the density at a border, fixed or moving with x."""
         if not here.size:
             return []
         side, cell = rows.side, some[here]

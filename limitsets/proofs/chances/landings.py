@@ -57,7 +57,7 @@ def _horner(coefficients: list[float], q: Array) -> Array:
 
 
 def moments(phi: Array, most: int = 2) -> Moments:
-    """Evaluate them at angles from 0 to 2 pi, up to k = `most`; nan beyond."""
+    """Evaluate the moments at angles from 0 to 2 pi, up to k = `most`; nan beyond."""
     q = phi * phi
     count = range(most + 1)
     return Moments(
@@ -268,7 +268,7 @@ def slopes(side: OneSide, phi: Intervals, delta: Intervals) -> Derivatives:
 
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
-# Of all cells: surely flips, surely jogs, what is open, and the branches below and above the border.
+# For all cells: certain flips, certain jogs, how far the border is open, and the branches below and above the border.
 _Cells = tuple[Flags, Flags, Array, Flags, Flags]
 
 BISECTIONS = 48
@@ -290,7 +290,7 @@ class Piece(NamedTuple):
 
 
 class Decided(NamedTuple):
-    """Of nodes x_k of a side and the cells between them.
+    """The branches of throws from nodes x_k of a side and from the cells between them.
 
     Attributes
     ----------
@@ -345,7 +345,7 @@ def _at(side: OneSide, x: Array, delta: Array) -> Intervals:
 
 
 def _bisected(side: OneSide, x: Array, lo: Array, hi: Array, rising: NDArray[np.bool_]) -> Array:
-    """Propose where F changes its sign between two deviations; an end where it does not."""
+    """Propose the deviation at which F changes its sign between two; one of these two where it keeps its sign."""
     lo, hi = lo.copy(), hi.copy()
     for _ in range(BISECTIONS):
         middle = 0.5 * (lo + hi)
@@ -356,7 +356,7 @@ def _bisected(side: OneSide, x: Array, lo: Array, hi: Array, rising: NDArray[np.
 
 
 def hull(some: Iterable[Intervals]) -> Intervals:
-    """Give the least intervals that hold all of these."""
+    """Give the least intervals that hold all of the given ones."""
     lo, hi = zip(*((each.lo, each.hi) for each in some), strict=True)
     return Intervals(np.minimum.reduce(lo), np.maximum.reduce(hi))
 

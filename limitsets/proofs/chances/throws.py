@@ -40,7 +40,7 @@ Index = NDArray[np.int64]
 MORE = 1.0 + 2.0**-40
 # Deviations of the speed enclosed at a time: of 6 % at once no derivative keeps its sign.
 PIECE = 0.005
-# A cap that is none.
+# Stands for the absence of a cap.
 NEVER = 1e200
 
 
@@ -58,13 +58,13 @@ def throw_average(
     sides : list of OneSide
         The sides.
     source : Nodes
-        Of the starts.
+        Nodes of the starts.
     target : Nodes
-        Of the function that is averaged.
+        Nodes of the averaged function.
     law : Staircase
-        Of the relative deviation of the speed.
+        The law of the relative deviation of the speed.
     runs : list of ndarray of int
-        Numbers of consecutive nodes of one side between which all is wanted; the first may lie at the joint.
+        Runs of consecutive nodes of one side whose cells are bounded; the first node may lie at the joint.
     """
     parts = _Parts(source, target, law)
     for numbers in runs:
@@ -84,7 +84,7 @@ def _columns(borders: Array) -> list[tuple[int, int]]:
 
 
 class _Parts(Deficits):
-    """What is collected, side by side."""
+    """The segments, swings and gaps of an average, collected side by side."""
 
     def __init__(self, source: Nodes, target: Nodes, law: Staircase) -> None:
         super().__init__(target, law)
@@ -95,7 +95,7 @@ class _Parts(Deficits):
         self.gaps: list[Gaps] = []
 
     def average(self) -> Average:
-        """Put them together."""
+        """Join the collected parts to an average."""
         columns = [np.concatenate(column) for column in zip(*self.segments, strict=True)]
         matrix = mean_matrix(self.source.place.size, self.target, *columns)
         return Average(
@@ -115,7 +115,7 @@ class _Parts(Deficits):
         x = self.source.place[numbers]
         joint = x <= side.spans["a"][1]
         begin = int(joint.sum())
-        x = np.maximum(x, x[begin])  # at the joint: as from the first place beyond it
+        x = np.maximum(x, x[begin])  # starts at the joint are taken as the first one beyond
         every = landed(side, np.repeat(x, law.borders.size), np.tile(law.borders, n))
         table: list[Any] = [column.reshape(n, -1) for column in every]
         rows = Rows(
@@ -220,7 +220,7 @@ class _Parts(Deficits):
         known = (
             np.isfinite(t_x) & np.isfinite(t_delta) & rows.good[:-1] & rows.good[1:] & np.isfinite(lo + hi)
         )
-        # At the joint: whatever lies between it and where the first place beyond it lands.
+        # At the joint: throws land between the joint and the landing place of the first start beyond it.
         lo[:begin] = np.minimum(lo[:begin], side.spans["a"][0])
         density = 1.0 if law.certain else float(law.density.max())
         self._undecided(rows, branches, lo, hi, density, known)
@@ -255,7 +255,7 @@ class _Parts(Deficits):
     def _undecided(
         self, rows: Rows, branches: Decided, lo: Array, hi: Array, density: float, known: Flags
     ) -> None:
-        """Where the branch is open, or not that of the node's row; where nothing is proved anything may be."""
+        """Add gaps where the branch is open or is not that of the node's row, and where no landing place is proved."""
         law, cell = self.law, rows.number[:-1]
         first, last = law.borders[0], law.borders[-1]
         off = np.zeros(cell.size)

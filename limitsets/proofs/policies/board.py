@@ -1,4 +1,4 @@
-"""A scene's throws on cells: what a controller plays on, before a sensor is chosen."""
+"""The board of a game: a scene's throws on cells, before a sensor is chosen."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Board:
     scene : Scene
         The scene.
     covers : dict of str to Cover
-        The cells, and the images proved of them, of every throw, noise included.
+        For every throw the cells and their proved images, noise included.
     goal : tuple of (float, int)
         The goal region: at x or beyond, on this side.
     mode : str
@@ -45,7 +45,7 @@ class Board:
     starts : CellSet
         Where the part may lie at first.
     starts_are : str
-        How they were named.
+        How the caller named the starts.
     game : Game
         The game on the cells, as yet without a sensor.
     """
@@ -157,7 +157,7 @@ def _cells(
 
 
 def _starts(scene: Scene, cells: Grid, starts: Starts, noise: dict[str, str]) -> tuple[Mask, str]:
-    """Give the cells of the starts, and how they are named."""
+    """Give the cells of the starts, and the words for them."""
     mask = np.zeros(cells.n_cells, dtype=bool)
     if starts is None:
         graph = cover_on(parameter_box(scene, noise=noise), cells).graph

@@ -26,7 +26,7 @@ from limitsets.systems.graph.ranges import expand
 
 Bits = NDArray[np.uint64]
 
-# Of the beliefs that are looked through for a subset the last so many: one that is not found only costs time.
+# Only so many of the latest beliefs are searched for a subset: a subset that is missed only costs time.
 COMPARED = 4096
 
 

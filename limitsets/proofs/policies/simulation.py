@@ -19,12 +19,12 @@ from limitsets.systems.graph.images.enclosed import DECIDED, BoxImages
 from limitsets.systems.maps import images
 
 # ----------------------------------------------------------------
-# What no policy can do: the same game on finitely many starts, whose images are enclosed.
+# Proof that no policy serves some starts: the same game on finitely many starts, whose images are enclosed.
 #
-# Cells are outer images, on which a policy may fail that would work.  Here a belief is a set of single starts that saw
-# the same throws and answers.  A start of which an answer, a decision or the goal region is not certain is taken out,
-# which makes the game easier; so what is not won within n throws is won by no policy, on those starts or any that hold
-# them.
+# On cells, which are outer images, a policy may fail that works in fact.  Here a belief is a set of single starts that
+# saw the same throws and answers.  A start is taken out where an answer, a decision or the goal region is not certain;
+# this makes the game easier.  So if these starts are not won within n throws, no policy wins them in n throws, nor any
+# set of starts that holds them.
 
 
 BEAT = 16
@@ -32,7 +32,7 @@ BEAT = 16
 
 @dataclass(frozen=True, eq=False)
 class Impossible:
-    """What was shown of the starts.
+    """A proved number of throws within which no policy serves some starts.
 
     Attributes
     ----------

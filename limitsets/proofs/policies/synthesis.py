@@ -140,7 +140,7 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Synthesis(Board, Tabled):
-    """What one bit of feedback was found to do, and the game in which: its sensor included.
+    """The answer of a search for a policy with one bit of feedback, and the game that was searched.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ class Synthesis(Board, Tabled):
 
     @property
     def model(self) -> Model:
-        """Of which model the policy is, and which facts of the scene that leaves out."""
+        """The model for which the policy is proved, and the facts of the scene that this model leaves out."""
         return Model.of(self.scene, self.noise)
 
     def asking(self, sensor: Sensor | None) -> Synthesis:
@@ -206,7 +206,7 @@ class Synthesis(Board, Tabled):
         return write(path, self, self.sensor, self.found.policy, recheck=recheck, workers=workers)
 
     def denied(self, why: str) -> Synthesis:
-        """Return what is left of it where the checker denies its certificate: nothing is decided."""
+        """Return the answer where the checker denies its certificate: nothing is decided."""
         reason = f"the checker denies it: {why}"
         return replace(
             self, found=replace(self.found, verdict=NOT_DECIDED, throws=-1, policy=None, reason=reason)

@@ -24,7 +24,7 @@ BELOW = "with the arm's surface above the joint, starts nearer to it than the fi
 
 @dataclass(frozen=True, eq=False)
 class Attraction:
-    """What is proved of where starts end.
+    """The attracting cells of a cover, and the proof that starts enter them.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Attraction:
     proved : bool
         Whether every start on (a_i, arm.length] of every side enters the attracting cells.
     reason : str
-        What is missing and where, empty if nothing.
+        The first step that is not proved, and where; empty if all are.
     unresolved : CellSet
         Recurrent cells that do not attract.
     """

@@ -6,7 +6,7 @@ length zero.  Off the attracting cells a cell of the basin is of one of three ki
 * *falling*: every image lies in cells of smaller rank;
 * *passing*: besides in such cells it may lie in the cell itself again, and jogs from the cell are proved to go one way,
   all outward or all inward, by more than the noise of the landing place: an orbit leaves the cell after finitely many;
-* *thin*: the rank does not rise, and almost every start leaves the cells of that rank (`perron_frobenius.py`).
+* *thin*: the rank does not rise, and almost every start leaves the cells of that rank (`thinning.py`).
 
 Ranks do not rise along any image, so an orbit that does not come to the attracting cells stays in thin cells of one
 rank from some throw on.  Such starts have length zero, and so have all that are thrown there, where the slope is proved
@@ -51,10 +51,10 @@ from limitsets.systems.graph.components import ranks, reach
 # most. With effects the left vertex has to land first, phi at most the exterior angle there, and a part that rolls on
 # has to come to rest in the cells: every start then either rests as above, or is in the cells at once. The
 # small-angle flights have phi >= 2 r / kappa and no v and w in the displacement, so the same q serves. For h > 0 see
-# `fixed_point.py`. Source: docs/model.md, "Conventions": near a_i.
+# `cover.py`. Source: docs/model.md, "Conventions": near a_i.
 
 
-# q - 1 is lowered by this share, so that other arithmetic can confirm it where the parameters are wide.
+# q - 1 is lowered by this share, so that the checker's arithmetic can confirm it where the parameters are wide.
 SLACK_OF_Q = 2.0**-26
 
 
@@ -74,7 +74,7 @@ class NearHinge:
     rises : bool
         Whether R' is proved to grow with R on (a_i, x] at least as fast: the displacement grows with the angle.
     proved : bool
-        Whether q > 1 and all that it rests on is proved.
+        Whether q > 1 is proved, with everything that the factor rests on.
     reason : str
         What is missing, empty if nothing.
     fixed_point : (float, float) or None
@@ -82,7 +82,7 @@ class NearHinge:
     rolls : bool
         Whether a throw from (a_i, x] may roll on to another side.
     empty : bool
-        Whether no throw begins on this side, for the part cannot rest on it; all is proved of no starts.
+        Whether no throw begins on this side, because the part cannot rest on it; the proof is then trivial.
     """
 
     x: float
@@ -96,7 +96,7 @@ class NearHinge:
     empty: bool = False
 
 
-# Of a side on which the part cannot rest.
+# The entry of a side on which the part cannot rest.
 NO_STARTS = NearHinge(np.inf, np.inf, -np.inf, True, True, "", empty=True)
 
 
@@ -223,7 +223,7 @@ def _rolled(cover: Cover, side: int, x: float, reach: float) -> tuple[float, boo
 
 
 def _beyond(cover: Cover, side: int, x: float) -> NearHinge:
-    """Prove it where the arm's surface is above the joint."""
+    """Prove the expansion beyond the fixed point of the jog, where the arm's surface is above the joint."""
     point = cover.points[side]
     if point.reason:
         return NearHinge(x, np.nan, np.inf, False, False, point.reason)
@@ -255,7 +255,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Basin:
-    """What is proved of where starts come to.
+    """The starts that are proved to come to the attracting cells.
 
     Attributes
     ----------
@@ -436,9 +436,9 @@ def _reaching(cover: Cover, cells: Mask) -> Mask:
 
 
 def _passing(cover: Cover, alone: Mask) -> Mask:
-    """Of some cells, those from which jogs are proved to go one way by more than the noise of the landing place."""
+    """Return the cells from which jogs are proved to go one way by more than the noise of the landing place."""
     passing = np.zeros_like(alone)
-    if cover.box.effects:  # another vertex may land, elsewhere
+    if cover.box.effects:  # another vertex may land first, at another place
         return passing
     for side in range(len(cover.grid.edges)):
         own = cover.grid.of_side(side)

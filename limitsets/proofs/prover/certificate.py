@@ -203,7 +203,7 @@ def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
 
 
 def _say_nothing(arrays: dict[str, NDArray[Any]], cover: Cover) -> None:
-    """Of cells of which nothing is proved: they land within a turn if at all, and may go anywhere."""
+    """Enter the cells whose images are not proved: their starts land within one turn if at all, at any place."""
     offset, sides = cover.grid.offset, cover.grid.sides
     for side, images in enumerate(cover.images):
         cells, after = offset[side] + np.flatnonzero(images.lost), (side + 1) % sides
@@ -268,7 +268,7 @@ def write(
     claims : sequence of mapping
         ``{"claim": ..., "section": {...}}`` each, and the ``verdict`` where it is not "proved".
     noise, tolerance : mapping or None
-        What the parameters were allowed to do.
+        Deviations of the parameters for which the claims are proved.
     unit : str
         Unit of length.
     producer : mapping
@@ -293,7 +293,7 @@ def write(
     for number, proof in enumerate(proofs):
         arrays |= arrays_of(proof, f"{number}.")
         cover = proof.cover
-        # what is left of the effects here is a spread; a scene may leave the model to its defaults
+        # the only effect here is a spread; a scene may leave the model to its defaults
         scene = {word: tidy(table) for word, table in cover.box.scene.items() if word != "effects"}
         scene["model"] = _model(cover)
         if cover.box.scene.get("effects", {}).get("spread"):

@@ -40,10 +40,10 @@ from limitsets.systems.cells import Grid
 # Cells per side, tried in turn until everything asked for is proved or refuted.
 LADDER = (2048, 8192, 32768, 131072)
 
-# Pieces into which a tolerance may be cut, and cells that may be tried on them, before it is given up.
+# Pieces into which a tolerance may be cut, and cells that may be tried on them, before the proof is given up.
 MOST_PIECES, MOST_CELLS = 1024, 4_000_000
 
-# Of the pieces so many, the widest, are searched for an orbit that refutes the goal, besides the corners.
+# An orbit that refutes the goal is searched for in so many of the widest pieces, and at the corners.
 MOST_SEARCHED = 8
 
 Progress = Callable[[str, int, int], None]
@@ -64,14 +64,14 @@ def _attracts_all(attractors: Attraction, scene: Scene) -> Claim:
 
 
 def _not_attracted(attractors: Attraction, scene: Scene) -> Claim:
-    """Say why attraction is not proved: first what no finer cells can change."""
+    """Say why attraction is not proved; reasons that finer cells cannot remove come first."""
     box = attractors.cover.box
     if box.lo.surface_height <= 0.0 <= box.hi.surface_height:
         reason = "the arm's surface is not proved to be below the joint nor above it"
         return Claim("attracts-all", "undecided", f"{reason}; {attractors.reason}", {}, final=True)
     for side, point in enumerate(attractors.cover.points):
         if point.reason:
-            # of a narrower piece of a tolerance it may be found
+            # a narrower piece of the tolerance may have one that can be enclosed
             alone = box.scene == dict(scene.text)
             return Claim("attracts-all", "undecided", f"side {side}: {point.reason}", {}, final=alone)
     for side, near in enumerate(attractors.joint):
@@ -126,7 +126,7 @@ def _goal(attractors: Attraction, scene: Scene, *, search: bool = True) -> Claim
 
 
 def _require_one_scene(claim: str, attractors: Attraction, scene: Scene) -> None:
-    """Refuse a tolerance: numbers that hold for every scene in it would be those of none."""
+    """Refuse a tolerance: numbers that are proved for every scene in it would be exact for none."""
     if attractors.cover.box.scene != dict(scene.text):
         raise AnswerError("the claim", claim, "a claim about one scene", "ask for it without a tolerance")
 
@@ -346,7 +346,7 @@ def _attempt(
 ) -> tuple[Attraction, tuple[Claim, ...]]:
     """Refine the cells until every claim is proved or refuted for one box of parameters, or the ladder ends.
 
-    What refutes the goal is searched for with the first cells and with the last: it hardly depends on them.
+    An orbit that refutes the goal is searched for with the first cells and the last: it hardly depends on them.
     """
     wanted_cuts = cuts(() if scene.goal is None else (scene.goal,), box.lo.a.size)
     for step, cells in enumerate(ladder):
@@ -408,9 +408,7 @@ def _halved(
         tried, looked = tried + one.cover.grid.n_cells, looked + 1
         missing = tuple(each for each in answers if not _settled(each))
         refuted = tuple(replace(each, fixed=part.texts()) for each in missing if each.verdict == "refuted")
-        if (
-            noise
-        ):  # the search chose kappa from the noise about every value in the piece: more than is allowed
+        if noise:  # the search takes kappa from the noise about all values in the piece: no scene allows that
             refuted = ()
         if refuted:
             return (one,), refuted

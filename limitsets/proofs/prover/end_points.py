@@ -21,7 +21,7 @@ point itself does not matter.  The proof does not claim that one orbit is dense 
 Where the map contracts, inward rounding makes B empty: the inner ends are then None, and `orbits.py` describes L there.
  With noise, both sets hold for every sequence of throws.
 
-Checked by machine: branches and signs of slopes on tiles of N, images of tile ends (`proved_pieces.py`), and the exact
+Checked by machine: branches and signs of slopes on tiles of N, images of tile ends, and the exact
 comparison of B with its image.  Source: docs/model.md, limit sets.
 """
 
@@ -52,8 +52,8 @@ from limitsets.systems.maps import codes
 # is, so that the image of an interval covers all between the images of two of its points.  Undecided or bent tiles are
 # halved down to the rounding error, which brackets critical and turning points.
 #
-# Brackets and images are a little wider (inward images a little narrower) than they are found, so that other arithmetic
-# of about the same quality can confirm what rests on them.
+# Brackets and images are widened slightly (inward images narrowed), so that other arithmetic of about the same accuracy
+# can confirm the claims that rest on them.
 
 
 Pair = tuple[float, float]
@@ -122,7 +122,7 @@ def _merged_tiles(tiles: Iterable[ProvedPiece]) -> list[ProvedPiece]:
 
 
 def _widened(tiles: list[ProvedPiece]) -> list[ProvedPiece]:
-    """Let tiles of which less is known grow a little into their neighbours."""
+    """Extend undecided tiles slightly into their decided neighbours."""
     wide = list(tiles)
     for k, piece in enumerate(tiles):
         more = WIDER * (piece.hi - piece.lo)
@@ -392,7 +392,7 @@ def _critical(tiles: dict[int, list[ProvedPiece]]) -> tuple[CriticalBracket, ...
 
 
 class _Step(NamedTuple):
-    """Where an end comes from in one throw: an x, and whether it is itself an end (by number of its interval)."""
+    """The start whose throw gives an end, and the number of the interval of which the start is itself an end."""
 
     side: int
     x: float

@@ -110,7 +110,7 @@ class RationalInterval:
 
 
 def _span(value: Any) -> Any:
-    """Make a span of a number; None of anything else, which may know what to do with a span."""
+    """Make a span of a number; None of another operand, whose own class may take a span."""
     if isinstance(value, RationalInterval):
         return value
     return RationalInterval(Fraction(value), Fraction(value)) if isinstance(value, int) else None
@@ -311,7 +311,7 @@ class Intervals:
 
 
 def _as(value: object) -> Intervals | None:
-    """Make intervals of a number; None of anything else, which may know what to do with intervals."""
+    """Make intervals of a number; None of another operand, whose own class may take intervals."""
     if isinstance(value, Intervals):
         return value
     if isinstance(value, RationalInterval):

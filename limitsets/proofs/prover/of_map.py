@@ -49,7 +49,7 @@ from limitsets.systems.sets.basin import longest_stays, passing
 Floats: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = list[list[Intervals]]
 
-# Claims that are about slopes too, which are derived even where boxes are written by hand.
+# Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
 OF_SLOPES = ("cycles", "expanding")
 
 # Largest period of the search for cycles.
@@ -210,7 +210,7 @@ def _region(cells: CellSet, caption: str, proved: str) -> Table:
 
 
 def _missing(claim: Claim) -> str | None:
-    """Say what is not proved, of cycles also where others are."""
+    """Say what is not proved, also of the cycles where only some are proved."""
     rest = claim.section.get("missing", [])
     more = f"; and {len(rest) - 1} more" if len(rest) > 1 else ""
     return claim.reason or (f"{rest[0]}{more}" if rest else None)
@@ -394,7 +394,7 @@ def _attracts(slope: Matrix) -> bool | None:
     return False if det.absolute().lo[0] > 1.0 or room.hi[0] < 0.0 else None
 
 
-@np.errstate(all="ignore")  # what is singular or runs away gives inf and nan, which prove nothing
+@np.errstate(all="ignore")  # a singular matrix or an overflow gives inf and nan, which prove nothing
 def _prove(proof: ProofOfMap, cycle: Cycle) -> CycleOfMap | str:
     """Prove that there is one orbit near one found in floats; or say what is missing."""
     middle = cycle.x.reshape(cycle.period, -1).astype(np.float64)
@@ -418,7 +418,7 @@ def _prove(proof: ProofOfMap, cycle: Cycle) -> CycleOfMap | str:
 
 
 def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
-    """Say what there is to know of an orbit that lies in boxes; or what is missing."""
+    """Prove the sides, branches and slope of an orbit that lies in boxes; or say what is missing."""
     step = _stepped(proof, at.lo, at.hi, cycle)
     if isinstance(step, str):
         return step
@@ -497,7 +497,7 @@ CLAIMS_OF_MAP = (*PROVERS, "cycles")
 
 
 def _require_provable(lower: Any) -> None:
-    """Refuse maps whose boxes are not of what its orbits follow."""
+    """Refuse maps whose boxes do not enclose the map that their orbits follow."""
     kind = kind_of(lower)
     for name in ("scattered", "on_side"):
         if type(lower) in getattr(kernels, name).methods:

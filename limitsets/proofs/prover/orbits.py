@@ -291,7 +291,7 @@ def proved_cycle(box: ParameterBox, cycle: Cycle) -> ProvedCycle | str:
     radius = FIRST * max(abs(x), 1.0)
     for _ in range(TRIES):
         crossing = _crosses(box, x - radius, x + radius, side, word)
-        # half of it would do: other arithmetic about as good has to see the signs too
+        # half the radius would do; with the whole, other arithmetic of about the same accuracy proves the signs too
         lo, hi = x - 2.0 * radius, x + 2.0 * radius
         radius *= GROWTH
         if not (crossing and _crosses(box, lo, hi, side, word)):
@@ -360,7 +360,7 @@ def proved_cycles(attraction: Attraction, up_to: int | None = None) -> ProvedCyc
     Raises
     ------
     AnswerError
-        For noise: the orbit of the one throw is not one of the other.
+        For noise: an orbit of one throw of the noise is not an orbit of another.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """The box of map parameters given by a scene's decimals, tolerances and noise, and the effects that it can hold.
 
-From the text of the scene, in exact rational spans (`rational.py`), through the same formulas of `geometry` that floats
+From the text of the scene, in exact rational spans (`numbers.py`), through the same formulas of `geometry` that floats
 go through; only the last step rounds to doubles, outward.
 """
 
@@ -78,7 +78,7 @@ def simulated(scene: Scene) -> FullThrow | None:
 
 
 def scattered(scene: Scene) -> dict[str, str]:
-    """Return what the scene's bounded spread says, by quantity, as noise."""
+    """Return the scene's bounded spread as noise, by quantity."""
     if scene.effects.spread != "bounded":
         return {}
     table = scene.text["world"]["scatter"]
@@ -91,7 +91,7 @@ def joined(noise: Mapping[str, str], scatter: Mapping[str, str]) -> dict[str, st
     Raises
     ------
     AnswerError
-        Both say something of one quantity, and not the same.
+        The two give one quantity different deviations.
     """
     for name in noise.keys() & scatter.keys():
         if noise[name] != scatter[name]:
@@ -230,7 +230,7 @@ VARYING = ("throw.speed", "gravity.tilt", "landing.x")
 
 @dataclass(frozen=True, eq=False)
 class ParameterBox:
-    """A box of parameters of the throw map, and what it stands for.
+    """A box of parameters of the throw map, and the scenes and the noise that it encloses.
 
     Attributes
     ----------
@@ -294,7 +294,7 @@ class _Spans(Numbers):
     noise : mapping of str to str, optional
         What differs at every throw.
     instead : mapping of str to RationalInterval or Jet, optional
-        What stands in for quantities.
+        Numbers that replace quantities.
     """
 
     def __init__(
@@ -365,7 +365,7 @@ class _Spans(Numbers):
         return RationalInterval.of(0), self.constant(text, find(name).dimension)
 
     def share_of_gravity(self) -> RationalInterval:
-        """Return what the noise of the tilt multiplies g by: sin(tilt +- dev) / sin(tilt).
+        """Return the factor by which the noise of the tilt changes g: sin(tilt +- dev) / sin(tilt).
 
         Both ends are farthest from 1 at the smallest tilt: (1 +- p) cot((1 +- p) t) against cot(t), and cot(t) alone.
         """
@@ -393,7 +393,7 @@ class _Spans(Numbers):
     def narrow_body(self) -> tuple[list[tuple[Any, ...]], RationalInterval]:
         """As `body`, but narrower where several of its numbers are known to a tolerance only."""
         plain, radius = self.body()
-        # pairs of texts are what has a tolerance
+        # a pair of texts is a quantity with a tolerance
         names = [name for name, text in texts(self.tree["part"], "part") if isinstance(text, list)]
         if not names:
             return plain, radius
@@ -446,7 +446,7 @@ def _require_rest(
     kappa: RationalInterval,
     radius: RationalInterval,
 ) -> None:
-    """Refuse parameters some of which are those of no part, or of one that falls over where the scene's rests."""
+    """Refuse parameters if some of them fit no part, or a part that tips over where the scene's part rests."""
     for side, ((a, d, length), stays) in enumerate(zip(sides, rests, strict=True)):
         good = a.lo > 0 and a.hi < length.lo if stays else a.hi <= 0 or a.lo >= length.hi
         if not (good and d.lo > 0):

@@ -145,7 +145,7 @@ SHARES = ("share", "leaves", "creeps", "open")
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim and what became of it.
+    """One claim and its verdict.
 
     Attributes
     ----------
@@ -156,9 +156,9 @@ class Claim:
     reason : str
         Why it is not proved: what is missing and where; empty if it is.
     section : dict
-        What a recheck needs, empty if nothing is proved.
+        The numbers that a recheck needs; empty if nothing is proved.
     counterexample : tuple of State
-        An orbit that refutes it, empty if none was found.
+        An orbit that refutes the claim; empty if there is none.
     fixed : dict of str to list of str
         The counterexample's values of what is fixed but unknown, as pairs of texts.
     final : bool
@@ -268,7 +268,7 @@ class Proof(Tabled):
 
     @property
     def model(self) -> Model:
-        """Of which model the claims are, and which facts of the scene that leaves out."""
+        """The model for which the claims are proved, and the facts of the scene that this model leaves out."""
         return Model.of(self.scene, self.noise)
 
     def tables(self) -> tuple[Table, ...]:
@@ -457,7 +457,7 @@ class Proof(Tabled):
         return Path(path)
 
     def denied(self, claims: Mapping[str, str]) -> Proof:
-        """Return what is left of it where the checker denies some claims: these are undecided."""
+        """Return the proof where the checker denies some claims: these are undecided."""
         left = tuple(
             replace(
                 each,

@@ -177,7 +177,7 @@ def _followed(
 # One claim of all pieces of a tolerance, from those of each: the weakest numbers, for the fewest starts.
 
 
-# For which starts a goal holds: the fewer the later.
+# The words for the starts of a goal, from the most starts to the fewest.
 STARTS = ("every", "within", "almost-every", "from", "cells")
 
 
@@ -271,7 +271,7 @@ LADDER = (512, 2048, 8192, 32_768)
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What became of the goals on one box.
+    """The verdict on the goals for one box of scenes.
 
     Attributes
     ----------
@@ -288,11 +288,11 @@ class Outcome:
     counterexample : tuple of State
         The orbit that does it.
     piece : SceneBox or None
-        The scenes it was asked of; None for the scene as it is.
+        The scenes of the query; None for the scene as it is.
     noise : dict of str to str
         The noise.
     within : dict of str to str
-        Deviations that those of a single scene do not exceed, by quantity.
+        Bounds, by quantity, of the deviations of the single scene that refutes.
     """
 
     verdict: str
@@ -326,10 +326,9 @@ class Query:
 
     @classmethod
     def of(cls, scene: Scene, goals: tuple[Goal, ...]) -> Query:
-        """Put goals to a scene, without what a margin is not asked about.
+        """Ask goals of a scene without its own goal and scatter.
 
-        The scene's own goal is left out, so that a certificate says what was asked; and its scatter, because no
-        quantity deviates in a margin but those asked about.
+        A certificate then names the goals of the query; and in a margin no quantity deviates but those of the query.
         """
         tree = scene.as_dict()
         tree.pop("goal", None)
@@ -375,7 +374,7 @@ class Query:
                 if missing.verdict == "proved":
                     self.known["base"] = base
                     return Outcome("proved", "", attractors, answers, piece=piece, noise=noise)
-                # finer cells where nothing attracts are needed only for starts that are not proved to come
+                # finer cells off the attracting ones are needed only for starts that are not proved to reach these
                 if missing.final or missing.verdict != "proved-on-cells":
                     break
         except AnswerError as error:
@@ -407,7 +406,7 @@ class Query:
         return attractors, answers
 
     def _each(self, attractors: Attraction) -> tuple[Answer, ...]:
-        """Prove one goal after the other, up to the first that is not: it comes last then."""
+        """Prove one goal after the other, up to the first that is not proved, which comes last."""
         answers: list[Answer] = []
         for goal in self.goals:
             answers.append(prove(attractors, self.scene, goal))
@@ -474,10 +473,10 @@ class Query:
         return Outcome("undecided", reason, attractors, piece=piece, noise=noise)
 
     def _against(self, attractors: Attraction, goal: Goal) -> Answer:
-        """Search for what refutes one goal: where throws differ, for the worst that they can do."""
+        """Search for an orbit that refutes one goal: with noise, for the worst sequence of throws."""
         wrong = goal.wrong()
         if isinstance(goal, Reaches) and not goal.every_orbit:
-            # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
+            # the ends of the attracting cells refute it; the search for an attracting cycle would take too long here
             finer = self._finer(attractors, attractors.cover.box, 2)
             finer = narrowed(finer, starts_in(finer, goal.laid)[0]) if goal.laid else finer
             return laid_only(falls_short(finer, goal) or undecided(""), finer, goal.laid)

@@ -15,7 +15,7 @@ most a share below 1 of what it was m throws ago, it is at most that share again
 bounds, all others left out, keep a share of themselves after one throw, they keep it after each.  So it is known long
 before whether bounds fall below 1.
 
-Cells of different groups are told apart: an orbit that goes from one group to another has left the first.
+Cells of different groups are kept apart: an orbit that goes from one group to another has left the first.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ FIRST = 32
 # Tries to find bounds that keep a share of themselves.
 TRIES = 8
 
-# It is given up, too, where a bound has grown so large.
+# The proof is given up, too, where a bound has grown so large.
 HOPELESS = 1e100
 
 # Slopes are lessened by this share of them, and bounds enlarged, against rounding and so that others can confirm them.
@@ -130,14 +130,14 @@ SLACK = 2.0**-20
 
 
 class DensityBound(NamedTuple):
-    """What became of the cells.
+    """The groups of cells that almost every start leaves, and those of which this is not proved.
 
     Attributes
     ----------
     throws : int
         After so many, or fewer, the bounds of every group that thins out are below 1.
     thick : ndarray of bool, shape (n_cells,)
-        Cells of the groups of which it is not proved.
+        Cells of the groups that are not proved to thin out.
     reason : str
         What is missing, empty if nothing.
     """

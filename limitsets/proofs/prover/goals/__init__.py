@@ -42,7 +42,7 @@ __all__ = [
     "sentence",
 ]
 
-# A goal of whose starts so small a share is open, while others leave, is not asked again with finer cells.
+# If some starts leave and no more than this share is open, finer cells are not tried.
 LITTLE = 1e-3
 
 WHOLE = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}

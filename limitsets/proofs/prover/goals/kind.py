@@ -28,7 +28,7 @@ Mask = NDArray[np.bool_]
 
 
 class Answer(NamedTuple):
-    """What became of a goal; the words are those of `limitsets.proofs.prover.certifying.Claim`."""
+    """The verdict on a goal; the words are those of `limitsets.proofs.prover.certifying.Claim`."""
 
     verdict: str
     reason: str = ""
@@ -75,7 +75,7 @@ def undecided(reason: str, *, final: bool = False) -> Answer:
 
 
 def against(refutation: Refutation, reason: str = "") -> Answer:
-    """Answer by a refutation: `starts` of which it is not true; undecided if it is empty."""
+    """Answer by a refutation, with the starts for which the goal fails; undecided if the refutation is empty."""
     if not refutation.of:
         return undecided(reason)
     states, of, recurs = refutation
@@ -83,12 +83,12 @@ def against(refutation: Refutation, reason: str = "") -> Answer:
 
 
 def once(orbit: tuple[State, ...], reason: str = "") -> Answer:
-    """Answer by one passage, which refutes what is asked of every start on the arm; undecided without one."""
+    """Answer by one passage, which refutes a goal about every start on the arm; undecided without one."""
     return against(Refutation(orbit, "every", {"once": True}) if orbit else Refutation(), reason)
 
 
 def common(attraction: Attraction, *, anywhere: bool) -> str:
-    """Say what is missing that every goal needs: attracting cells, or that no start leaves; empty if nothing."""
+    """Say which need of every goal is not proved: attracting cells, or that no start leaves; empty if all are."""
     if not anywhere:
         return "" if (attraction.component >= 0).any() else "there are no attracting cells"
     if attraction.cover.points:
@@ -103,7 +103,7 @@ def common(attraction: Attraction, *, anywhere: bool) -> str:
 
 
 def begins(section: Mapping[str, Any]) -> str:
-    """Say where the orbits begin that a goal from anywhere speaks of."""
+    """Say where orbits begin in a goal about every start on the arm."""
     laid = isinstance(section.get("starts"), dict)
     return "where they are laid down" if laid else "anywhere on the arm"
 
@@ -163,13 +163,13 @@ def throws_to_reach(
     ranges = attraction.cover.graph.ranges if branch is None else _of_branch(attraction, branch)
     owner = np.repeat(np.arange(cells.size), np.diff(ranges.first))
     ranges = ranges._replace(box=ranges.box.copy())
-    ranges.box[wanted[owner], RUN] = 0  # what has arrived goes no farther
+    ranges.box[wanted[owner], RUN] = 0  # an orbit that has arrived is followed no farther
     parts = strong_components(ranges)
     stay = (parts.recurrent[parts.label] | (ranges.exits > 0)) & ~wanted
     late = reach(ranges, parts, stay.astype(np.uint8)) > 0
     steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
     throws = int(steps[cells & ~late].max(initial=0))
-    # of one branch the last throw is one that is not followed
+    # with one branch given, the last throw is one of another branch
     return throws + (0 if branch is None else 1), np.flatnonzero(cells & late)
 
 

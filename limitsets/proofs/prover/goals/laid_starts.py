@@ -1,7 +1,7 @@
 """A goal whose starts are ranges in which parts are laid down: what these starts can come to, and their shares.
 
-Nothing is asked of the rest of the arm: cells to which no orbit from the ranges can come count neither as starts nor as
-attracting cells.  Source: docs/certificates.md, "Parts that are laid down".
+The goal says nothing about the rest of the arm: cells to which no orbit from the ranges can come count neither as
+starts nor as attracting cells.  Source: docs/certificates.md, "Parts that are laid down".
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.images.enclosed import Enclosures
 from limitsets.systems.graph.ranges import RUN
 
-# Of whose starts so small a share is open, while others leave, finer cells are not asked.
+# If some starts leave and no more than this share is open, finer cells are not tried.
 LITTLE = 1e-3
 
 
@@ -89,7 +89,7 @@ def narrowed(attraction: Attraction, cells: Mask) -> Attraction:
     )
     basin = attraction.basin
     thinning = basin.thinning if (basin.thin & keep).any() else 0
-    # in place of what it would find of all cells
+    # in place of the basin of all cells
     vars(part)["basin"] = replace(
         basin, rank=np.where(keep, basin.rank, -1), thinning=thinning, near=True, creeps=0.0
     )

@@ -1,7 +1,7 @@
 """A predicate of the caller: of every attracting cell, or of every landing from anywhere on the arm.
 
-The caller's code is believed: no certificate can hold it, and nothing rechecks it.  An orbit refutes it where it says
-no at both ends and in the middle of what encloses the orbit's last state.
+The proof trusts the caller's code: no certificate can hold the code, and nothing rechecks it.  An orbit refutes the
+predicate if it is false at both ends and in the middle of the enclosure of the orbit's last state.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def _prove(attraction: Attraction, scene: Scene, goal: Reaches) -> Answer:
 def not_null(attraction: Attraction) -> str:
     """Say what is missing for this: almost no start of the basin comes to a given set of length zero.
 
-    Where the slope is positive, what is thrown to a set of length zero has length zero.
+    Where the slope is positive, the starts that are thrown to a set of length zero have length zero.
     """
     basin = attraction.basin
     for side, near in enumerate(attraction.joint):
@@ -115,7 +115,8 @@ def _arrives(loop: Loop, goal: Reaches) -> bool:
 def falls_short(attraction: Attraction, goal: Reaches) -> Answer | None:
     """Refute the goal by an attracting component that ends below x: no orbit in it gets there.
 
-    It is mapped into itself and has an interior: so many starts never get there.  The orbit is shown, not needed.
+    The component is mapped into itself and has an interior, so a set of starts of positive length never gets there.
+    The orbit is an illustration; the proof does not need it.
     """
     edges = attraction.cover.grid.edges[goal.side][0]
     reach = np.zeros(attraction.component.size, dtype=bool)

@@ -211,7 +211,9 @@ def _paths(attraction: Attraction, box: ParameterBox) -> Iterator[Orbit]:
             if last is None:
                 continue
             met.add(_component(attraction, *last))
-            met.discard(-1)  # off the attracting cells any two may end in different places
+            met.discard(
+                -1
+            )  # two starts whose orbits end off the attracting cells may end in different places
             yield _lasting(map_now, *last, SHORT)
 
 
@@ -376,7 +378,7 @@ def _continuous(box: ParameterBox) -> bool:
 
 
 def _of(loop: Loop, box: ParameterBox, attraction: Attraction) -> Refutation:
-    """Put a periodic orbit as what refutes: its first point comes again at the end."""
+    """Make a refutation of a periodic orbit: its first point comes again at the end."""
     kappa, landing = box.middle_kappa, 0.0 if attraction.cover.box.landing > 0.0 else None
     points = zip(loop.lo.tolist(), loop.hi.tolist(), loop.side.tolist(), strict=True)
     states = [State(lo, hi, side, kappa, landing) for lo, hi, side in points]

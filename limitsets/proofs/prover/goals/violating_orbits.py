@@ -85,7 +85,7 @@ class Path(NamedTuple):
 def throw_choices(box: ParameterBox, kappas: int = CHOICES) -> list[ThrowChoice]:
     """List what a throw may be like: values of kappa across its noise, the ends and the middle of the landing's.
 
-    A little inside the bounds, so that each is one of the noise's whatever the last digit.
+    The ends lie slightly inside the bounds, so that rounding takes none of them out of the noise.
     """
     ends, shift = (box.lo.kappa, box.hi.kappa), box.landing * (1.0 - 1e-9)
     margin = 1e-9 * (ends[1] - ends[0])
@@ -181,7 +181,7 @@ def middle(attraction: Attraction, cells: NDArray[np.int64]) -> tuple[float, int
 def on_limit_set(attraction: Attraction) -> tuple[float, int]:
     """Follow an orbit from the attracting cells until it is as near to the limit set as floats come, and its end.
 
-    Cells surround the limit set: what starts in one of them may violate a goal once, on its way, and never again.
+    Cells surround the limit set: an orbit from one of them may violate a goal once, on its way, and never again.
     """
     start, on = middle(attraction, attraction.cells.numbers())
     box = attraction.cover.box
@@ -296,7 +296,7 @@ def start_that_leaves(attraction: Attraction, laid: Laid = ()) -> tuple[State, .
     Returns
     -------
     tuple of State
-        The orbit, the landing off the arm last; empty if none is found.
+        The orbit, the landing off the arm last; empty if the search finds none.
     """
     box = attraction.cover.box
     for option in throw_choices(box, 3):
