@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene.facts import NOT_TIPPING, TIPPING
 from limitsets.feeder.scene.left_out import Model
 from limitsets.proofs.auditing.assumptions import ASSUMPTIONS, Assumption
-from limitsets.proofs.auditing.judging import Places, Row, Sample, all_hold, enclosed_at, places, where
+from limitsets.proofs.auditing.judging import Cells, Places, Row, Sample, all_hold, enclosed_at, places, where
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
@@ -34,18 +34,18 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Extents = dict[int, list[tuple[float, float]]]
 
-# Throws that are looked at for a count alone: a second's worth.
+# Throws that are evaluated where only a count is wanted: about a second.
 MOST_THROWS = 200_000
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What became of one assumption in one place.
+    """The verdict on one assumption in one place.
 
     Attributes
     ----------
     about : Assumption
-        Which: its effect, words, dimension.
+        The assumption: its effect, words and dimension.
     place : str
         "limit-set" or "domain".
     called_for : bool or None
@@ -53,9 +53,9 @@ class Finding:
     how : str
         "proved" or "sampled".
     side, x : int or None, float or None
-        Of the throw that is worst, or nearest to the limit [length].
+        Start of the throw whose number is worst, or nearest to the limit [length].
     worst : float or None
-        The number there; None where it is beyond all bounds, or nothing was looked at.
+        The number there; None where it has no bound, or no throw was evaluated.
     threshold : float or None
         Its limit on that side; where a fact is missing, the value of the fact at which it would begin to matter.
     missing : str
@@ -63,7 +63,7 @@ class Finding:
     ranges : dict of int to list of (lo, hi)
         Per side where on the domain the assumption is broken [length]; empty for the limit set.
     jogs, flips, others : (int, int)
-        On the orbits: how many such throws break it, of how many; others are rolls.
+        On the orbits: how many jogs, flips and rolls break the assumption, and how many of them there are.
     simulated : bool
         Whether the scene simulates the effect.
     """
@@ -165,10 +165,10 @@ class Audit(Tabled):
         return [finding.to_json() for finding in self.findings]
 
 
-def _worst(row: Row, found: Mapping[int, Array], samples: Mapping[int, Sample]) -> dict[str, Any]:
+def _worst(row: Row, enclosures: Mapping[int, Array], samples: Mapping[int, Sample]) -> dict[str, Any]:
     """Find the throw whose number is farthest beyond its limit, or nearest to it."""
     best: tuple[float, dict[str, Any]] = (-math.inf, {})
-    for side, seen in found.items():
+    for side, seen in enclosures.items():
         reached = row.reached(seen)
         known = ~np.isnan(reached) & ~(np.isneginf(reached) if row.about.below else np.isposinf(reached))
         if not known.any():
@@ -201,29 +201,36 @@ def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[
     return {"jogs": count(codes.JOG), "flips": count(codes.FLIP), "others": count(codes.ROLL)}
 
 
-def _ranges(box: ParameterBox, row: Row, found: Mapping[int, Array], domain: Mapping[int, Sample]) -> Extents:
+def _ranges(
+    box: ParameterBox, row: Row, enclosures: Mapping[int, Array], domain: Mapping[int, Sample]
+) -> Extents:
     ranges = {}
     for side, sample in domain.items():
 
         def broken(x: Array, side: int = side) -> Flags:
             return row.broken(enclosed_at(box, side, x), side)
 
-        ranges[side] = where(broken, sample.x, row.broken(found[side], side))
+        ranges[side] = where(broken, sample.x, row.broken(enclosures[side], side))
     return {side: parts for side, parts in ranges.items() if parts}
+
+
+def _proved(box: ParameterBox, cells: Cells, rows: list[Row], hit: Sequence[bool]) -> dict[int, bool]:
+    """For each assumption that no sampled throw breaks, whether it is proved to hold on all cells."""
+    unbroken = [k for k, row in enumerate(rows) if not hit[k] and row.terms.limit is not None and bool(cells)]
+    return dict(zip(unbroken, all_hold(box, cells, [rows[k] for k in unbroken]), strict=True))
 
 
 def _findings(
     place: str, scene: Scene, box: ParameterBox, rows: list[Row], sites: Places
 ) -> tuple[Finding, ...]:
-    """Every assumption in one place."""
+    """Judge every assumption in one place."""
     limit = place == "limit-set"
     samples, cells = (sites.orbits, sites.limit_cells) if limit else (sites.domain, sites.domain_cells)
     sound = sites.enclosed or not limit
-    found = {side: enclosed_at(box, side, sample.x) for side, sample in samples.items()}
-    broken = [{side: row.broken(seen, side) for side, seen in found.items()} for row in rows]
+    enclosures = {side: enclosed_at(box, side, sample.x) for side, sample in samples.items()}
+    broken = [{side: row.broken(seen, side) for side, seen in enclosures.items()} for row in rows]
     hit = [any(flags.any() for flags in each.values()) for each in broken]
-    hopeful = [k for k, row in enumerate(rows) if not hit[k] and row.terms.limit is not None and bool(cells)]
-    proved = dict(zip(hopeful, all_hold(box, cells, [rows[k] for k in hopeful]), strict=True))
+    proved = _proved(box, cells, rows, hit)
     findings = []
     for k, row in enumerate(rows):
         called = True if hit[k] else (None if row.terms.limit is None or not samples else False)
@@ -234,9 +241,9 @@ def _findings(
                 place,
                 called,
                 "proved" if sure else "sampled",
-                **_worst(row, found, samples),
+                **_worst(row, enclosures, samples),
                 missing=row.terms.missing,
-                ranges={} if limit or not hit[k] else _ranges(box, row, found, samples),
+                ranges={} if limit or not hit[k] else _ranges(box, row, enclosures, samples),
                 **_shares(broken[k], samples),
                 simulated=row.about.effect in scene.effects.on(),
             )
@@ -245,11 +252,11 @@ def _findings(
 
 
 def _prepared(scene: Scene) -> tuple[ParameterBox, list[Row], Places]:
-    """Give what every finding is made of: parameters, assumptions with the scene's facts, throws to look at."""
+    """Collect the parameters, the assumptions with the scene's facts, and the throws at which they are evaluated."""
     from limitsets.feeder.scene import load
     from limitsets.proofs.prover.parameters import parameter_box
 
-    # what the minimal model assumes is asked of its throws, whichever effects are on
+    # the assumptions are those of the minimal model, so its throws are evaluated, whichever effects are on
     without = {} if scene.sides.rests.all() else dict.fromkeys(TIPPING, True)
     box = parameter_box(load({**scene.as_dict(), "effects": without}))
     return box, [Row(about, about.terms(scene, box)) for about in ASSUMPTIONS], places(scene, box)
@@ -270,7 +277,7 @@ def audited(model: Model, scene: Scene) -> Model:
     Returns
     -------
     Model
-        As it was where no limit set is found.
+        Unchanged where there is no limit set.
 
     Examples
     --------
@@ -282,7 +289,7 @@ def audited(model: Model, scene: Scene) -> Model:
     """
     try:
         box, rows, sites = _prepared(scene)
-    except LimitsetsError:  # of this scene nothing is enclosed, so that nobody can look
+    except LimitsetsError:  # no throw of this scene can be enclosed
         return model
     step = -(-sum(sample.x.size for sample in sites.orbits.values()) // MOST_THROWS)
     seen = {side: enclosed_at(box, side, sample.x[::step]) for side, sample in sites.orbits.items()}
@@ -291,7 +298,7 @@ def audited(model: Model, scene: Scene) -> Model:
         for row in rows
         if row.about.effect not in model.simulated
         and (row.about.effect != "spread" or "scatter" in model.left_out)  # else noise covers the scatter
-        and any(row.broken(found, side).any() for side, found in seen.items())
+        and any(row.broken(enclosed, side).any() for side, enclosed in seen.items())
     ]
     return replace(model, broken=tuple(broken)) if seen else model
 
@@ -321,10 +328,10 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
     Examples
     --------
     >>> import limitsets as ls
-    >>> found = ls.audit("paper-initial")
-    >>> [(each.effect, each.how) for each in found.on("limit-set") if each.called_for]
+    >>> audited = ls.audit("paper-initial")
+    >>> [(each.effect, each.how) for each in audited.on("limit-set") if each.called_for]
     [('pivot', 'sampled'), ('pivot', 'sampled'), ('roll', 'sampled')]
-    >>> [(each.effect, each.how) for each in found.on("limit-set") if each.called_for is False]
+    >>> [(each.effect, each.how) for each in audited.on("limit-set") if each.called_for is False]
     [('release', 'proved'), ('landing', 'proved'), ('slip', 'proved'), ('arm', 'proved')]
     """
     from limitsets.feeder.scene import load
@@ -339,7 +346,7 @@ def audit(scene: str | Path | Mapping[str, Any] | Scene) -> Audit:
 # `[effects] auto = true`: switch on the effects that the limit set calls for, and name those that cannot be.
 
 
-# What no effect lifts: a scene that breaks it has to be changed.
+# Assumptions that no effect lifts: a scene that breaks one has to be changed.
 NO_EFFECT = ("release", "arm")
 
 

@@ -39,14 +39,14 @@ SAMPLES = 4096
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Throws to look at on one side.
+    """Throws on one side at which assumptions are evaluated.
 
     Attributes
     ----------
     x : ndarray, shape (n,)
         Where they start, ascending on the domain [length].
     code : ndarray of int, shape (n,)
-        What they do (`limitsets.systems.maps.codes`); empty where nobody asks.
+        Branch of each throw (`limitsets.systems.maps.codes`); empty where it is not needed.
     """
 
     x: Array
@@ -55,7 +55,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """What to look at.
+    """Cells and throws at which assumptions are evaluated.
 
     Attributes
     ----------
@@ -77,10 +77,10 @@ class Places:
     extents: dict[int, list[tuple[float, float]]]
 
 
-def _cells_of(found: CellSet) -> Cells:
+def _cells_of(attracting: CellSet) -> Cells:
     cells = {}
-    for side, (edges,) in enumerate(found.grid.edges):
-        here = np.flatnonzero(found.mask[found.grid.of_side(side)])
+    for side, (edges,) in enumerate(attracting.grid.edges):
+        here = np.flatnonzero(attracting.mask[attracting.grid.of_side(side)])
         if here.size:
             cells[side] = (edges[here], edges[here + 1])
     return cells
@@ -103,8 +103,11 @@ def _limit_sets(scene: Scene, box: ParameterBox) -> tuple[list[CellSet], Cells, 
         side: (edges[:-1], edges[1:]) for side, (edges,) in enumerate(covered.grid.edges) if edges.size > 1
     }
     if not scene.effects.on():
-        found = attraction(covered)
-        sets = [CellSet(covered.grid, found.component == k) for k in range(int(found.component.max()) + 1)]
+        attracting = attraction(covered)
+        sets = [
+            CellSet(covered.grid, attracting.component == k)
+            for k in range(int(attracting.component.max()) + 1)
+        ]
         if sets:
             return sets, domain, True
     graph = transitions(scene.map, grid(scene.domain, cells=SAMPLED_CELLS))
@@ -131,7 +134,7 @@ def _orbits(scene: Scene, sets: list[CellSet]) -> dict[int, Sample]:
 
 
 def places(scene: Scene, box: ParameterBox) -> Places:
-    """Find what to look at.
+    """Collect the cells and throws at which assumptions are evaluated.
 
     Parameters
     ----------
@@ -162,7 +165,7 @@ def places(scene: Scene, box: ParameterBox) -> Places:
 
 Flags = NDArray[np.bool_]
 
-# A cell on which an assumption is not proved is halved this often, as long as there are no more cells than these.
+# A cell on which an assumption is not proved is halved so many times, while there are no more than so many cells.
 HALVINGS, MOST_CELLS = 10, 200_000
 
 
@@ -177,9 +180,9 @@ class Row:
         limit = self.terms.limit
         return math.nan if limit is None else float(limit[side] if isinstance(limit, np.ndarray) else limit)
 
-    def values(self, found: Array) -> Array:
+    def values(self, enclosed: Array) -> Array:
         """Both ends of the number, widened by the rounding of scale and offset."""
-        pair: Array = found[:, self.about.column]
+        pair: Array = enclosed[:, self.about.column]
         scale, offset = self.terms.scale, self.terms.offset
         if scale == 1.0 and offset == 0.0:
             return pair
@@ -188,26 +191,28 @@ class Row:
         wider: Array = np.nextafter(np.nextafter(pair, ends), ends)
         return wider
 
-    def reached(self, found: Array) -> Array:
-        """Give what is surely reached: the end of the enclosure that breaks the least."""
-        return self.values(found)[:, 0 if self.about.below else 1]
+    def reached(self, enclosed: Array) -> Array:
+        """Give the value that is certainly reached: the end of the enclosure that breaks the limit least."""
+        return self.values(enclosed)[:, 0 if self.about.below else 1]
 
-    def broken(self, found: Array, side: int) -> Flags:
-        """Whether it is proved to be broken; never where nothing is known."""
-        reached = self.reached(found)
+    def broken(self, enclosed: Array, side: int) -> Flags:
+        """Whether the assumption is proved to be broken; never where a fact is missing."""
+        reached = self.reached(enclosed)
         beyond = reached > self.limit(side) if self.about.below else reached < self.limit(side)
         # no value of a missing fact is enough
         hopeless = np.isposinf(reached) if self.about.below else np.isneginf(reached)
         return beyond | (hopeless & (self.terms.limit is None))
 
-    def kept(self, found: Array, side: int) -> Flags:
-        """Whether it is proved to hold."""
-        values = self.values(found)
+    def kept(self, enclosed: Array, side: int) -> Flags:
+        """Whether the assumption is proved to hold."""
+        values = self.values(enclosed)
         return values[:, 1] <= self.limit(side) if self.about.below else values[:, 0] >= self.limit(side)
 
-    def spare(self, found: Array, side: int) -> Array:
-        """Give how far within the limit it is, to the width of the enclosures; below 0 beyond it."""
-        inside: Array = (self.limit(side) - self.values(found).mean(axis=1)) * (1 if self.about.below else -1)
+    def spare(self, enclosed: Array, side: int) -> Array:
+        """Give the distance of the number from its limit, to the width of the enclosures; below 0 beyond the limit."""
+        inside: Array = (self.limit(side) - self.values(enclosed).mean(axis=1)) * (
+            1 if self.about.below else -1
+        )
         return inside
 
 
@@ -222,8 +227,8 @@ def all_hold(box: ParameterBox, cells: Cells, rows: list[Row]) -> list[bool]:
     for side, (lo, hi) in cells.items() if rows else ():
         needed = np.tile(open_rows, (lo.size, 1))
         for halving in range(HALVINGS + 1):
-            found = assumed(*box.bare, side, lo, hi)
-            kept = np.stack([row.kept(found, side) for row in rows], axis=1)
+            enclosed = assumed(*box.bare, side, lo, hi)
+            kept = np.stack([row.kept(enclosed, side) for row in rows], axis=1)
             needed &= ~kept & open_rows
             again = needed.any(axis=1)
             if not again.any():

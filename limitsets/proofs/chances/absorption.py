@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------
-# What is proved of where a noisy chain ends, and when.
+# Brackets of where a noisy chain ends, and when.
 
 
 Array = NDArray[np.float64]
 
 # Any absorbing set or exit.
 ANY = "any"
-# A certificate claims a little more than was found, and the checker's cells are finer: see `writing`.
+# A certificate claims slightly wider brackets than the proof gives, and the checker's cells are finer: see `chain`.
 ALLOWANCE, FINER = 1e-6, 2
 
 
@@ -69,7 +69,7 @@ class AbsorptionBrackets(Tabled):
     values : dict of str to ndarray, shape (2, n_nodes)
         By name the bounds at the nodes after the last throw, for starts there.
     mean : (float, float)
-        Bounds of the mean of T; the upper one is infinite where none was found.
+        Bounds of the mean of T; the upper one is infinite where no finite bound is proved.
     seconds : float
         Time it took.
     how : str
@@ -135,9 +135,9 @@ class AbsorptionBrackets(Tabled):
         path : str or Path
             The file, NAME.proof.zip; an older one is replaced whole.
         allowance : float
-            What is claimed is wider by this at both ends; bounds of the mean by as many throws times their number.
+            The claimed brackets are wider by this at both ends; bounds of the mean by this times the number of throws.
         finer : int
-            Into how many each cell is cut for the checker, whose way to bound a throw is a little less narrow.
+            Parts into which each cell is cut for the checker, whose bounds of a throw are slightly wider.
         recheck : bool
             Whether to check it first: from seconds to as long as the proof.
 
@@ -155,9 +155,9 @@ class AbsorptionBrackets(Tabled):
         >>> import limitsets as ls
         >>> from limitsets.robust import Scattering, Uniform, absorption_brackets
         >>> noise = Scattering(landing=Uniform(0.1))
-        >>> found = absorption_brackets("paper-initial", noise, right=(20, 2), cells=300, throws=3, mean=False)
+        >>> brackets = absorption_brackets("paper-initial", noise, right=(20, 2), cells=300, throws=3, mean=False)
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     ls.recheck(found.save(f"{folder}/initial.proof.zip")).verdict
+        ...     ls.recheck(brackets.save(f"{folder}/initial.proof.zip")).verdict
         'proved'
         """
         from limitsets.proofs.chances.chain import write
@@ -166,10 +166,10 @@ class AbsorptionBrackets(Tabled):
             path,
             self.source,
             self.scatter,
-            (self.starts, self.absorbing),
-            self.nodes,
-            self.within,
-            self.mean,
+            places=(self.starts, self.absorbing),
+            nodes=self.nodes,
+            within=self.within,
+            mean=self.mean,
             allowance=allowance,
             finer=finer,
             recheck=recheck,
@@ -193,7 +193,13 @@ def _start_row(nodes: Nodes, starts: Sequence[Place]) -> Any:
     length = (hi - lo).astype(np.float64)
     row = np.zeros(side.size, dtype=np.int64)
     return mean_matrix(
-        1, nodes, row, length / length.sum(), side.astype(np.int64), lo.astype(float), hi.astype(float)
+        1,
+        nodes,
+        row,
+        weight=length / length.sum(),
+        side=side.astype(np.int64),
+        one=lo.astype(float),
+        two=hi.astype(float),
     )
 
 
@@ -202,7 +208,7 @@ def _mean_above(row: Any, values: Array) -> float:
 
 
 def _at_most(nodes: Nodes, values: Array, most: float) -> Array:
-    """Lower a bound far above what no value exceeds: there and at the next nodes it is that, so at all between."""
+    """Lower bounds far above the largest possible value to this value; raise those at the nodes next to them to it."""
     far = values > most + 0.5
     if not far.any():
         return values
@@ -229,19 +235,19 @@ def within_brackets(
     """
     fixed = chain.fixed(value), chain.fixed({name: -number for name, number in value.items()})
     bound = [chain.first(each) for each in fixed]
-    found = np.empty((2, throws + 1))
+    brackets = np.empty((2, throws + 1))
     for n in range(throws + 1):
         if n:
             bound = [
                 _at_most(chain.nodes, chain.above(values, each), most)
                 for values, each, most in zip(bound, fixed, (1.0, 0.0), strict=True)
             ]
-        found[:, n] = -_mean_above(row, bound[1]), _mean_above(row, bound[0])
+        brackets[:, n] = -_mean_above(row, bound[1]), _mean_above(row, bound[0])
         if progress is not None:
             progress(n, throws)
     # Having ended is for ever: a bound from below holds later, one from above holds earlier.
-    low = np.maximum.accumulate(np.clip(found[0], 0.0, 1.0))
-    high = np.minimum.accumulate(np.clip(found[1], 0.0, 1.0)[::-1])[::-1]
+    low = np.maximum.accumulate(np.clip(brackets[0], 0.0, 1.0))
+    high = np.minimum.accumulate(np.clip(brackets[1], 0.0, 1.0)[::-1])[::-1]
     return np.stack([low, high]), np.stack([-bound[1], bound[0]])
 
 
@@ -321,8 +327,8 @@ def absorption_brackets(
     --------
     >>> from limitsets.robust import Scattering, Uniform, absorption_brackets
     >>> noise = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
-    >>> found = absorption_brackets("paper-designed", noise, right=(20.5, 2), cells=500, throws=5, mean=False)
-    >>> low, high = found.within["right"][:, 5]
+    >>> brackets = absorption_brackets("paper-designed", noise, right=(20.5, 2), cells=500, throws=5, mean=False)
+    >>> low, high = brackets.within["right"][:, 5]
     >>> bool(low < 0.222 < high < low + 0.05)
     True
     """
@@ -351,15 +357,15 @@ def absorption_brackets(
         read,
         read.name,
         read.unit,
-        noise,
-        {name: tuple(each) for name, each in places.items()},
-        begin,
-        chain.nodes,
-        {"speed": chain.speed.borders, "landing": chain.landing_law.borders},
-        within,
-        values,
-        means,
-        time.perf_counter() - begun,
+        scatter=noise,
+        absorbing={name: tuple(each) for name, each in places.items()},
+        starts=begin,
+        nodes=chain.nodes,
+        strata={"speed": chain.speed.borders, "landing": chain.landing_law.borders},
+        within=within,
+        values=values,
+        mean=means,
+        seconds=time.perf_counter() - begun,
     )
 
 
@@ -370,22 +376,24 @@ def _places(
     absorbing: Mapping[str, Sequence[Place]] | None,
 ) -> dict[str, list[Place]]:
     """Collect the absorbing places by name."""
-    found: dict[str, list[Place]] = {}
+    absorbers: dict[str, list[Place]] = {}
     if right is not None:
-        found["right"] = [(int(right[1]), float(right[0]), math.inf)]
+        absorbers["right"] = [(int(right[1]), float(right[0]), math.inf)]
     if wrong is not None:
         if right is None:
             raise AnswerError(
                 "the places that are wrong", wrong, "x, with `right`", "say which side is right"
             )
-        found["wrong"] = [(k, float(wrong), math.inf) for k in range(len(scene.sides)) if k != int(right[1])]
+        absorbers["wrong"] = [
+            (k, float(wrong), math.inf) for k in range(len(scene.sides)) if k != int(right[1])
+        ]
     for name, places in (absorbing or {}).items():
-        if name in (*found, ANY, EXITS):
+        if name in (*absorbers, ANY, EXITS):
             raise AnswerError("the name of absorbing places", name, "one that is not taken", "choose another")
-        found[name] = [(int(side), float(lo), float(hi)) for side, lo, hi in places]
-    for name, each in found.items():
+        absorbers[name] = [(int(side), float(lo), float(hi)) for side, lo, hi in places]
+    for name, each in absorbers.items():
         _require(scene, f'a place that is "{name}"', each)
-    return found
+    return absorbers
 
 
 def _require(scene: Scene, thing: str, places: Sequence[Place]) -> None:

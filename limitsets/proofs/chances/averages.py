@@ -6,16 +6,16 @@ above the chord between two nodes by at most
 
     h^2/8 max(0, -M''),     or    h/4 (oscillation of M'),
 
-of which parts may be bounded by the one and parts by the other.  M'' is a sum of slopes of V at the places where
-densities jump ("bends"), and of terms bounded by the total variation of V where moves land ("swings").  What is not
-decided costs the difference of what it may be ("gaps").
+and parts of M may be bounded by the one, parts by the other.  M'' is a sum of slopes of V at the places where
+densities jump ("bends"), and of terms bounded by the total variation of V where moves land ("swings").  Where
+the branch is not decided, the bound is the difference of the values that V may have ("gaps").
 
 Rounding, with u = 2^-53.  The entries of a row are >= 0 with a sum of 1, each computed by fewer than 12 operations from
 places that are doubles, a share 1 - s of a node to u rather than to u (1 - s); entries of one node are merged, at most
 four from each of two runs of 192 strata; so in whatever order scipy adds them up, a mean of k entries is off by less
 than (k + 768 + 12) u times the largest |V|: `rounding_of`, never below `ROUNDING`, which covers the few additions after
 it.  Slopes and extremes have one rounding of their own size, which `MORE` inflates; running sums of n terms, whose
-differences stand for sums over spans, are off by less than n u times the whole sum, which is added (`spans.running`).
+differences stand for sums over spans, are off by less than n u times the whole sum, which is added (`running`).
 Slopes across the nodes of a jump are so large that running sums would lose the others: they are counted, not added.
 """
 
@@ -79,13 +79,13 @@ class Nodes:
 
     def cell(self, side: Index, x: Array) -> Index:
         """Return the cells, named by their left nodes, in which places lie."""
-        found = np.empty(x.shape, dtype=np.int64)
+        cells = np.empty(x.shape, dtype=np.int64)
         for k in range(self.first.size - 1):
             here = side == k
             row = self.place[self.of_side(k)]
             inside = np.searchsorted(row, x[here], side="right") - 1
-            found[here] = self.first[k] + np.clip(inside, 0, row.size - 2)
-        return found
+            cells[here] = self.first[k] + np.clip(inside, 0, row.size - 2)
+        return cells
 
 
 def extra(graded: float) -> float:
@@ -119,7 +119,7 @@ def nodes_of(
     without: Sequence[Sequence[tuple[float, float]]] | None = None,
     graded: float = 0.0,
 ) -> Nodes:
-    """Place nodes at distances of about `width`, less near the joint, and at special places besides.
+    """Place nodes at distances of about `width`, closer near the joint, and at the special places.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def nodes_of(
 
 
 # ----------------------------------------------------------------
-# Cells of the function that is averaged, from one to another, and what of it on them bounds a mean.
+# Spans of cells of the averaged function, and the quantities of the function on them that bound a mean.
 
 
 class Span(NamedTuple):
@@ -194,7 +194,7 @@ class Gaps(NamedTuple):
 class Kinks(NamedTuple):
     """To `cell`'s deficit comes `much` times the sum of what the slope of V falls by at the nodes within a span.
 
-    Or `even` times the most that it falls by per length, where that is less; and `bow` times the largest slope there.
+    Or `even` times the largest fall of the slope per length, where that is less; and `bow` times the largest slope.
     """
 
     cell: Index
@@ -205,7 +205,7 @@ class Kinks(NamedTuple):
 
 
 class Curvature(NamedTuple):
-    """One way to bound the deficit by curvature, for the cells that it knows."""
+    """One way to bound the deficits of some cells by curvature."""
 
     cells: Index
     bends: tuple[Bends, ...] = ()
@@ -215,15 +215,15 @@ class Curvature(NamedTuple):
 
 
 class Running(NamedTuple):
-    """Running sums of numbers >= 0, from 0 on, and how far a difference of two may be off."""
+    """Running sums of numbers >= 0, from 0 on, and a bound of the rounding of a difference of two."""
 
     total: Array
     off: float
 
     def between(self, first: Index, last: Index) -> Array:
         """Bound the sum of the numbers from `first` up to the one before `last` from above."""
-        found: Array = self.total[last] - self.total[first] + self.off
-        return found
+        bound: Array = self.total[last] - self.total[first] + self.off
+        return bound
 
 
 def running(numbers: Array) -> Running:
@@ -312,13 +312,13 @@ class Average:
     matrix : csr_array, shape (n, m)
         From values at the nodes of the target to means at those of the source.
     beyond : float
-        Weight of which nothing is known.
+        Weight of the deviations outside the strata.
     at_nodes : tuple of Swings
         How far the means at nodes may be off.
     swings, gaps : tuple of Swings, tuple of Gaps
-        The same of means anywhere in a cell.
+        How far the means anywhere in a cell may be off.
     ways : tuple of Curvature
-        Deficits of the chord, h included; of several ways the best counts, for each cell.
+        Bounds of the deficits of the chord, h included; the least bound counts for each cell.
     """
 
     source: Nodes
@@ -368,12 +368,12 @@ class Average:
         return bound
 
     def _deficit(self, values: Array, slopes: Array, total: Running, n: int) -> Array:
-        """How far the mean may lie above the chord, for each cell, named by its left node."""
-        found, best, width = np.zeros(n), np.full(n, np.inf), self.target.width
+        """Bound how far the mean may lie above the chord, for each cell, named by its left node."""
+        excess, best, width = np.zeros(n), np.full(n, np.inf), self.target.width
         for each in self.swings:
-            found += np.bincount(each.row, _variation(total, each), n)
+            excess += np.bincount(each.row, _variation(total, each), n)
         for gap in self.gaps:
-            found += np.bincount(gap.row, self._difference(gap, values), n)
+            excess += np.bincount(gap.row, self._difference(gap, values), n)
         fall = np.maximum(slopes - np.append(slopes[1:], 0.0), 0.0)  # at the node after each cell
         ordinary = fall <= JUMP * float(np.abs(values).max()) / float(np.median(width))
         falls = running(np.where(ordinary, fall, 0.0))
@@ -405,11 +405,11 @@ class Average:
             known[way.cells] = True
             best[way.cells] = np.minimum(best[way.cells], deficit[way.cells])
         best[~known] = 0.0
-        # Nodes close together are lifted alike: a difference would be a slope without end.
+        # Nodes close together are lifted by the same amount: a difference would be a very large slope.
         close = np.flatnonzero(self.source.width < CLOSE_BY * np.median(self.source.width))
         for _ in range(CLUSTER):
             best[close] = np.maximum(best[close], np.maximum(best[close - 1], best[close + 1]))
-        deficits: Array = found + best
+        deficits: Array = excess + best
         return deficits
 
     def _difference(self, gap: Gaps, values: Array) -> Array:

@@ -27,10 +27,10 @@ Array = NDArray[np.float64]
 Place = tuple[int, float, float]
 
 EXITS = "exits"
-# Into how many strata each law is cut: a uniform one needs them for the curvature of the landing place alone.
+# Number of strata into which each law is cut: a uniform law needs them only for the curvature of the landing place.
 SPEED_STRATA, LANDING_STRATA = 16, 1
 NORMAL_SPEED, NORMAL_LANDING = 96, 192
-# Cells of the function of the landing place for one of the function of the start.
+# Number of cells of the function of the landing place for each cell of the function of the start.
 FINER = 4
 # Cells are narrower near the joint, up to this share of the arm, where no scatter of the landing smooths functions.
 GRADED = 0.43
@@ -43,11 +43,11 @@ class Chain:
     Attributes
     ----------
     nodes : Nodes
-        Of the functions.
+        Nodes of the functions.
     throw : Average
-        Over the speed.
+        Average over the speed.
     landing : Average or None
-        Over the landing place; None where it does not deviate.
+        Average over the landing place; None where it does not deviate.
     free : ndarray of bool, shape (n,)
         Nodes from which a throw is made, or at the border of such places.
     absorbs : dict of str to ndarray of bool, shape (n,)
@@ -66,10 +66,10 @@ class Chain:
 
     def fixed(self, value: Mapping[str, float]) -> Array:
         """Return the largest value on absorbing places, -inf where there is none."""
-        found = np.full(self.free.size, -np.inf)
+        largest = np.full(self.free.size, -np.inf)
         for name, nodes in self.absorbs.items():
-            found[nodes] = np.maximum(found[nodes], value[name])
-        return found
+            largest[nodes] = np.maximum(largest[nodes], value[name])
+        return largest
 
     def first(self, fixed: Array) -> Array:
         """Return the function that is 0 where a throw is made."""
@@ -101,11 +101,11 @@ def _absorbing(
 def _special(
     sides: list[OneSide], box: ParameterBox, absorbing: Mapping[str, Sequence[Place]], law: Staircase
 ) -> list[list[list[float]]]:
-    """Per side clusters of nodes: where functions jump, and where the speed begins and ceases to decide."""
+    """Per side clusters of nodes: where functions jump, and where the speed begins and ceases to decide the branch."""
     lo, hi = box.bare
     close = CLOSE * hi.arm_length
     below, above = lo.arm_length, hi.arm_length
-    found = []
+    clusters = []
     for side in sides:
         a = side.spans["a"]
         rows = [
@@ -118,8 +118,28 @@ def _special(
         for delta in {float(law.borders[0]), float(law.borders[-1])}:
             for x in crossings(side, a[1] + 8 * close, below - 8 * close, delta):
                 rows.append([x - 2 * close, x - close, x + close, x + 2 * close])
-        found.append(rows)
-    return found
+        clusters.append(rows)
+    return clusters
+
+
+def _nodes_on_arm(
+    ends: list[tuple[float, float]],
+    special: list[list[list[float]]],
+    absorbing: Mapping[str, Sequence[Place]],
+    cells: int,
+    *,
+    far: float,
+    graded: float,
+) -> tuple[Nodes, float]:
+    """Spread the cells over the sides, none of them on places that absorb; with the width of a cell."""
+    flat = [[x for row in rows for x in row] for rows in special]
+    gone = [
+        [(x, min(y, above)) for places in absorbing.values() for k, x, y in places if k == number]
+        for number, (_, above) in enumerate(ends)
+    ]
+    length = sum(y - x + extra(graded) for x, y in ends) - sum(y - x for row in gone for x, y in row)
+    width = length / (cells * len(ends))
+    return nodes_of(ends, width, flat, far, gone, graded), width
 
 
 def chain_of(
@@ -168,16 +188,8 @@ def chain_of(
     arm, close = hi.arm_length, CLOSE * hi.arm_length
     special = _special(sides, box, absorbing, speed)
     ends = [(side.spans["a"][0] - close, arm + close) for side in sides]
-    flat = [[x for row in rows for x in row] for rows in special]
-    # No cells are spent on places that absorb.
-    gone = [
-        [(x, min(y, above)) for places in absorbing.values() for k, x, y in places if k == side.number]
-        for side, (_, above) in zip(sides, ends, strict=True)
-    ]
     graded = GRADED * arm if landing.certain else 0.0
-    length = sum(y - x + extra(graded) for x, y in ends) - sum(y - x for row in gone for x, y in row)
-    width = length / (cells * len(sides))
-    nodes = nodes_of(ends, width, flat, FAR * arm, gone, graded)
+    nodes, width = _nodes_on_arm(ends, special, absorbing, cells, far=FAR * arm, graded=graded)
     target, average = nodes, None
     if not landing.certain:
         reach = float(landing.borders[-1])
@@ -193,15 +205,15 @@ def chain_of(
     breaks = np.flatnonzero(np.diff(numbers) > 1) + 1
     runs = [run for run in np.split(numbers, breaks) if run.size > 1]
     throw = throw_average(sides, nodes, target, speed, runs)
-    return Chain(nodes, throw, average, free, absorbs, speed, landing)
+    return Chain(nodes, throw, average, free=free, absorbs=absorbs, speed=speed, landing_law=landing)
 
 
 # ----------------------------------------------------------------
 # The certificate of brackets: laws, starts, places that absorb, nodes; the checker makes the steps itself.
 #
 # The checker bounds a throw in its own way, which needs somewhat finer cells for the same width: the certificate cuts
-# each cell, and claims what was found, widened by an allowance.  The file is laid out as
-# every certificate (docs/certificates.md).
+# each cell, and claims the proved brackets, widened by an allowance.  The file has the layout of every certificate
+# (docs/certificates.md).
 
 
 # Strata of the speed for the checker: between their ends it takes landing places to be linear.

@@ -1,7 +1,7 @@
 """How far the mean after a throw may lie above its chord on a cell, for laws given as staircases.
 
-By the borders of strata and branches, where the density of the speed jumps; by the nodes at which the slope of the
-averaged function falls; and by all that this function may be where throws land.
+There are three bounds: from the borders of strata and branches, where the density of the speed jumps; from the nodes
+at which the slope of the averaged function falls; and from the range of this function where throws land.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from limitsets.proofs.prover.numbers import Intervals, RationalInterval, pi, squ
 # ----------------------------------------------------------------
 # Laws as staircases: a density that is constant on strata, and how far the law itself may be from it.
 #
-# A uniform law is one.  For a normal law the steps have its exact masses, enclosed in rationals, so that of a
-# function V only its variation within a stratum meets the difference: with osc the change of the density on a stratum
-# of width w,
+# A uniform law is a staircase.  For a normal law the steps have its exact masses, enclosed in rationals, so that only
+# the variation of a function V within a stratum contributes to the difference: with osc the change of the density on a
+# stratum of width w,
 #
 #     | int (p - step) V | = | int (p - step) (V - c) | <= (osc w / 4) (total variation of V there).
 #
-# What lies beyond six standard deviations is a weight of which nothing is known.
+# The weight beyond six standard deviations may lie anywhere.
 
 
 Array = NDArray[np.float64]
@@ -96,9 +96,9 @@ def staircase(law: Any, strata: int, name: str) -> Staircase:
     law : Uniform, Gaussian or None
         The law; None for a deviation of 0.
     strata : int
-        How many; of a normal law a multiple of 12.
+        Number of strata; a multiple of 12 for a normal law.
     name : str
-        What deviates, for the error.
+        The quantity that deviates, for the message of an error.
 
     Raises
     ------
@@ -162,16 +162,16 @@ def landing_average(target: Nodes, source: Nodes, law: Staircase) -> Average:
     Parameters
     ----------
     target : Nodes
-        Of V.
+        Nodes of V.
     source : Nodes
-        Of y; the outermost nodes lie as far out.
+        Nodes of y; the outermost nodes lie as far out as those of V.
     law : Staircase
-        Of e.
+        The law of e.
     """
     n, strata = source.place.size, law.weight.size
     side, y = source.side(), source.place
     reach = max(law.borders[-1], -law.borders[0])
-    # Far out V is constant, and stays so within reach.
+    # Far out V is constant, also within the reach of the law.
     y = np.clip(y, target.place[0] + reach, target.place[-1] - reach)
     row = np.repeat(np.arange(n), strata)
     ends = y[:, None] + law.borders
@@ -179,10 +179,10 @@ def landing_average(target: Nodes, source: Nodes, law: Staircase) -> Average:
         n,
         target,
         row,
-        np.tile(law.weight, n),
-        np.repeat(side, strata),
-        ends[:, :-1].ravel(),
-        ends[:, 1:].ravel(),
+        weight=np.tile(law.weight, n),
+        side=np.repeat(side, strata),
+        one=ends[:, :-1].ravel(),
+        two=ends[:, 1:].ravel(),
     )
     cells = np.flatnonzero(np.isfinite(source.width))
     h = np.maximum(y[cells + 1] - y[cells], 0.0)
@@ -190,7 +190,7 @@ def landing_average(target: Nodes, source: Nodes, law: Staircase) -> Average:
     jumps = -np.diff(law.density, prepend=0.0, append=0.0)
     bends, swings = [], []
     for border, jump in zip(law.borders, jumps, strict=True):
-        # A tenth of a rounding: where nothing jumps nothing bends.
+        # A jump below rounding is none, and bends nothing.
         if abs(jump) > 1e-12 * law.density.max():
             span = _span(target, side[cells], y[cells] + border, y[cells + 1] + border)
             much = h * h / 8.0 * jump
@@ -226,7 +226,7 @@ Flags = NDArray[np.bool_]
 
 # Inflates coefficients against the rounding of the few operations that make them.
 MORE = 1.0 + 2.0**-40
-# A cap that is none.
+# Stands for the absence of a cap.
 NEVER = 1e200
 
 
@@ -271,7 +271,7 @@ class Deficits:
         self.ways: list[Curvature] = []
 
     def landing(self, side: OneSide, flips: Flags, place: Array) -> tuple[Index, Array]:
-        """Return the side on which throws land, and where, of the places of jogs."""
+        """Return the side and the place where throws land, from the places where jogs land."""
         return np.where(flips, side.after, side.number), np.where(flips, place - side.shift, place)
 
     def span_of(self, side: OneSide, flips: Flags, lo: Array, hi: Array) -> Span:
@@ -283,14 +283,16 @@ class Deficits:
     def gaps_of(
         self, cell: Index, much: Array, side: OneSide, flips: Flags, lo: Array, hi: Array, both: Flags
     ) -> Gaps:
-        """Return gaps between such places, on both branches where `both`."""
+        """Return gaps over the cells between two places of jogs, on both branches where `both`."""
         return Gaps(cell, much, self.span_of(side, flips, lo, hi), self.span_of(side, flips ^ both, lo, hi))
 
-    def any_way(self, rows: Rows, found: Decided, some: Index, lo: Array, hi: Array) -> None:
-        """By all that V may be where throws land."""
+    def any_way(self, rows: Rows, branches: Decided, some: Index, lo: Array, hi: Array) -> None:
+        """Bound deficits by the range of V where throws land."""
         cell = rows.number[:-1][some]
-        below, above = found.cell_below[some], found.cell_above[some]
-        gaps = self.gaps_of(cell, np.ones(some.size), rows.side, below, lo[some], hi[some], below != above)
+        below, above = branches.cell_below[some], branches.cell_above[some]
+        gaps = self.gaps_of(
+            cell, np.ones(some.size), rows.side, flips=below, lo=lo[some], hi=hi[some], both=below != above
+        )
         self.ways.append(Curvature(cell, gaps=(gaps,)))
 
     def _widest(self, span: Span) -> Array:
@@ -300,21 +302,21 @@ class Deficits:
     def by_kinks(
         self,
         rows: Rows,
-        found: Decided,
+        branches: Decided,
         all_of: Derivatives,
         some: Index,
         lo: Array,
         hi: Array,
         density: float,
     ) -> None:
-        """By what the slope of V falls at nodes, each met by a share of the deviations only."""
+        """Bound deficits by the falls of the slope of V at nodes, each met by only a share of the deviations."""
         law, side, cell = self.law, rows.side, rows.number[:-1]
         h = np.diff(rows.x)[some]
         t = Derivatives(*(each[some] for each in all_of))
         wide, rate = t.x.absolute().hi, t.delta.absolute().lo
         with np.errstate(divide="ignore"):
             share = np.ones(some.size) if law.certain else np.minimum(density * wide * h / rate, 1.0)
-        below, above = found.cell_below[some], found.cell_above[some]
+        below, above = branches.cell_below[some], branches.cell_above[some]
         split = np.flatnonzero(below != above)
         much, bow = MORE * 0.25 * h * wide * share, MORE * h * h / 8.0 * t.x_x.absolute().hi
         # A function that is affine between nodes at most d apart, and whose slope falls by at most L per length, lies
@@ -333,7 +335,7 @@ class Deficits:
             even_too = MORE * (length[split] ** 2 / 8.0 + length[split] * self._widest(other) / 4.0)
             kinks.append(Kinks(cell[at], much[split], even_too, bow[split], other))
             # Along a border that moves with x: p g' (2 T_x + g' T_delta) G'.
-            drift = (found.cut[at + 1] - found.cut[at]) / h[split]
+            drift = (branches.cut[at + 1] - branches.cut[at]) / h[split]
             moving = Intervals(drift, drift)
             by = h[split] ** 2 / 8.0 * density
             turned = moving * (2.0 * t.x[split] + moving * t.delta[split]) * Intervals(0.0 * by, by)
@@ -347,14 +349,14 @@ class Deficits:
     def by_borders(
         self,
         rows: Rows,
-        found: Decided,
+        branches: Decided,
         all_of: Derivatives,
         some: Index,
         lo: Array,
         hi: Array,
         density: float,
     ) -> None:
-        """By the borders of strata and branches, where the densities jump."""
+        """Bound deficits by the borders of strata and branches, where the densities jump."""
         bends: list[Bends] = []
         swings: list[Swings] = []
         gaps: list[Gaps] = []
@@ -365,8 +367,8 @@ class Deficits:
         ratio = t.x * one
         by_delta = (2.0 * t.x_delta - ratio * t.delta_delta) * ratio
         inner = ((t.x_x - by_delta) * one).absolute().hi * density * h * h / 8.0
-        below, above = found.cell_below[some], found.cell_above[some]
-        one_cut, two_cut = found.cut[some], found.cut[some + 1]
+        below, above = branches.cell_below[some], branches.cell_above[some]
+        one_cut, two_cut = branches.cut[some], branches.cut[some + 1]
         least, most = np.minimum(one_cut, two_cut), np.maximum(one_cut, two_cut)
         below = np.where(most <= law.borders[0], above, below)
         above = np.where(least >= law.borders[-1], below, above)
@@ -387,27 +389,35 @@ class Deficits:
             for flips, here in ((below, lower | between), (above, ~lower)):
                 low = np.where(between, min(jumps[b], 0.0), jumps[b])
                 high = np.where(between, max(jumps[b], 0.0), jumps[b])
-                border = _Border(level, level, first, last, ends, still, low, high)
+                border = _Border(level, level, first, last=last, ends=ends, drift=still, low=low, high=high)
                 bends += self._border(rows, some, np.flatnonzero(here), flips, border)
             at = np.flatnonzero(between)
             if at.size:
                 much = MORE * 0.25 * abs(jumps[b]) * (most - least)[at]
                 both = np.ones(at.size, dtype=bool)
                 gaps.append(
-                    self.gaps_of(cell[some[at]], much, side, below[at], lo[some[at]], hi[some[at]], both)
+                    self.gaps_of(
+                        cell[some[at]],
+                        much,
+                        side,
+                        flips=below[at],
+                        lo=lo[some[at]],
+                        hi=hi[some[at]],
+                        both=both,
+                    )
                 )
         here = np.flatnonzero(split)
         if here.size:
-            bends += self._moving(rows, found, some, here, below, above)
+            bends += self._moving(rows, branches, some, here, below, above)
         self.ways.append(Curvature(cell[some], tuple(bends), tuple(swings), gaps=tuple(gaps)))
 
     def _moving(
-        self, rows: Rows, found: Decided, some: Index, here: Index, below: Flags, above: Flags
+        self, rows: Rows, branches: Decided, some: Index, here: Index, below: Flags, above: Flags
     ) -> list[Bends]:
-        """Return what the border between the branches bends."""
+        """Return the bends at the border between the branches."""
         law, side = self.law, rows.side
         h = np.diff(rows.x)[some]
-        one_cut, two_cut = found.cut[some], found.cut[some + 1]
+        one_cut, two_cut = branches.cut[some], branches.cut[some + 1]
         least, most = np.minimum(one_cut, two_cut), np.maximum(one_cut, two_cut)
         x_one, x_two = rows.x[some], rows.x[some + 1]
         first, last = landed(side, x_one, least).phi, landed(side, x_two, most).phi
@@ -421,12 +431,12 @@ class Deficits:
             low, high = window.ends(law.density)
         else:
             low = high = np.full(some.size, law.density[0])
-        border = _Border(least, most, first, last, ends, drift, low, high)
+        border = _Border(least, most, first, last=last, ends=ends, drift=drift, low=low, high=high)
         other = border._replace(low=-high, high=-low)
         return self._border(rows, some, here, below, border) + self._border(rows, some, here, above, other)
 
     def _border(self, rows: Rows, some: Index, here: Index, flips: Flags, border: _Border) -> list[Bends]:
-        """Return what the jump of the density at a border, fixed or moving with x, bends."""
+        """Return the bends by the jump of the density at a border, fixed or moving with x."""
         if not here.size:
             return []
         side, cell = rows.side, some[here]

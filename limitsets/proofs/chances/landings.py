@@ -57,7 +57,7 @@ def _horner(coefficients: list[float], q: Array) -> Array:
 
 
 def moments(phi: Array, most: int = 2) -> Moments:
-    """Evaluate them at angles from 0 to 2 pi, up to k = `most`; nan beyond."""
+    """Evaluate the moments at angles from 0 to 2 pi, up to k = `most`; nan beyond."""
     q = phi * phi
     count = range(most + 1)
     return Moments(
@@ -146,7 +146,19 @@ def one_side(lo: Any, hi: Any, number: int) -> OneSide:
     middle = {name: 0.5 * (ends[0] + ends[1]) for name, ends in spans.items()}
     slack = max(ends[1] - ends[0] for ends in spans.values())
     a, d, h, kappa, shift = (float(middle[name]) for name in ("a", "d", "h", "kappa", "shift"))
-    return OneSide(number, after, a, d, h, kappa, shift, spans, float(slack), lo.flight, lo.flip)
+    return OneSide(
+        number,
+        after,
+        a,
+        d=d,
+        h=h,
+        kappa=kappa,
+        shift=shift,
+        spans=spans,
+        slack=float(slack),
+        flight=lo.flight,
+        flip=lo.flip,
+    )
 
 
 def kappa_of(side: OneSide, delta: Array) -> Array:
@@ -235,10 +247,10 @@ def slopes(side: OneSide, phi: Intervals, delta: Intervals) -> Derivatives:
         1.0 + rate * one,
         by_kappa * first,
         turn * square + rate * phi_xx,
-        x_kappa * first,
-        kappa_kappa * first * first + by_kappa * second,
-        one,
-        phi_kappa,
+        x_delta=x_kappa * first,
+        delta_delta=kappa_kappa * first * first + by_kappa * second,
+        phi_x=one,
+        phi_kappa=phi_kappa,
     )
 
 
@@ -256,7 +268,7 @@ def slopes(side: OneSide, phi: Intervals, delta: Intervals) -> Derivatives:
 
 Index = NDArray[np.int64]
 Flags = NDArray[np.bool_]
-# Of all cells: surely flips, surely jogs, what is open, and the branches below and above the border.
+# For all cells: certain flips, certain jogs, how far the border is open, and the branches below and above the border.
 _Cells = tuple[Flags, Flags, Array, Flags, Flags]
 
 BISECTIONS = 48
@@ -278,7 +290,7 @@ class Piece(NamedTuple):
 
 
 class Decided(NamedTuple):
-    """Of nodes x_k of a side and the cells between them.
+    """The branches of throws from nodes x_k of a side and from the cells between them.
 
     Attributes
     ----------
@@ -315,14 +327,14 @@ def margin(
     formulas = Formulas(side.flight, side.flip)
     if not steep:
         n, part = _numbers(side, kappa)
-        found = formulas.margin(n, part, angle(phi), x)
-        return found, found, found
+        enclosure = formulas.margin(n, part, angle(phi), x)
+        return enclosure, enclosure, enclosure
     n, part = _numbers(side, variable(kappa, 1, 3))
-    found = formulas.margin(n, part, angle(variable(phi, 0, 3)), variable(x, 2, 3))
-    by_phi, by_kappa, by_x = found.derivatives
+    enclosure = formulas.margin(n, part, angle(variable(phi, 0, 3)), variable(x, 2, 3))
+    by_phi, by_kappa, by_x = enclosure.derivatives
     along = slopes(side, phi, delta)
     by_delta = (by_kappa + by_phi * along.phi_kappa) * (-2.0 * (kappa / factor))
-    return found.value, by_x + by_phi * along.phi_x, by_delta
+    return enclosure.value, by_x + by_phi * along.phi_x, by_delta
 
 
 def _at(side: OneSide, x: Array, delta: Array) -> Intervals:
@@ -333,7 +345,7 @@ def _at(side: OneSide, x: Array, delta: Array) -> Intervals:
 
 
 def _bisected(side: OneSide, x: Array, lo: Array, hi: Array, rising: NDArray[np.bool_]) -> Array:
-    """Propose where F changes its sign between two deviations; an end where it does not."""
+    """Propose the deviation at which F changes its sign between two; one of these two where it keeps its sign."""
     lo, hi = lo.copy(), hi.copy()
     for _ in range(BISECTIONS):
         middle = 0.5 * (lo + hi)
@@ -344,7 +356,7 @@ def _bisected(side: OneSide, x: Array, lo: Array, hi: Array, rising: NDArray[np.
 
 
 def hull(some: Iterable[Intervals]) -> Intervals:
-    """Give the least intervals that hold all of these."""
+    """Give the least intervals that hold all of the given ones."""
     lo, hi = zip(*((each.lo, each.hi) for each in some), strict=True)
     return Intervals(np.minimum.reduce(lo), np.maximum.reduce(hi))
 
@@ -367,8 +379,8 @@ def decided(side: OneSide, x: Array, pieces: Sequence[Piece]) -> Decided:
     flips = middle.lo + middle.hi > 0.0
     cut, below, above = np.full(n, last), flips.copy(), flips.copy()
     box = Intervals(x[:-1], x[1:])
-    found = hull(margin(side, box, each.phi, each.delta)[0] for each in pieces)
-    yes, no = found.lo > 0.0, found.hi <= 0.0
+    margins = hull(margin(side, box, each.phi, each.delta)[0] for each in pieces)
+    yes, no = margins.lo > 0.0, margins.hi <= 0.0
     anywhere = last - first if last > first else 1.0
     beta = np.where(yes | no, 0.0, anywhere)
     cell_below, cell_above = yes.copy(), yes.copy()
@@ -377,17 +389,26 @@ def decided(side: OneSide, x: Array, pieces: Sequence[Piece]) -> Decided:
         steep = [margin(side, box[open_], each.phi[open_], each.delta[open_], steep=True) for each in pieces]
         by_x, by_delta = (hull(each[k] for each in steep) for k in (1, 2))
         rising, falling = by_delta.lo > 0.0, by_delta.hi < 0.0
-        _by_corners(side, x, open_, by_x, rising, falling, bounds, (yes, no, beta, cell_below, cell_above))
+        _by_corners(
+            side,
+            x,
+            open_,
+            by_x=by_x,
+            rising=rising,
+            falling=falling,
+            bounds=bounds,
+            cells=(yes, no, beta, cell_below, cell_above),
+        )
         if last > first:
             _by_border(
                 side,
                 x,
                 open_,
-                by_x,
-                by_delta,
-                bounds,
-                (cut, below, above),
-                (yes, no, beta, cell_below, cell_above),
+                by_x=by_x,
+                by_delta=by_delta,
+                bounds=bounds,
+                nodes=(cut, below, above),
+                cells=(yes, no, beta, cell_below, cell_above),
             )
         else:
             cell_below[open_] |= flips[open_] & ~no[open_]

@@ -40,7 +40,7 @@ Index = NDArray[np.int64]
 MORE = 1.0 + 2.0**-40
 # Deviations of the speed enclosed at a time: of 6 % at once no derivative keeps its sign.
 PIECE = 0.005
-# A cap that is none.
+# Stands for the absence of a cap.
 NEVER = 1e200
 
 
@@ -58,13 +58,13 @@ def throw_average(
     sides : list of OneSide
         The sides.
     source : Nodes
-        Of the starts.
+        Nodes of the starts.
     target : Nodes
-        Of the function that is averaged.
+        Nodes of the averaged function.
     law : Staircase
-        Of the relative deviation of the speed.
+        The law of the relative deviation of the speed.
     runs : list of ndarray of int
-        Numbers of consecutive nodes of one side between which all is wanted; the first may lie at the joint.
+        Runs of consecutive nodes of one side whose cells are bounded; the first node may lie at the joint.
     """
     parts = _Parts(source, target, law)
     for numbers in runs:
@@ -84,7 +84,7 @@ def _columns(borders: Array) -> list[tuple[int, int]]:
 
 
 class _Parts(Deficits):
-    """What is collected, side by side."""
+    """The segments, swings and gaps of an average, collected side by side."""
 
     def __init__(self, source: Nodes, target: Nodes, law: Staircase) -> None:
         super().__init__(target, law)
@@ -95,18 +95,18 @@ class _Parts(Deficits):
         self.gaps: list[Gaps] = []
 
     def average(self) -> Average:
-        """Put them together."""
+        """Join the collected parts to an average."""
         columns = [np.concatenate(column) for column in zip(*self.segments, strict=True)]
         matrix = mean_matrix(self.source.place.size, self.target, *columns)
         return Average(
             self.source,
             self.target,
             matrix,
-            self.law.beyond,
-            tuple(self.at_nodes),
-            tuple(self.swings),
-            tuple(self.gaps),
-            tuple(self.ways),
+            beyond=self.law.beyond,
+            at_nodes=tuple(self.at_nodes),
+            swings=tuple(self.swings),
+            gaps=tuple(self.gaps),
+            ways=tuple(self.ways),
         )
 
     def add(self, side: OneSide, numbers: Index) -> None:
@@ -115,17 +115,17 @@ class _Parts(Deficits):
         x = self.source.place[numbers]
         joint = x <= side.spans["a"][1]
         begin = int(joint.sum())
-        x = np.maximum(x, x[begin])  # at the joint: as from the first place beyond it
+        x = np.maximum(x, x[begin])  # starts at the joint are taken as the first one beyond
         every = landed(side, np.repeat(x, law.borders.size), np.tile(law.borders, n))
         table: list[Any] = [column.reshape(n, -1) for column in every]
         rows = Rows(
             side,
             numbers,
             x,
-            table[2],
-            table[0],
-            np.maximum(table[1], table[3]).max(axis=1),
-            table[4].all(axis=1),
+            place=table[2],
+            phi=table[0],
+            error=np.maximum(table[1], table[3]).max(axis=1),
+            good=table[4].all(axis=1),
         )
         slack = np.maximum(rows.error[:-1], rows.error[1:])
         pieces = []
@@ -137,8 +137,8 @@ class _Parts(Deficits):
             pieces.append(Piece(float(law.borders[first]), float(law.borders[last]), phi))
         places = x.copy()
         places[:begin] = self.source.place[numbers[:begin]]
-        found = decided(side, places, pieces)
-        at_cut = landed(side, x, np.full(n, law.borders[0]) if law.certain else found.cut)
+        branches = decided(side, places, pieces)
+        at_cut = landed(side, x, np.full(n, law.borders[0]) if law.certain else branches.cut)
         rows = rows._replace(
             error=np.maximum(rows.error, np.maximum(at_cut.phi_error, at_cut.error)),
             good=rows.good & at_cut.good,
@@ -146,19 +146,19 @@ class _Parts(Deficits):
         all_of = Derivatives(
             *map(hull, zip(*(slopes(side, each.phi, each.delta) for each in pieces), strict=True))
         )
-        self._nodes(rows, found, all_of, at_cut.place)
-        self._cells(rows, found, all_of, begin)
+        self._nodes(rows, branches, all_of, at_cut.place)
+        self._cells(rows, branches, all_of, begin)
 
     # ------------------------------------------------------------ nodes
 
-    def _nodes(self, rows: Rows, found: Decided, all_of: Derivatives, at_cut: Array) -> None:
+    def _nodes(self, rows: Rows, branches: Decided, all_of: Derivatives, at_cut: Array) -> None:
         """Segments between the places of borders, and how far the places between them may be off a line."""
         law, side, n = self.law, rows.side, rows.x.size
         if law.certain:
-            number, place = self.landing(side, found.below, rows.place[:, 0])
+            number, place = self.landing(side, branches.below, rows.place[:, 0])
             self.segments.append((rows.number, np.ones(n), number, place, place))
             span = self.span_of(
-                side, found.below, rows.place[:, 0] - rows.error, rows.place[:, 0] + rows.error
+                side, branches.below, rows.place[:, 0] - rows.error, rows.place[:, 0] + rows.error
             )
             # Of the variation on a cell no more is met than the share of it that the error makes.
             narrowest = Windows(span).ends(self.target.width)[0]
@@ -168,10 +168,10 @@ class _Parts(Deficits):
         step = np.diff(law.borders)
         bend = all_of.delta_delta.absolute().hi
         bend = np.nan_to_num(np.maximum(np.append(bend, bend[-1]), np.insert(bend, 0, bend[0])), nan=np.inf)
-        for flips, is_below in ((found.below, True), (found.above, False)):
+        for flips, is_below in ((branches.below, True), (branches.above, False)):
             lo = np.broadcast_to(law.borders[:-1], (n, step.size))
             hi = np.broadcast_to(law.borders[1:], (n, step.size))
-            cut = found.cut[:, None]
+            cut = branches.cut[:, None]
             begin, end = (lo, np.minimum(hi, cut)) if is_below else (np.maximum(lo, cut), hi)
             one, two = rows.place[:, :-1], rows.place[:, 1:]
             if is_below:
@@ -206,7 +206,7 @@ class _Parts(Deficits):
 
     # ------------------------------------------------------------ cells
 
-    def _cells(self, rows: Rows, found: Decided, all_of: Derivatives, begin: int) -> None:
+    def _cells(self, rows: Rows, branches: Decided, all_of: Derivatives, begin: int) -> None:
         """Deficits between nodes."""
         law, side = self.law, rows.side
         cell = rows.number[:-1]
@@ -220,54 +220,64 @@ class _Parts(Deficits):
         known = (
             np.isfinite(t_x) & np.isfinite(t_delta) & rows.good[:-1] & rows.good[1:] & np.isfinite(lo + hi)
         )
-        # At the joint: whatever lies between it and where the first place beyond it lands.
+        # At the joint: throws land between the joint and the landing place of the first start beyond it.
         lo[:begin] = np.minimum(lo[:begin], side.spans["a"][0])
         density = 1.0 if law.certain else float(law.density.max())
-        self._undecided(rows, found, lo, hi, density, known)
+        self._undecided(rows, branches, lo, hi, density, known)
         if begin:
             at = np.arange(begin)
-            both = found.beta[at] > 0.0
+            both = branches.beta[at] > 0.0
             self.gaps.append(
-                self.gaps_of(cell[at], np.ones(begin), side, found.cell_below[at], lo[at], hi[at], both)
+                self.gaps_of(
+                    cell[at],
+                    np.ones(begin),
+                    side,
+                    flips=branches.cell_below[at],
+                    lo=lo[at],
+                    hi=hi[at],
+                    both=both,
+                )
             )
         live = np.flatnonzero(known & (np.arange(h.size) >= begin) & (h > 0.0))
         if law.ripple:
-            for flips in (found.cell_below, found.cell_above):
+            for flips in (branches.cell_below, branches.cell_above):
                 span = self.span_of(side, flips[live], lo[live], hi[live])
                 self.swings.append(Swings(cell[live], np.full(live.size, law.ripple), span))
-        self.any_way(rows, found, live, lo, hi)
-        self.by_kinks(rows, found, all_of, live, lo, hi, density)
+        self.any_way(rows, branches, live, lo, hi)
+        self.by_kinks(rows, branches, all_of, some=live, lo=lo, hi=hi, density=density)
         # Where the speed moves the landing place by less than a cell its derivative says nothing, if it has a sign.
         rate = all_of.delta.absolute()
         spread = float(law.borders[-1] - law.borders[0]) * rate.lo
         curved = live[((spread > h) & (rate.lo > 0.0))[live]]
         if curved.size:
-            self.by_borders(rows, found, all_of, curved, lo, hi, density)
+            self.by_borders(rows, branches, all_of, some=curved, lo=lo, hi=hi, density=density)
 
     def _undecided(
-        self, rows: Rows, found: Decided, lo: Array, hi: Array, density: float, known: Flags
+        self, rows: Rows, branches: Decided, lo: Array, hi: Array, density: float, known: Flags
     ) -> None:
-        """Where the branch is open, or not that of the node's row; where nothing is proved anything may be."""
+        """Add gaps where the branch is open or is not that of the node's row, and where no landing place is proved."""
         law, cell = self.law, rows.number[:-1]
         first, last = law.borders[0], law.borders[-1]
         off = np.zeros(cell.size)
         for k in (slice(None, -1), slice(1, None)):
-            cut = found.cut[k]
+            cut = branches.cut[k]
             if law.certain:
-                wrong = np.where(found.below[k] != found.cell_below, 1.0, 0.0)
+                wrong = np.where(branches.below[k] != branches.cell_below, 1.0, 0.0)
             else:
                 low, high = cut - first, last - cut
-                wrong = np.where(found.below[k] != found.cell_below, low, 0.0)
-                wrong = wrong + np.where(found.above[k] != found.cell_above, high, 0.0)
+                wrong = np.where(branches.below[k] != branches.cell_below, low, 0.0)
+                wrong = wrong + np.where(branches.above[k] != branches.cell_above, high, 0.0)
             off = np.maximum(off, wrong)
-        much = np.minimum(density * (found.beta + off), 1.0)
+        much = np.minimum(density * (branches.beta + off), 1.0)
         if law.ripple:
-            much = much + np.where(found.cell_below == found.cell_above, 0.0, law.cut_ripple)
+            much = much + np.where(branches.cell_below == branches.cell_above, 0.0, law.cut_ripple)
         some = np.flatnonzero((much > 0.0) & known)
         if some.size:
-            below, both = found.cell_below[some], np.ones(some.size, bool)
+            below, both = branches.cell_below[some], np.ones(some.size, bool)
             self.gaps.append(
-                self.gaps_of(cell[some], MORE * much[some], rows.side, below, lo[some], hi[some], both)
+                self.gaps_of(
+                    cell[some], MORE * much[some], rows.side, flips=below, lo=lo[some], hi=hi[some], both=both
+                )
             )
         lost = cell[~known]
         if lost.size:

@@ -1,4 +1,4 @@
-"""A scene's throws on cells: what a controller plays on, before a sensor is chosen."""
+"""The board of a game: a scene's throws on cells, before a sensor is chosen."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Board:
     scene : Scene
         The scene.
     covers : dict of str to Cover
-        The cells, and the images proved of them, of every throw, noise included.
+        For every throw the cells and their proved images, noise included.
     goal : tuple of (float, int)
         The goal region: at x or beyond, on this side.
     mode : str
@@ -45,7 +45,7 @@ class Board:
     starts : CellSet
         Where the part may lie at first.
     starts_are : str
-        How they were named.
+        How the caller named the starts.
     game : Game
         The game on the cells, as yet without a sensor.
     """
@@ -126,7 +126,16 @@ def board_of(
         begin &= ~beyond
     if not begin.any():
         raise AnswerError("the starts", words, "some that are not caught at once", "name others")
-    return Board(scene, covers, (x, side), mode, noises, CellSet(cells_of, begin), words, game)
+    return Board(
+        scene,
+        covers,
+        (x, side),
+        mode=mode,
+        noise=noises,
+        starts=CellSet(cells_of, begin),
+        starts_are=words,
+        game=game,
+    )
 
 
 def _cells(
@@ -148,18 +157,18 @@ def _cells(
 
 
 def _starts(scene: Scene, cells: Grid, starts: Starts, noise: dict[str, str]) -> tuple[Mask, str]:
-    """Give the cells of the starts, and how they are named."""
-    found = np.zeros(cells.n_cells, dtype=bool)
+    """Give the cells of the starts, and the words for them."""
+    mask = np.zeros(cells.n_cells, dtype=bool)
     if starts is None:
         graph = cover_on(parameter_box(scene, noise=noise), cells).graph
         sets = graph.recurrent_components()
         good = attracting_of(graph.ranges, graph.components(), sets)
         for each in (part for part, attracts in zip(sets, good, strict=True) if attracts):
-            found[each] = True
-        if not found.any():
+            mask[each] = True
+        if not mask.any():
             remedy = "name the starts"
             raise AnswerError("the limit sets of the scene's own throw", "none on these cells", "one", remedy)
-        return found, "the limit sets of the scene's own throw"
+        return mask, "the limit sets of the scene's own throw"
     by_side: Mapping[int, tuple[float, float]]
     if isinstance(starts, Mapping):
         by_side, words = starts, "those named"
@@ -175,5 +184,5 @@ def _starts(scene: Scene, cells: Grid, starts: Starts, noise: dict[str, str]) ->
             allowed = f"from {edges[0]:.9g} to {edges[-1]:.9g} {scene.unit} on side {side}"
             raise AnswerError("the starts", (lo, hi), allowed, "name places where the part can rest")
         inside = (edges[1:] > lo) & (edges[:-1] < hi)
-        found[cells.of_side(side)] = inside if lo < hi else (edges[1:] >= lo) & (edges[:-1] <= hi)
-    return found, words
+        mask[cells.of_side(side)] = inside if lo < hi else (edges[1:] >= lo) & (edges[:-1] <= hi)
+    return mask, words

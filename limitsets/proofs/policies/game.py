@@ -26,7 +26,7 @@ from limitsets.systems.graph.ranges import expand
 
 Bits = NDArray[np.uint64]
 
-# Of the beliefs that are looked through for a subset the last so many: one that is not found only costs time.
+# Only so many of the latest beliefs are searched for a subset: a subset that is missed only costs time.
 COMPARED = 4096
 
 
@@ -38,9 +38,9 @@ def packed(masks: NDArray[np.bool_]) -> Bits:
     >>> packed(np.array([True, False, True]))
     array([5], dtype=uint64)
     """
-    found = np.packbits(masks, axis=-1, bitorder="little")
-    missing = -found.shape[-1] % 8
-    whole = np.concatenate([found, np.zeros((*found.shape[:-1], missing), np.uint8)], axis=-1)
+    octets = np.packbits(masks, axis=-1, bitorder="little")
+    missing = -octets.shape[-1] % 8
+    whole = np.concatenate([octets, np.zeros((*octets.shape[:-1], missing), np.uint8)], axis=-1)
     return np.ascontiguousarray(whole).view(np.uint64)
 
 
@@ -170,14 +170,14 @@ class Game:
 
     def seeing(self, throws: int) -> list[Bits]:
         """Give the cells from which one who sees the cell wins within 0, 1, ... throws: no others can be solved."""
-        found = [self.won if self.wrong is None else np.zeros_like(self.won)]
+        winning = [self.won if self.wrong is None else np.zeros_like(self.won)]
         for _ in range(throws):
-            inside = found[-1] | self.won
+            inside = winning[-1] | self.won
             good: Mask = ~(self.images & ~inside).any(axis=2) & ~self.leaves
             if self.wrong is not None:
                 good &= ~(self.images & self.wrong).any(axis=2)
-            found.append(found[-1] | packed(np.any(good, axis=0)))
-        return found
+            winning.append(winning[-1] | packed(np.any(good, axis=0)))
+        return winning
 
 
 def game_of(
@@ -230,11 +230,11 @@ def game_of(
     for number, image in enumerate(images.values()):
         for cell in range(n):
             one[cell] = True
-            found = image(one)
+            reached = image(one)
             one[cell] = False
-            leaves[number, cell] = found is None
-            if found is not None:
-                rows[number, cell] = packed(found)
+            leaves[number, cell] = reached is None
+            if reached is not None:
+                rows[number, cell] = packed(reached)
     bare = Game(tuple(images), rows, leaves, {}, target, lost)
     return bare.asking(answers)
 
@@ -260,9 +260,9 @@ def image_of(graph: TransitionGraph) -> Image:
     def image(cells: Mask) -> Mask | None:
         if (cells & leaves).any():
             return None
-        found = np.zeros(graph.n_cells, dtype=bool)
+        reached = np.zeros(graph.n_cells, dtype=bool)
         for cell in np.flatnonzero(cells).tolist():
-            found[targets[pointer[cell] : pointer[cell + 1]]] = True
-        return found
+            reached[targets[pointer[cell] : pointer[cell + 1]]] = True
+        return reached
 
     return image

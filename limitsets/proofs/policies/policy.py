@@ -109,17 +109,17 @@ def policy_of(
         answers,
         game.throws,
         np.array([order.get(each, NONE) for each in roots], dtype=np.int64),
-        belief,
-        np.array([choices[number][0] for number in kept], dtype=np.int64),
-        after,
-        solved.throws[kept].copy(),
+        belief=belief,
+        throw=np.array([choices[number][0] for number in kept], dtype=np.int64),
+        after=after,
+        left=solved.throws[kept].copy(),
     )
 
 
 def broken(policy: Policy, game: Game, starts: Mask) -> str:
-    """Look for what a policy does not keep to: inclusion after every throw, falling counts, targets; "" for nothing.
+    """Name the rule that a policy breaks: inclusion after every throw, falling counts, targets; "" for none.
 
-    It asks the game's images and nothing of the search.
+    The check uses the images of the game, and no result of the search.
     """
     for word, number in zip(game.answers, policy.first.tolist(), strict=True):
         at_first = starts & game.answers[word]
@@ -155,9 +155,9 @@ def broken(policy: Policy, game: Game, starts: Mask) -> str:
 # Search for a policy: deeper and deeper, beliefs remembered.
 #
 # A belief is solved within n throws where some throw leads, whatever is answered, to beliefs that are solved within
-# n - 1.  What is solved within n throws is so of every smaller belief, and what is not, not of a larger one: a belief
-# is dropped where a superset is solved in as few throws, or a subset is not in as many.  No belief is solved that
-# holds a cell from which not even one who sees the cell wins in time.
+# n - 1.  Every subset of a solved belief is solved within as many throws, and no superset of an unsolved belief is
+# solved: a belief is dropped where a superset is solved in as few throws, or a subset is unsolved in as many.  A belief
+# is unsolved if it holds a cell from which a controller who sees the cell does not win in time.
 
 
 SOLVED, NOT_SOLVED, NOT_DECIDED = "solved", "not-solved", "not-decided"

@@ -19,12 +19,12 @@ from limitsets.systems.graph.images.enclosed import DECIDED, BoxImages
 from limitsets.systems.maps import images
 
 # ----------------------------------------------------------------
-# What no policy can do: the same game on finitely many starts, whose images are enclosed.
+# Proof that no policy serves some starts: the same game on finitely many starts, whose images are enclosed.
 #
-# Cells are outer images, on which a policy may fail that would work.  Here a belief is a set of single starts that saw
-# the same throws and answers.  A start of which an answer, a decision or the goal region is not certain is taken out,
-# which makes the game easier; so what is not won within n throws is won by no policy, on those starts or any that hold
-# them.
+# On cells, which are outer images, a policy may fail that works in fact.  Here a belief is a set of single starts that
+# saw the same throws and answers.  A start is taken out where an answer, a decision or the goal region is not certain;
+# this makes the game easier.  So if these starts are not won within n throws, no policy wins them in n throws, nor any
+# set of starts that holds them.
 
 
 BEAT = 16
@@ -32,7 +32,7 @@ BEAT = 16
 
 @dataclass(frozen=True, eq=False)
 class Impossible:
-    """What was shown of the starts.
+    """A proved number of throws within which no policy serves some starts.
 
     Attributes
     ----------
@@ -69,11 +69,11 @@ class _SpentError(Exception):
 
 
 class _Enclosed:
-    def __init__(self, found: Synthesis, boxes: Sequence[ParameterBox], until: float) -> None:
-        self.found, self.boxes, self.until, self.seen = found, boxes, until, 0
+    def __init__(self, synthesis: Synthesis, boxes: Sequence[ParameterBox], until: float) -> None:
+        self.synthesis, self.boxes, self.until, self.seen = synthesis, boxes, until, 0
 
     def may_be_won(self, parts: _Parts) -> NDArray[np.bool_]:
-        x, side = self.found.goal
+        x, side = self.synthesis.goal
         won: NDArray[np.bool_] = (parts.hi >= x) & (parts.side == side)
         return won
 
@@ -96,8 +96,8 @@ class _Enclosed:
         a_lo, a_hi = bare_lo.a[side], bare_hi.a[side]
         gone = (hi <= a_lo) | (lo > bare_hi.arm_length)
         stays = (lo > a_hi) & (hi <= bare_lo.arm_length)
-        x, wanted = self.found.goal
-        if self.found.mode == "catch":
+        x, wanted = self.synthesis.goal
+        if self.synthesis.mode == "catch":
             gone |= (lo >= x) & (side != wanted)
             stays &= (hi < x) | ((lo >= x) & (side == wanted))
         if (sure & gone).any():
@@ -106,9 +106,9 @@ class _Enclosed:
 
     def heard(self, parts: _Parts) -> list[_Parts]:
         """Give the parts of which each answer may certainly come, those that are caught left out."""
-        if self.found.mode == "catch":
+        if self.synthesis.mode == "catch":
             parts = parts.some(~self.may_be_won(parts))
-        sensor = self.found.sensor
+        sensor = self.synthesis.sensor
         if isinstance(sensor, SideSensor):
             on = parts.side == sensor.side
             return [parts.some(on), parts.some(~on)]
@@ -141,7 +141,7 @@ class _Enclosed:
 
 
 def not_within(
-    found: Synthesis,
+    synthesis: Synthesis,
     starts: Sequence[tuple[float, int]],
     throws: int | None = None,
     *,
@@ -152,7 +152,7 @@ def not_within(
 
     Parameters
     ----------
-    found : Synthesis
+    synthesis : Synthesis
         The question: throws, sensor, mode and goal.
     starts : sequence of (float, int)
         x and side of each start, all of them in the starts of the question [length].
@@ -173,15 +173,15 @@ def not_within(
         For a start that is not one of the question.
     """
     for x, side in starts:
-        if not (0 <= side < found.grid.sides and found.starts.holds([x], side)[0]):
+        if not (0 <= side < synthesis.grid.sides and synthesis.starts.holds([x], side)[0]):
             raise AnswerError("the start", (x, side), "one of the starts of the question", "choose another")
-    scene = found.scene
+    scene = synthesis.scene
     assert scene.feedback is not None
     boxes = [parameter_box(scene.with_values({each.quantity: each.text})) for each in scene.feedback.throws]
-    most = found.found.throws + 1 if throws is None else throws
+    most = synthesis.found.throws + 1 if throws is None else throws
     places = np.array([at for at, _ in starts], dtype=np.float64)
     begin = _Parts(places, places.copy(), np.array([side for _, side in starts], dtype=np.int64))
-    run, shown, decided = _Enclosed(found, boxes, time.monotonic() + seconds), -1, True
+    run, shown, decided = _Enclosed(synthesis, boxes, time.monotonic() + seconds), -1, True
     try:
         for left in range(most + 1):
             if progress is not None:
@@ -232,12 +232,12 @@ class Simulated:
         return float(np.average(np.arange(self.throws.size), weights=self.throws)) if self.reached else np.nan
 
 
-def simulate(found: Synthesis, parts: int = 10_000, seed: int = 0) -> Simulated:
+def simulate(synthesis: Synthesis, parts: int = 10_000, seed: int = 0) -> Simulated:
     """Run a policy with throws of the map itself.
 
     Parameters
     ----------
-    found : Synthesis
+    synthesis : Synthesis
         A policy that was found.
     parts : int
         How many parts to start, equally likely per length of the starts.
@@ -253,34 +253,34 @@ def simulate(found: Synthesis, parts: int = 10_000, seed: int = 0) -> Simulated:
     AnswerError
         Where there is no policy.
     """
-    policy = found.found.policy
+    policy = synthesis.found.policy
     if policy is None:
         remedy = "more throws, other throws, another sensor or fewer starts may do it"
-        raise AnswerError("the policy", found.found.verdict, "one that was found", remedy)
+        raise AnswerError("the policy", synthesis.found.verdict, "one that was found", remedy)
     random = np.random.default_rng(seed)
-    x, side = _drawn(found, parts, random)
-    state = policy.first[_heard(found, x, side, random)]
+    x, side = _drawn(synthesis, parts, random)
+    state = policy.first[_heard(synthesis, x, side, random)]
     took, ends = np.zeros(parts, np.int64), np.full(parts, "", dtype=object)
     moving = np.ones(parts, dtype=bool)
     for made in range(int(policy.left.max()) + 1):
         unknown = moving & (state == NONE)
         ends[unknown] = "an answer that cannot come"
         stops = moving & ~unknown & (policy.throw[state] == NONE)
-        ends[stops & ~_inside(found, x, side)] = "stopped elsewhere"
+        ends[stops & ~_inside(synthesis, x, side)] = "stopped elsewhere"
         moving &= ~(unknown | stops)
         if not moving.any():
             break
         took[moving] = made + 1
-        for throw, box in enumerate(found.throws.values()):
+        for throw, box in enumerate(synthesis.throws.values()):
             now = np.flatnonzero(moving & (policy.throw[state] == throw))
             x[now], side[now], code = _thrown(box, x[now], side[now], random)
             ends[now[code < 0]] = "left the arm"
             moving[now[code < 0]] = False
-        if found.mode == "catch":
-            fallen = moving & (x >= found.goal[0])
-            ends[fallen & (side != found.goal[1])] = "caught on a wrong side"
+        if synthesis.mode == "catch":
+            fallen = moving & (x >= synthesis.goal[0])
+            ends[fallen & (side != synthesis.goal[1])] = "caught on a wrong side"
             moving &= ~fallen
-        state = np.where(moving, policy.after[state, _heard(found, x, side, random)], state)
+        state = np.where(moving, policy.after[state, _heard(synthesis, x, side, random)], state)
     ends[moving] = "more throws than promised"
     good = ends == ""
     kinds, counts = np.unique(ends[~good].astype(str), return_counts=True)
@@ -292,9 +292,9 @@ def simulate(found: Synthesis, parts: int = 10_000, seed: int = 0) -> Simulated:
     )
 
 
-def _drawn(found: Synthesis, parts: int, random: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
+def _drawn(synthesis: Synthesis, parts: int, random: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
     """Draw starts, equally likely per length."""
-    spans = [(side, lo, hi) for side, pairs in found.starts.extents().items() for lo, hi in pairs]
+    spans = [(side, lo, hi) for side, pairs in synthesis.starts.extents().items() for lo, hi in pairs]
     length = np.array([hi - lo for _, lo, hi in spans])
     which = random.choice(len(spans), size=parts, p=length / length.sum())
     at = np.array([(lo, hi) for _, lo, hi in spans])[which]
@@ -302,17 +302,17 @@ def _drawn(found: Synthesis, parts: int, random: np.random.Generator) -> tuple[F
     return random.uniform(at[:, 0], at[:, 1]), side.astype(np.int64)
 
 
-def _inside(found: Synthesis, x: Floats, side: NDArray[np.int64]) -> NDArray[np.bool_]:
-    inside: NDArray[np.bool_] = (x >= found.goal[0]) & (side == found.goal[1])
+def _inside(synthesis: Synthesis, x: Floats, side: NDArray[np.int64]) -> NDArray[np.bool_]:
+    inside: NDArray[np.bool_] = (x >= synthesis.goal[0]) & (side == synthesis.goal[1])
     return inside
 
 
-def _heard(found: Synthesis, x: Floats, side: NDArray[np.int64], random: np.random.Generator) -> Any:
+def _heard(synthesis: Synthesis, x: Floats, side: NDArray[np.int64], random: np.random.Generator) -> Any:
     """Read the sensor: the numbers of the answers."""
-    if found.sensor is None:
+    if synthesis.sensor is None:
         return np.zeros(x.size, np.int64)
-    yes = found.sensor.read(x, side, random.uniform(-1.0, 1.0, x.size))
-    words = list(found.game.answers)
+    yes = synthesis.sensor.read(x, side, random.uniform(-1.0, 1.0, x.size))
+    words = list(synthesis.game.answers)
     return np.where(yes, words.index("yes"), words.index("no"))
 
 

@@ -140,7 +140,7 @@ class Limits(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Synthesis(Board, Tabled):
-    """What one bit of feedback was found to do, and the game in which: its sensor included.
+    """The answer of a search for a policy with one bit of feedback, and the game that was searched.
 
     Attributes
     ----------
@@ -173,7 +173,7 @@ class Synthesis(Board, Tabled):
 
     @property
     def model(self) -> Model:
-        """Of which model the policy is, and which facts of the scene that leaves out."""
+        """The model for which the policy is proved, and the facts of the scene that this model leaves out."""
         return Model.of(self.scene, self.noise)
 
     def asking(self, sensor: Sensor | None) -> Synthesis:
@@ -206,7 +206,7 @@ class Synthesis(Board, Tabled):
         return write(path, self, self.sensor, self.found.policy, recheck=recheck, workers=workers)
 
     def denied(self, why: str) -> Synthesis:
-        """Return what is left of it where the checker denies its certificate: nothing is decided."""
+        """Return the answer where the checker denies its certificate: nothing is decided."""
         reason = f"the checker denies it: {why}"
         return replace(
             self, found=replace(self.found, verdict=NOT_DECIDED, throws=-1, policy=None, reason=reason)
@@ -264,8 +264,8 @@ class Synthesis(Board, Tabled):
 def _play(board: Board, sensor: Sensor | None, limits: Limits, progress: Progress = None) -> Synthesis:
     own = {each.name: getattr(board, each.name) for each in fields(Board)}
     game = board.game.asking(None if sensor is None else sensor.answers(board.starts.grid))
-    found = search(game, board.starts.mask, **limits._asdict(), progress=progress)
-    return Synthesis(**{**own, "game": game}, sensor=sensor, limits=limits, found=found)
+    outcome = search(game, board.starts.mask, **limits._asdict(), progress=progress)
+    return Synthesis(**{**own, "game": game}, sensor=sensor, limits=limits, found=outcome)
 
 
 @shown_in_notebooks
@@ -338,14 +338,16 @@ def feedback(
     ...     "sensor": {"beyond": "20 in"},
     ...     "throws": [{"name": "own", "kappa": "25.3778518 in"}],
     ... }
-    >>> found = ls.feedback(ls.load(scene), starts={2: (16.0, 16.5)}, cells=256)
-    >>> found.found.verdict, found.found.throws
+    >>> answer = ls.feedback(ls.load(scene), starts={2: (16.0, 16.5)}, cells=256)
+    >>> answer.found.verdict, answer.found.throws
     ('solved', 2)
     """
     chosen = load(scene)
     asked = _sensor_of(chosen, sensor)
     own = asked.cuts if isinstance(asked, BeyondSensor) else ()
-    board = board_of(chosen, mode, goal, starts, cells, noise, (*cuts, *own), progress)
+    board = board_of(
+        chosen, mode, goal, starts=starts, cells=cells, noise=noise, cuts=(*cuts, *own), progress=progress
+    )
     return _play(board, asked, Limits(throws, seconds, beliefs), progress)
 
 
@@ -369,16 +371,16 @@ def places(
         One for each place.
     """
     sensors = [BeyondSensor(x, error) for x in at]
-    found: list[Synthesis] = []
+    syntheses: list[Synthesis] = []
     for k, sensor in enumerate(sensors):
         if progress is not None:
             progress("places of the sensor", k, len(at))
-        if found:
-            found.append(found[0].asking(sensor))
+        if syntheses:
+            syntheses.append(syntheses[0].asking(sensor))
         else:
             cuts = [cut for each in sensors for cut in each.cuts]
-            found.append(feedback(scene, sensor, **{**options, "cuts": cuts}))
-    return tuple(found)
+            syntheses.append(feedback(scene, sensor, **{**options, "cuts": cuts}))
+    return tuple(syntheses)
 
 
 def _sensor_of(scene: Scene, sensor: Sensor | str | None) -> Sensor | None:

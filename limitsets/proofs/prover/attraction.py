@@ -24,7 +24,7 @@ BELOW = "with the arm's surface above the joint, starts nearer to it than the fi
 
 @dataclass(frozen=True, eq=False)
 class Attraction:
-    """What is proved of where starts end.
+    """The attracting cells of a cover, and the proof that starts enter them.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Attraction:
     proved : bool
         Whether every start on (a_i, arm.length] of every side enters the attracting cells.
     reason : str
-        What is missing and where, empty if nothing.
+        The first step that is not proved, and where; empty if all are.
     unresolved : CellSet
         Recurrent cells that do not attract.
     """
@@ -101,12 +101,12 @@ class Attraction:
         return int(self.basin.rank.max())
 
 
-def attraction(found: Cover) -> Attraction:
+def attraction(cover: Cover) -> Attraction:
     """Find the attracting cells and prove that everything enters them.
 
     Parameters
     ----------
-    found : Cover
+    cover : Cover
         Cells and enclosed images.
 
     Returns
@@ -114,40 +114,40 @@ def attraction(found: Cover) -> Attraction:
     Attraction
         With the reason where it is not proved.
     """
-    graph = found.graph
+    graph = cover.graph
     parts, sets = graph.components(), graph.recurrent_components()
     good = attracting_of(graph.ranges, parts, sets)  # a survey's order is quadratic in their number
     component = np.full(graph.n_cells, -1, dtype=np.int32)
     for number, cells in enumerate(k for k, attracts in zip(sets, good, strict=True) if attracts):
         component[cells] = number
     lost = [cells for cells, attracts in zip(sets, good, strict=True) if not attracts]
-    unresolved = CellSet.of(found.grid, np.concatenate([np.zeros(0, np.int64), *lost]))
-    joint = near_hinge(found)
+    unresolved = CellSet.of(cover.grid, np.concatenate([np.zeros(0, np.int64), *lost]))
+    joint = near_hinge(cover)
     return Attraction(
-        found,
+        cover,
         component,
         joint,
-        *_verdict(found, component, unresolved, joint),
+        *_verdict(cover, component, unresolved, joint),
         unresolved,
     )
 
 
 def _verdict(
-    found: Cover, component: NDArray[np.int32], unresolved: CellSet, joint: tuple[NearHinge, ...]
+    cover: Cover, component: NDArray[np.int32], unresolved: CellSet, joint: tuple[NearHinge, ...]
 ) -> tuple[bool, str]:
     """Whether attraction is proved, and the first thing that is missing."""
-    lost = np.concatenate([images.lost for images in found.images])
+    lost = np.concatenate([images.lost for images in cover.images])
     if lost.any():
-        return False, f"nothing is proved of the image of {found.place(int(np.flatnonzero(lost)[0]))}"
-    if found.box.landing > 0.0:
+        return False, f"nothing is proved of the image of {cover.place(int(np.flatnonzero(lost)[0]))}"
+    if cover.box.landing > 0.0:
         return False, f"near the joint: {next(near.reason for near in joint if not near.empty)}"
-    leaving = np.flatnonzero(found.graph.ranges.exits)
+    leaving = np.flatnonzero(cover.graph.ranges.exits)
     if leaving.size:
-        return False, f"the image of {found.place(int(leaving[0]))} may leave the cells"
+        return False, f"the image of {cover.place(int(leaving[0]))} may leave the cells"
     if len(unresolved):
         return (
             False,
-            f"{len(unresolved)} recurrent cells do not attract: first {found.place(unresolved.numbers()[0])}",
+            f"{len(unresolved)} recurrent cells do not attract: first {cover.place(unresolved.numbers()[0])}",
         )
     if not (component >= 0).any():
         return False, "there are no attracting cells"
@@ -157,10 +157,10 @@ def _verdict(
     return True, ""
 
 
-def near_section(found: Attraction) -> dict[str, dict[str, Any]]:
+def near_section(attractors: Attraction) -> dict[str, dict[str, Any]]:
     """Write what a recheck needs of the starts below the cells: by side the factor, the bracket of a fixed point."""
     section: dict[str, dict[str, Any]] = {}
-    for side, near in enumerate(found.joint):
+    for side, near in enumerate(attractors.joint):
         if near.empty:
             continue
         section[str(side)] = {"q": near.q.hex()}
@@ -182,12 +182,12 @@ def _held(lo: float, hi: float, intervals: list[tuple[float, float]], end: float
     return any(bottom < lo and (hi < top or (top >= end and hi <= arm)) for bottom, top in intervals)
 
 
-def trapping(found: Attraction) -> str:
+def trapping(attractors: Attraction) -> str:
     """Prove that the images of each attracting component lie in the interior of its cells.
 
     Parameters
     ----------
-    found : Attraction
+    attractors : Attraction
         Cells, components and enclosed images.
 
     Returns
@@ -199,13 +199,13 @@ def trapping(found: Attraction) -> str:
     -----
     Comparisons of the enclosures' ends with the cells' borders only, both exact.  Source: docs/model.md, attraction.
     """
-    grid, arm = found.cover.grid, float(found.cover.box.lo.arm_length)
-    if not (found.component >= 0).any():
+    grid, arm = attractors.cover.grid, float(attractors.cover.box.lo.arm_length)
+    if not (attractors.component >= 0).any():
         return "there are no attracting cells"
-    for number in range(int(found.component.max()) + 1):
-        inside = CellSet(grid, found.component == number)
+    for number in range(int(attractors.component.max()) + 1):
+        inside = CellSet(grid, attractors.component == number)
         extents = inside.extents()
-        for side, images in enumerate(found.cover.images):
+        for side, images in enumerate(attractors.cover.images):
             mine = inside.mask[grid.of_side(side)]
             edges = grid.edges[side][0]
             cells = [*((int(k), "nothing is proved of") for k in np.flatnonzero(mine & images.lost))]

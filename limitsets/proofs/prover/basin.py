@@ -6,7 +6,7 @@ length zero.  Off the attracting cells a cell of the basin is of one of three ki
 * *falling*: every image lies in cells of smaller rank;
 * *passing*: besides in such cells it may lie in the cell itself again, and jogs from the cell are proved to go one way,
   all outward or all inward, by more than the noise of the landing place: an orbit leaves the cell after finitely many;
-* *thin*: the rank does not rise, and almost every start leaves the cells of that rank (`perron_frobenius.py`).
+* *thin*: the rank does not rise, and almost every start leaves the cells of that rank (`thinning.py`).
 
 Ranks do not rise along any image, so an orbit that does not come to the attracting cells stays in thin cells of one
 rank from some throw on.  Such starts have length zero, and so have all that are thrown there, where the slope is proved
@@ -51,10 +51,10 @@ from limitsets.systems.graph.components import ranks, reach
 # most. With effects the left vertex has to land first, phi at most the exterior angle there, and a part that rolls on
 # has to come to rest in the cells: every start then either rests as above, or is in the cells at once. The
 # small-angle flights have phi >= 2 r / kappa and no v and w in the displacement, so the same q serves. For h > 0 see
-# `fixed_point.py`. Source: docs/model.md, "Conventions": near a_i.
+# `cover.py`. Source: docs/model.md, "Conventions": near a_i.
 
 
-# q - 1 is lowered by this share, so that other arithmetic can confirm it where the parameters are wide.
+# q - 1 is lowered by this share, so that the checker's arithmetic can confirm it where the parameters are wide.
 SLACK_OF_Q = 2.0**-26
 
 
@@ -74,7 +74,7 @@ class NearHinge:
     rises : bool
         Whether R' is proved to grow with R on (a_i, x] at least as fast: the displacement grows with the angle.
     proved : bool
-        Whether q > 1 and all that it rests on is proved.
+        Whether q > 1 is proved, with everything that the factor rests on.
     reason : str
         What is missing, empty if nothing.
     fixed_point : (float, float) or None
@@ -82,7 +82,7 @@ class NearHinge:
     rolls : bool
         Whether a throw from (a_i, x] may roll on to another side.
     empty : bool
-        Whether no throw begins on this side, for the part cannot rest on it; all is proved of no starts.
+        Whether no throw begins on this side, because the part cannot rest on it; the proof is then trivial.
     """
 
     x: float
@@ -96,7 +96,7 @@ class NearHinge:
     empty: bool = False
 
 
-# Of a side on which the part cannot rest.
+# The entry of a side on which the part cannot rest.
 NO_STARTS = NearHinge(np.inf, np.inf, -np.inf, True, True, "", empty=True)
 
 
@@ -164,12 +164,12 @@ SCATTERED_BEYOND = (
 )
 
 
-def near_hinge(found: Cover) -> tuple[NearHinge, ...]:
+def near_hinge(cover: Cover) -> tuple[NearHinge, ...]:
     """Prove the expansion near a_i, or from the fixed point of the jog on, on every side.
 
     Parameters
     ----------
-    found : Cover
+    cover : Cover
         The cells, which say where "near" ends.
 
     Returns
@@ -178,59 +178,61 @@ def near_hinge(found: Cover) -> tuple[NearHinge, ...]:
         One per side.
     """
     answers = []
-    for side, (edges,) in enumerate(found.grid.edges):
-        if not found.box.rests[side]:
+    for side, (edges,) in enumerate(cover.grid.edges):
+        if not cover.box.rests[side]:
             answers.append(NO_STARTS)
             continue
-        if found.points:
-            answers.append(_beyond(found, side, float(edges[0])))
+        if cover.points:
+            answers.append(_beyond(cover, side, float(edges[0])))
             continue
         out = np.full(8, np.nan)
-        _near_hinge(*found.box.bare, side, float(edges[0]), out)
+        _near_hinge(*cover.box.bare, side, float(edges[0]), out)
         q = 1.0 + (float(out[5]) - 1.0) * (1.0 - SLACK_OF_Q)
         good = [*(out[:5] > 0.0), q > 1.0]
         reason = "" if all(good) else REASONS[good.index(False)]
-        if found.box.landing > 0.0 and not reason:
+        if cover.box.landing > 0.0 and not reason:
             reason = SCATTERED
         rises, x, reach = bool(out[7] > 0.0), float(edges[0]), float(out[6])
         rolls = False
-        if found.box.effects and not reason:
-            reach, rolls, reason = _rolled(found, side, x, reach)
+        if cover.box.effects and not reason:
+            reach, rolls, reason = _rolled(cover, side, x, reach)
         answers.append(NearHinge(x, q, reach, rises, not reason, reason, rolls=rolls))
     return tuple(answers)
 
 
-def _rolled(found: Cover, side: int, x: float, reach: float) -> tuple[float, bool, str]:
+def _rolled(cover: Cover, side: int, x: float, reach: float) -> tuple[float, bool, str]:
     """Prove that what is thrown from (a_i, x] rests as in the minimal model, or rolls into the cells.
 
     Returns the farthest place of all, whether anything may roll to another side, and what is missing.
     """
     corner, turned, place = np.full(1, np.nan), np.zeros(2, np.int64), np.full((2, 2), np.nan)
-    count = _near_ways(found.box.lo, found.box.hi, side, x, corner, turned, place)
+    count = _near_ways(cover.box.lo, cover.box.hi, side, x, corner, turned, place)
     if not corner[0] >= 0.0:
         return reach, True, "another vertex than the left one may land first"
     if count < 1:
         return reach, True, "where the part rolls to is not enclosed"
-    sides, end = found.grid.sides, found.box.bare[0].arm_length
+    sides, end = cover.grid.sides, cover.box.bare[0].arm_length
     rolls = [k for k in range(count) if turned[k] != 0]
     for k in rolls:
         lo, hi = place[k]
-        edges = found.grid.edges[(side + int(turned[k])) % sides][0]
+        edges = cover.grid.edges[(side + int(turned[k])) % sides][0]
         if not (lo >= edges[0] and hi <= edges[-1] and hi <= end):
             return reach, True, "the part may roll to where it is not on the arm, or near to the joint again"
         reach = max(reach, float(hi))
     return reach, bool(rolls), ""
 
 
-def _beyond(found: Cover, side: int, x: float) -> NearHinge:
-    """Prove it where the arm's surface is above the joint."""
-    point = found.points[side]
+def _beyond(cover: Cover, side: int, x: float) -> NearHinge:
+    """Prove the expansion beyond the fixed point of the jog, where the arm's surface is above the joint."""
+    point = cover.points[side]
     if point.reason:
         return NearHinge(x, np.nan, np.inf, False, False, point.reason)
-    q, reason = leaves(found.box, side, point, x)
-    reason = SCATTERED_BEYOND if found.box.landing > 0.0 else reason
+    q, reason = leaves(cover.box, side, point, x)
+    reason = SCATTERED_BEYOND if cover.box.landing > 0.0 else reason
     # R' grows with R there, by a factor of q at least
-    return NearHinge(x, q, np.inf, not reason, not reason, reason, (point.lo, point.hi))
+    return NearHinge(
+        x, q, np.inf, rises=not reason, proved=not reason, reason=reason, fixed_point=(point.lo, point.hi)
+    )
 
 
 # ----------------------------------------------------------------
@@ -253,7 +255,7 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Basin:
-    """What is proved of where starts come to.
+    """The starts that are proved to come to the attracting cells.
 
     Attributes
     ----------
@@ -342,23 +344,23 @@ def _ends(b: Any, phi: Any) -> Any:
     return (least.lo if grows else shift.lo), (most.hi if grows else shift.hi)
 
 
-def _displacements(found: Cover, side: int, wanted: NDArray[np.int64]) -> Floats:
+def _displacements(cover: Cover, side: int, wanted: NDArray[np.int64]) -> Floats:
     """Return what `_shifts` says of some cells of a side, by their numbers there."""
-    (edges,) = found.grid.edges[side]
+    (edges,) = cover.grid.edges[side]
     out = np.full((wanted.size, 4), np.nan)
-    _shifts(*found.box.bare, side, edges[:-1][wanted], edges[1:][wanted], out)
+    _shifts(*cover.box.bare, side, edges[:-1][wanted], edges[1:][wanted], out)
     return out
 
 
 # ---------------------------------------------------------------- the basin
 
 
-def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]) -> Basin:
+def basin(cover: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]) -> Basin:
     """Prove which starts come to the attracting cells.
 
     Parameters
     ----------
-    found : Cover
+    cover : Cover
         Cells and images.
     component : ndarray of int32, shape (n_cells,)
         Number of the attracting component of each cell, -1 off them.
@@ -369,30 +371,30 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
     -------
     Basin
     """
-    parts, inside = found.graph.components(), component >= 0
+    parts, inside = cover.graph.components(), component >= 0
     settled = np.zeros(parts.count, dtype=bool)
     settled[parts.label[inside]] = True
-    rank = ranks(found.graph.ranges, parts, settled)
-    lost = np.concatenate([images.lost for images in found.images])
-    leaving = found.graph.ranges.exits > 0
+    rank = ranks(cover.graph.ranges, parts, settled)
+    lost = np.concatenate([images.lost for images in cover.images])
+    leaving = cover.graph.ranges.exits > 0
     again = parts.recurrent[parts.label] & ~inside
-    again &= ~_passing(found, again & (parts.size[parts.label] == 1))
-    shut = _reaching(found, lost | leaving)
+    again &= ~_passing(cover, again & (parts.size[parts.label] == 1))
+    shut = _reaching(cover, lost | leaving)
     thin, throws = again & ~shut, 0
     thick = flat = np.zeros_like(inside)
     if thin.any():
-        result = perron_frobenius_bound(found, thin, rank)
+        result = perron_frobenius_bound(cover, thin, rank)
         throws, thick = result.throws, result.thick
-        shut |= _reaching(found, thick)
+        shut |= _reaching(cover, thick)
         thin &= ~shut
     if thin.any():
-        before = _reaching(found, thin) & ~shut & ~inside
-        flat = before & ~(slopes(found, CellSet(found.grid, before)) > 0.0)
-        shut |= _reaching(found, flat)
+        before = _reaching(cover, thin) & ~shut & ~inside
+        flat = before & ~(slopes(cover, CellSet(cover.grid, before)) > 0.0)
+        shut |= _reaching(cover, flat)
         thin &= ~shut
-    near = _below_cells(found, joint, shut, thin=bool(thin.any()))
+    near = _below_cells(cover, joint, shut, thin=bool(thin.any()))
     rank[shut] = -1
-    start, explained = _start(found, joint, shut, near)
+    start, explained = _start(cover, joint, shut, near)
     reasons = (
         (lost, "nothing is proved of the image of {}"),
         (leaving, "the image of {} may leave the cells"),
@@ -400,7 +402,7 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
         (flat, "the slope is not proved positive on {}"),
     )
     missing = next(
-        (text.format(found.place(int(np.argmax(mask)))) for mask, text in reasons if mask.any()), ""
+        (text.format(cover.place(int(np.argmax(mask)))) for mask, text in reasons if mask.any()), ""
     )
     if not missing and not near:
         missing = next(
@@ -419,80 +421,80 @@ def basin(found: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
         near,
         start,
         explained,
-        *shares_of(found, joint, shut, near, start, explained),
-        missing,
-        thin,
+        *shares_of(cover, joint, shut, near, start, explained),
+        missing=missing,
+        thin=thin,
     )
 
 
-def _reaching(found: Cover, cells: Mask) -> Mask:
+def _reaching(cover: Cover, cells: Mask) -> Mask:
     """Return the cells from which some of the given ones can be reached, these included."""
     if not cells.any():
         return np.zeros_like(cells)
-    marks: Mask = reach(found.graph.ranges, found.graph.components(), cells.astype(np.uint8)) > 0
+    marks: Mask = reach(cover.graph.ranges, cover.graph.components(), cells.astype(np.uint8)) > 0
     return marks
 
 
-def _passing(found: Cover, alone: Mask) -> Mask:
-    """Of some cells, those from which jogs are proved to go one way by more than the noise of the landing place."""
+def _passing(cover: Cover, alone: Mask) -> Mask:
+    """Return the cells from which jogs are proved to go one way by more than the noise of the landing place."""
     passing = np.zeros_like(alone)
-    if found.box.effects:  # another vertex may land, elsewhere
+    if cover.box.effects:  # another vertex may land first, at another place
         return passing
-    for side in range(len(found.grid.edges)):
-        own = found.grid.of_side(side)
+    for side in range(len(cover.grid.edges)):
+        own = cover.grid.of_side(side)
         wanted = np.flatnonzero(alone[own])
-        least, _, _, most = _displacements(found, side, wanted).T
+        least, _, _, most = _displacements(cover, side, wanted).T
         by = np.maximum(least, -most)
-        passing[own][wanted] = by - found.box.landing > ROOM * by
+        passing[own][wanted] = by - cover.box.landing > ROOM * by
     return passing
 
 
-def _below_cells(found: Cover, joint: Sequence[NearHinge], shut: Mask, *, thin: bool) -> bool:
+def _below_cells(cover: Cover, joint: Sequence[NearHinge], shut: Mask, *, thin: bool) -> bool:
     """Whether the starts below the cells, beyond a fixed point of the jog, come to cells that are not shut."""
-    for side, (each, (edges,)) in enumerate(zip(joint, found.grid.edges, strict=True)):
-        own = shut[found.grid.of_side(side)]
+    for side, (each, (edges,)) in enumerate(zip(joint, cover.grid.edges, strict=True)):
+        own = shut[cover.grid.of_side(side)]
         reached = edges[:-1] <= each.reach
         if not each.proved or own[reached].any() or (each.rolls and shut.any()) or (thin and not each.rises):
             return False
     return True
 
 
-def _start(found: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool) -> tuple[Floats, Floats]:
+def _start(cover: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool) -> tuple[Floats, Floats]:
     """On each side, from where on every start is claimed, and up to where the starts are lost or creep."""
-    (lo, hi), start, explained = found.box.bare, [], []
-    for side, (each, (edges,)) in enumerate(zip(joint, found.grid.edges, strict=True)):
+    (lo, hi), start, explained = cover.box.bare, [], []
+    for side, (each, (edges,)) in enumerate(zip(joint, cover.grid.edges, strict=True)):
         if each.empty:
             start.append(math.inf)
             explained.append(math.inf)
             continue
-        last = int(np.flatnonzero(shut[found.grid.of_side(side)]).max(initial=-1))
+        last = int(np.flatnonzero(shut[cover.grid.of_side(side)]).max(initial=-1))
         point = each.fixed_point if near else None
         below = float(hi.a[side]) if point is None else point[1]
         start.append(below if near and last < 0 else float(edges[last + 1]))
         ends = float(lo.a[side]) if point is None else point[0]
-        if each.reason == SCATTERED and each.reach - each.x < found.box.landing:
-            _, _, decided, most = _displacements(found, side, np.arange(last + 1)).T
-            lost = (most < found.box.landing * (1.0 - ROOM)) & (decided > 0.0)
+        if each.reason == SCATTERED and each.reach - each.x < cover.box.landing:
+            _, _, decided, most = _displacements(cover, side, np.arange(last + 1)).T
+            lost = (most < cover.box.landing * (1.0 - ROOM)) & (decided > 0.0)
             ends = float(edges[int(np.argmin([*lost, False]))])
         explained.append(ends)
     return np.array(start), np.array(explained)
 
 
 def shares_of(
-    found: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool, start: Floats, explained: Floats
+    cover: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool, start: Floats, explained: Floats
 ) -> tuple[float, float, float, float, bool]:
     """Shares of the arm that are claimed, leave, creep and are open; whether all beyond `start` is claimed.
 
     `start` and `explained` may be those of several boxes of parameters together, as of a joined claim.
     """
-    (lo, hi), rests = found.box.bare, found.box.rests
+    (lo, hi), rests = cover.box.bare, cover.box.rests
     total = float((lo.arm_length - hi.a)[rests].sum())
     wide = float((hi.arm_length - lo.a)[rests].sum())
     unexplained = float((start[rests] - explained[rests]).sum())
     from_start = unexplained <= MOST_UNEXPLAINED * total and bool((start[rests] < lo.arm_length).all())
     claimed = 0.0
-    for side, (edges,) in enumerate(found.grid.edges):
-        good = ~shut[found.grid.of_side(side)] & ((edges[:-1] >= start[side]) | (not from_start))
+    for side, (edges,) in enumerate(cover.grid.edges):
+        good = ~shut[cover.grid.of_side(side)] & ((edges[:-1] >= start[side]) | (not from_start))
         claimed += float(np.diff(edges)[good].sum())
         if near and rests[side]:
             point = joint[side].fixed_point
@@ -500,28 +502,28 @@ def shares_of(
             claimed += max(0.0, float(edges[0]) - (max(below, float(start[side])) if from_start else below))
     explains = float((explained - lo.a)[rests].sum())
     creeps = explains if near and any(each.fixed_point is not None for each in joint) else 0.0
-    if found.box.landing > 0.0:
+    if cover.box.landing > 0.0:
         leaves = explains
     else:
-        widths = np.concatenate([np.diff(edges) for (edges,) in found.grid.edges])
-        leaves = float(widths[leaving_cells(found)].sum()) if shut.any() else 0.0
+        widths = np.concatenate([np.diff(edges) for (edges,) in cover.grid.edges])
+        leaves = float(widths[leaving_cells(cover)].sum()) if shut.any() else 0.0
     if near and not creeps and not shut.any():
         return 1.0, 0.0, 0.0, 0.0, from_start
     share, gone, crept = (max(0.0, x / wide - ROUNDING) for x in (claimed, leaves, creeps))
     return share, gone, crept, min(1.0, max(0.0, 1.0 - share - gone - crept) + ROUNDING), from_start
 
 
-def leaving_cells(found: Cover) -> Mask:
+def leaving_cells(cover: Cover) -> Mask:
     """Return the cells all of whose orbits are proved to leave the arm.
 
     From these no recurrent cell can be reached, and no cell whose image may lie, in part, between the foot
     and the cells.
     """
-    foot, parts = found.box.bare[0].a, found.graph.components()
-    stays = parts.recurrent[parts.label] | np.concatenate([images.lost for images in found.images])
-    for side, images in enumerate(found.images):
-        own = stays[found.grid.of_side(side)]
+    foot, parts = cover.box.bare[0].a, cover.graph.components()
+    stays = parts.recurrent[parts.label] | np.concatenate([images.lost for images in cover.images])
+    for side, images in enumerate(cover.images):
+        own = stays[cover.grid.of_side(side)]
         for (to, _), (low, high) in images.hulls.items():
-            own |= (low <= high) & (low < found.grid.edges[to][0][0]) & (high > foot[to])
-    gone: Mask = ~_reaching(found, stays)
+            own |= (low <= high) & (low < cover.grid.edges[to][0][0]) & (high > foot[to])
+    gone: Mask = ~_reaching(cover, stays)
     return gone

@@ -176,17 +176,17 @@ FORMULAS = [
 ]
 
 
-def brackets(found: Cover) -> NDArray[np.float64]:
+def brackets(cover: Cover) -> NDArray[np.float64]:
     """Brackets of the impact angle, shape (n_cells, 2), widened by the slack."""
-    phi = np.concatenate([images.witness for images in found.images], axis=1).T
+    phi = np.concatenate([images.witness for images in cover.images], axis=1).T
     slack = SLACK * np.abs(phi)
     return np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1)
 
 
 def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
     """Arrays of one box of parameters."""
-    found = proof.cover
-    jog, flip = targets(found, 0), targets(found, 1)
+    cover = proof.cover
+    jog, flip = targets(cover, 0), targets(cover, 1)
     jogs, flips = jog[:, 0] >= 0, flip[:, 0] >= 0
     arrays: dict[str, NDArray[Any]] = {
         "jog": jog,
@@ -194,18 +194,18 @@ def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
         "branch": np.where(jogs & flips, 2, np.where(flips, 1, 0)).astype(np.int8),
         "rank": proof.basin.rank,
         "component": proof.component,
-        "phi": brackets(found),
+        "phi": brackets(cover),
     }
-    _say_nothing(arrays, found)
-    for side, (edges,) in enumerate(found.grid.edges):
+    _say_nothing(arrays, cover)
+    for side, (edges,) in enumerate(cover.grid.edges):
         arrays[f"edges.{side}"] = edges
     return {prefix + name: np.ascontiguousarray(value) for name, value in arrays.items()}
 
 
-def _say_nothing(arrays: dict[str, NDArray[Any]], found: Cover) -> None:
-    """Of cells of which nothing is proved: they land within a turn if at all, and may go anywhere."""
-    offset, sides = found.grid.offset, found.grid.sides
-    for side, images in enumerate(found.images):
+def _say_nothing(arrays: dict[str, NDArray[Any]], cover: Cover) -> None:
+    """Enter the cells whose images are not proved: their starts land within one turn if at all, at any place."""
+    offset, sides = cover.grid.offset, cover.grid.sides
+    for side, images in enumerate(cover.images):
         cells, after = offset[side] + np.flatnonzero(images.lost), (side + 1) % sides
         arrays["jog"][cells] = offset[side], offset[side + 1] - 1
         arrays["flip"][cells] = offset[after], offset[after + 1] - 1
@@ -213,13 +213,13 @@ def _say_nothing(arrays: dict[str, NDArray[Any]], found: Cover) -> None:
         arrays["phi"][cells] = SLACK, 2.0 * math.pi
 
 
-def _model(found: Cover) -> dict[str, str]:
-    first = found.box.bare[0]
+def _model(cover: Cover) -> dict[str, str]:
+    first = cover.box.bare[0]
     return {"flight": FLIGHTS[type(first.flight)], "flip": FLIPS[type(first.flip)]}
 
 
-def _parameters(found: Cover) -> dict[str, Any]:
-    lo, hi = found.box.lo, found.box.hi
+def _parameters(cover: Cover) -> dict[str, Any]:
+    lo, hi = cover.box.lo, cover.box.hi
 
     def scalar(name: str) -> list[str]:
         return [float(getattr(lo, name)).hex(), float(getattr(hi, name)).hex()]
@@ -268,7 +268,7 @@ def write(
     claims : sequence of mapping
         ``{"claim": ..., "section": {...}}`` each, and the ``verdict`` where it is not "proved".
     noise, tolerance : mapping or None
-        What the parameters were allowed to do.
+        Deviations of the parameters for which the claims are proved.
     unit : str
         Unit of length.
     producer : mapping
@@ -292,13 +292,13 @@ def write(
     boxes = []
     for number, proof in enumerate(proofs):
         arrays |= arrays_of(proof, f"{number}.")
-        found = proof.cover
-        # what is left of the effects here is a spread; a scene may leave the model to its defaults
-        scene = {word: tidy(table) for word, table in found.box.scene.items() if word != "effects"}
-        scene["model"] = _model(found)
-        if found.box.scene.get("effects", {}).get("spread"):
-            scene["effects"] = {"spread": found.box.scene["effects"]["spread"]}
-        boxes.append({"scene": scene, "parameters": _parameters(found), "prefix": f"{number}."})
+        cover = proof.cover
+        # the only effect here is a spread; a scene may leave the model to its defaults
+        scene = {word: tidy(table) for word, table in cover.box.scene.items() if word != "effects"}
+        scene["model"] = _model(cover)
+        if cover.box.scene.get("effects", {}).get("spread"):
+            scene["effects"] = {"spread": cover.box.scene["effects"]["spread"]}
+        boxes.append({"scene": scene, "parameters": _parameters(cover), "prefix": f"{number}."})
     header = {
         "map": _model(proofs[0].cover),
         "noise": spelled_plainly(noise) if noise else None,

@@ -40,62 +40,62 @@ from limitsets.systems.cells import Grid
 # Cells per side, tried in turn until everything asked for is proved or refuted.
 LADDER = (2048, 8192, 32768, 131072)
 
-# Pieces into which a tolerance may be cut, and cells that may be tried on them, before it is given up.
+# Pieces into which a tolerance may be cut, and cells that may be tried on them, before the proof is given up.
 MOST_PIECES, MOST_CELLS = 1024, 4_000_000
 
-# Of the pieces so many, the widest, are searched for an orbit that refutes the goal, besides the corners.
+# An orbit that refutes the goal is searched for in so many of the widest pieces, and at the corners.
 MOST_SEARCHED = 8
 
 Progress = Callable[[str, int, int], None]
 
 
-def _attracts_all(found: Attraction, scene: Scene) -> Claim:
-    if not found.proved:
-        noisy = found.cover.box.landing > 0.0 and not found.cover.points
-        orbit = start_that_leaves(found) if noisy or found.cover.graph.ranges.exits.any() else ()
+def _attracts_all(attractors: Attraction, scene: Scene) -> Claim:
+    if not attractors.proved:
+        noisy = attractors.cover.box.landing > 0.0 and not attractors.cover.points
+        orbit = start_that_leaves(attractors) if noisy or attractors.cover.graph.ranges.exits.any() else ()
         if orbit:
             once = {"once": True}
-            return Claim("attracts-all", "refuted", found.reason, {}, orbit, final=True, recurs=once)
+            return Claim("attracts-all", "refuted", attractors.reason, {}, orbit, final=True, recurs=once)
         if noisy:
-            return Claim("attracts-all", "undecided", found.reason, {}, final=True)
-        return _not_attracted(found, scene)
-    section = {"near_joint": near_section(found), "max_rank": found.max_rank}
+            return Claim("attracts-all", "undecided", attractors.reason, {}, final=True)
+        return _not_attracted(attractors, scene)
+    section = {"near_joint": near_section(attractors), "max_rank": attractors.max_rank}
     return Claim("attracts-all", "proved", "", section)
 
 
-def _not_attracted(found: Attraction, scene: Scene) -> Claim:
-    """Say why attraction is not proved: first what no finer cells can change."""
-    box = found.cover.box
+def _not_attracted(attractors: Attraction, scene: Scene) -> Claim:
+    """Say why attraction is not proved; reasons that finer cells cannot remove come first."""
+    box = attractors.cover.box
     if box.lo.surface_height <= 0.0 <= box.hi.surface_height:
         reason = "the arm's surface is not proved to be below the joint nor above it"
-        return Claim("attracts-all", "undecided", f"{reason}; {found.reason}", {}, final=True)
-    for side, point in enumerate(found.cover.points):
+        return Claim("attracts-all", "undecided", f"{reason}; {attractors.reason}", {}, final=True)
+    for side, point in enumerate(attractors.cover.points):
         if point.reason:
-            # of a narrower piece of a tolerance it may be found
+            # a narrower piece of the tolerance may have one that can be enclosed
             alone = box.scene == dict(scene.text)
             return Claim("attracts-all", "undecided", f"side {side}: {point.reason}", {}, final=alone)
-    for side, near in enumerate(found.joint):
-        if found.cover.points and not near.proved:
+    for side, near in enumerate(attractors.joint):
+        if attractors.cover.points and not near.proved:
             reason = f"side {side}, up to x = {near.x:.6g}: {near.reason}"
-            return Claim("attracts-all", "undecided", f"{reason}; {found.reason}", {})
-    least = min((near.q for near in found.joint if found.cover.points), default=math.inf)
+            return Claim("attracts-all", "undecided", f"{reason}; {attractors.reason}", {})
+    least = min((near.q for near in attractors.joint if attractors.cover.points), default=math.inf)
     gain = f"{least - 1.0:.1g} of its distance"
     slow = f"; beyond the jog's fixed point a throw gains {gain} only, too little for such cells"
-    few = len(found.unresolved) and least - 1.0 < 0.01
-    return Claim("attracts-all", "undecided", found.reason + (slow if few else ""), {})
+    few = len(attractors.unresolved) and least - 1.0 < 0.01
+    return Claim("attracts-all", "undecided", attractors.reason + (slow if few else ""), {})
 
 
-def _invariant(found: Attraction, _: Scene) -> Claim:
+def _invariant(attractors: Attraction, _: Scene) -> Claim:
     # an attracting component is one that no image leaves; there has to be one
-    if not (found.component >= 0).any():
+    if not (attractors.component >= 0).any():
         return Claim("invariant", "undecided", "there are no attracting cells", {})
     return Claim("invariant", "proved", "", {})
 
 
-def _expanding(found: Attraction, _: Scene) -> Claim:
-    if not (found.component >= 0).any():
+def _expanding(attractors: Attraction, _: Scene) -> Claim:
+    if not (attractors.component >= 0).any():
         return Claim("expanding", "undecided", "there are no attracting cells", {})
-    slope, place = least_slope(found.cover, found.cells)
+    slope, place = least_slope(attractors.cover, attractors.cells)
     if not slope > 1.0:
         return Claim("expanding", "undecided", f"slope {slope:.6g} at {place}", {})
     # less by a little, so that other arithmetic can confirm it
@@ -103,14 +103,14 @@ def _expanding(found: Attraction, _: Scene) -> Claim:
     return Claim("expanding", "proved", "", {"least_slope": stated.hex()})
 
 
-def _goal(found: Attraction, scene: Scene, *, search: bool = True) -> Claim:
+def _goal(attractors: Attraction, scene: Scene, *, search: bool = True) -> Claim:
     """Prove the goal; where it is not proved, search for what refutes it if asked to."""
     goal = scene.goal
     if goal is None:
         raise AnswerError(
             "the goal", None, "a scene with [goal]", "give the scene one, or leave this claim out"
         )
-    answer = (prove_or_refute if search else prove)(found, scene, goal)
+    answer = (prove_or_refute if search else prove)(attractors, scene, goal)
     return Claim(
         "goal",
         answer.verdict,
@@ -125,9 +125,9 @@ def _goal(found: Attraction, scene: Scene, *, search: bool = True) -> Claim:
     )
 
 
-def _require_one_scene(claim: str, found: Attraction, scene: Scene) -> None:
-    """Refuse a tolerance: numbers that hold for every scene in it would be those of none."""
-    if found.cover.box.scene != dict(scene.text):
+def _require_one_scene(claim: str, attractors: Attraction, scene: Scene) -> None:
+    """Refuse a tolerance: numbers that are proved for every scene in it would be exact for none."""
+    if attractors.cover.box.scene != dict(scene.text):
         raise AnswerError("the claim", claim, "a claim about one scene", "ask for it without a tolerance")
 
 
@@ -138,32 +138,32 @@ def _of_effects(claim: str) -> Claim:
     return Claim(claim, "undecided", reason, {}, final=True)
 
 
-def _end_points(found: Attraction, scene: Scene) -> Claim:
-    _require_one_scene("end-points", found, scene)
-    if found.cover.box.effects:
+def _end_points(attractors: Attraction, scene: Scene) -> Claim:
+    _require_one_scene("end-points", attractors, scene)
+    if attractors.cover.box.effects:
         return _of_effects("end-points")
-    if found.cover.box.landing > 0.0:
+    if attractors.cover.box.landing > 0.0:
         reason = "end points with noise of landing.x cannot be proved in this version"
         return Claim("end-points", "undecided", reason, {}, final=True)
-    ends = proved_ends(found)
+    ends = proved_ends(attractors)
     if ends.reason:
         return Claim("end-points", "undecided", ends.reason, {})
     return Claim("end-points", "proved", "", ends.section())
 
 
-def _cycles(found: Attraction, scene: Scene) -> Claim:
-    _require_one_scene("cycles", found, scene)
-    if found.cover.box.effects:
+def _cycles(attractors: Attraction, scene: Scene) -> Claim:
+    _require_one_scene("cycles", attractors, scene)
+    if attractors.cover.box.effects:
         return _of_effects("cycles")
-    orbits = proved_cycles(found)
+    orbits = proved_cycles(attractors)
     if not orbits.cycles:
         reason = orbits.missing[0] if orbits.missing else f"none is found of period up to {orbits.up_to}"
         return Claim("cycles", "undecided", reason, {})
     return Claim("cycles", "proved", "", orbits.section())
 
 
-def _trapping(found: Attraction, _: Scene) -> Claim:
-    reason = trapping(found)
+def _trapping(attractors: Attraction, _: Scene) -> Claim:
+    reason = trapping(attractors)
     return Claim("trapping", "undecided" if reason else "proved", reason, {})
 
 
@@ -193,13 +193,13 @@ def _chosen(scene: Scene, claims: Sequence[str] | None) -> tuple[str, ...]:
 
 def spelled_deviations(scene: Scene, given: Mapping[str, str] | None) -> dict[str, str]:
     """Check deviations, and write them as a certificate has them: a decimal number, a space, a unit."""
-    found = {}
+    deviations = {}
     for name, text in (given or {}).items():
         deviation(text, name, scene.unit, zero=True, key=name)
         number, unit = parse(text, "share" if text.rstrip().endswith("%") else find(name).dimension)
         number = number.lstrip("+")
-        found[name] = f"{'0' if number.startswith('.') else ''}{number} {unit}"
-    return found
+        deviations[name] = f"{'0' if number.startswith('.') else ''}{number} {unit}"
+    return deviations
 
 
 @overload
@@ -327,12 +327,12 @@ def certify_scene(
     tolerance = spelled_deviations(loaded, tolerance)
     begin = time.perf_counter()
     if tolerance:
-        found, answers = _pieces(loaded, wanted, whole(loaded, tolerance), noise, progress)
+        attractions, answers = _pieces(loaded, wanted, whole(loaded, tolerance), noise, progress)
     else:
         one, answers = _attempt(loaded, wanted, parameter_box(loaded, noise=noise), LADDER, progress)
-        found = (one,)
+        attractions = (one,)
     seconds = time.perf_counter() - begin
-    return Proof(loaded, noise, tolerance, found, answers, seconds)
+    return Proof(loaded, noise, tolerance, attractions, answers, seconds)
 
 
 def _attempt(
@@ -346,21 +346,21 @@ def _attempt(
 ) -> tuple[Attraction, tuple[Claim, ...]]:
     """Refine the cells until every claim is proved or refuted for one box of parameters, or the ladder ends.
 
-    What refutes the goal is searched for with the first cells and with the last: it hardly depends on them.
+    An orbit that refutes the goal is searched for with the first cells and the last: it hardly depends on them.
     """
     wanted_cuts = cuts(() if scene.goal is None else (scene.goal,), box.lo.a.size)
     for step, cells in enumerate(ladder):
         if progress is not None:
             progress(f"{cells} cells a side", step, len(ladder))
-        found = attraction(cover(box, cells, wanted_cuts))
+        attractors = attraction(cover(box, cells, wanted_cuts))
         now = search and step in (0, len(ladder) - 1)
         answers = tuple(
-            _goal(found, scene, search=now) if word == "goal" else PROVERS[word](found, scene)
+            _goal(attractors, scene, search=now) if word == "goal" else PROVERS[word](attractors, scene)
             for word in wanted
         )
         if all(answer.verdict in ("proved", "refuted") or answer.final for answer in answers):
             break
-    return found, answers
+    return attractors, answers
 
 
 def _pieces(
@@ -372,20 +372,20 @@ def _pieces(
 ) -> tuple[tuple[Attraction, ...], tuple[Claim, ...]]:
     """Prove the claims on a box of quantities; or refute the goal at one of its corners."""
     settled: dict[str, Claim] = {}
-    found: tuple[Attraction, ...] = ()
+    attractions: tuple[Attraction, ...] = ()
     for corner in piece.corners() if "goal" in wanted else ():
         box = parameter_box(scene, tree=corner.tree(), noise=noise)
         one, (answer,) = _attempt(scene, ("goal",), box, LADDER, progress)
-        found = (one,)
+        attractions = (one,)
         if answer.verdict == "refuted":
             settled["goal"] = replace(answer, fixed=corner.texts())
             break
     left = tuple(word for word in wanted if word not in settled)
     while left:
-        found, answers = _halved(scene, left, piece, noise, progress)
+        attractions, answers = _halved(scene, left, piece, noise, progress)
         settled |= {answer.claim: answer for answer in answers}
         left = tuple(word for word in wanted if word not in settled)
-    return found, tuple(settled[word] for word in wanted)
+    return attractions, tuple(settled[word] for word in wanted)
 
 
 def _halved(
@@ -408,9 +408,7 @@ def _halved(
         tried, looked = tried + one.cover.grid.n_cells, looked + 1
         missing = tuple(each for each in answers if not _settled(each))
         refuted = tuple(replace(each, fixed=part.texts()) for each in missing if each.verdict == "refuted")
-        if (
-            noise
-        ):  # the search chose kappa from the noise about every value in the piece: more than is allowed
+        if noise:  # the search takes kappa from the noise about all values in the piece: no scene allows that
             refuted = ()
         if refuted:
             return (one,), refuted
@@ -428,9 +426,9 @@ def _halved(
         else:
             # a narrower box of parameters is worth finer cells
             waiting += [(half, min(cells * 6 // 5, LADDER[-1])) for half in part.halves(scales)]
-    found = tuple(one for one, _ in proved)
-    joined = tuple(weakest_of([answers[k] for _, answers in proved], found) for k in range(len(wanted)))
-    return found, joined
+    attractions = tuple(one for one, _ in proved)
+    joined = tuple(weakest_of([answers[k] for _, answers in proved], attractions) for k in range(len(wanted)))
+    return attractions, joined
 
 
 def _settled(claim: Claim) -> bool:

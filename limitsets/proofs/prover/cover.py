@@ -1,8 +1,8 @@
 """Cells for a proof and the enclosures of their images, from the unstable fixed point of the jog on (h > 0).
 
 The cells of side i run from just beyond a_i to the arm's end, graded towards a_i; starts nearer to a_i are treated
-in `near_hinge.py`.  Where the arm's surface is above the joint they begin just beyond the unstable fixed point of
-the jog instead, if one is found.  Wanted borders (the x of a goal) are cut in.
+in `basin.py`.  Where the arm's surface is above the joint the cells begin just beyond the unstable fixed point of the
+jog instead, if the search finds one.  Borders that a goal needs (its x) are cut in.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ from limitsets.systems.maps import kind_of
 # Source: docs/model.md, "The sign of h".
 
 
-# The angles that enclose phi* are so far, relative to it, from what Newton's method proposes: wide against the bounds
-# of sine and cosine (2^-45), narrow against the 1e-9 wanted of the bracket of R*.
+# Relative distance of the angles that enclose phi* from the root that Newton's method proposes: wide against the bounds
+# of sine and cosine (2^-45), narrow against the 1e-9 that the bracket of R* should have.
 MARGIN = 2.0**-41
 
 # The bracket of R* is widened by these shares of R* - a and of its own width (balls have coarse radii), and q - 1 is
@@ -87,11 +87,11 @@ class FixedPoint:
     Attributes
     ----------
     lo, hi : float
-        R* lies between them, for each of the parameters; nan where none is found.
+        Bracket of R* for all the parameters; nan where it is not proved.
     phi_lo, phi_hi : float
         Angles between which it lands [rad].
     reason : str
-        Why none is found, empty if one is.
+        Why the fixed point is not enclosed; empty if it is.
     """
 
     lo: float
@@ -148,7 +148,7 @@ def _growth(b: SideBox, p: Interval, q: Interval) -> Interval:
 
 @proof_kernel
 def _guess(a: float, d: float, h: float) -> float:
-    """Root of E by Newton's method from below: E is concave there, so it climbs. Believed by nobody."""
+    """Propose a root of E by Newton's method from below, where E is concave; the proof does not rely on it."""
     phi = 2.0 * h / a
     for _ in range(60):
         _, v, w = exact_turn(phi)
@@ -270,7 +270,7 @@ def leaves(box: ParameterBox, side: int, point: FixedPoint, x: float) -> tuple[f
     side : int
         The side.
     point : FixedPoint
-        Its fixed point, that is found.
+        The fixed point of the jog on this side, without a reason against it.
     x : float
         Where the cells begin, beyond it.
 
@@ -303,8 +303,8 @@ def leaves(box: ParameterBox, side: int, point: FixedPoint, x: float) -> tuple[f
 # Share of a side's extent that is left to the argument near the joint.
 NEAREST = 1e-6
 
-# So many times the width of what is known of a_i is left to it at least: nearer than that a jog, whose length goes with
-# x - a, is shorter than a cell, whose width goes with the distance from the least a.
+# At least so many times the width of the enclosure of a_i is left to that argument: nearer to the joint a jog, whose
+# length grows with x - a, is shorter than a cell, whose width grows with the distance from the least a.
 UNKNOWN = 4.0
 
 # Images are widened by this share of the cell they come from, so that other arithmetic can confirm them.
@@ -313,7 +313,7 @@ SLACK_OF_IMAGE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Cover:
-    """Cells of every side and what is proved of their images.
+    """Cells of every side and enclosures of their images.
 
     Attributes
     ----------
@@ -324,7 +324,7 @@ class Cover:
     images : tuple of Enclosures
         Per side, widened by `SLACK_OF_IMAGE` and by the noise of the landing place.
     graph : TransitionGraph
-        The same as a graph; the sinks are reached by images that may leave.
+        The images as a graph; an image that may leave the cells leads to a sink.
     points : tuple of FixedPoint
         Where the arm's surface is above the joint: the fixed points of the jog, one per side; otherwise none.
     """
@@ -342,14 +342,14 @@ class Cover:
         return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
 
 
-def _widened(found: Enclosures, edges: NDArray[np.float64], landing: float) -> Enclosures:
+def _widened(enclosed: Enclosures, edges: NDArray[np.float64], landing: float) -> Enclosures:
     """Widen the images by the slack and by the scatter of the landing place, which no decision depends on."""
     more = np.nextafter(landing + SLACK_OF_IMAGE * np.diff(edges), np.inf)
     hulls = {
         key: (np.nextafter(lo - more, -np.inf), np.nextafter(hi + more, np.inf))
-        for key, (lo, hi) in found.hulls.items()
+        for key, (lo, hi) in enclosed.hulls.items()
     }
-    return Enclosures(hulls, found.witness, found.lost)
+    return Enclosures(hulls, enclosed.witness, enclosed.lost)
 
 
 def cover(
@@ -401,18 +401,18 @@ def cover_on(
     box: ParameterBox, cells: Grid, pieces: int | None = None, points: tuple[FixedPoint, ...] = ()
 ) -> Cover:
     """Enclose the images of cells that are given; `pieces` as in `cover`, `points` where the cells begin there."""
-    found = tuple(
+    enclosed = tuple(
         _widened(enclosures(box.lo, box.hi, edges, side, pieces), edges, box.landing)
         for side, (edges,) in enumerate(cells.edges)
     )
-    return Cover(box, cells, found, _graph(box, cells, found), points)
+    return Cover(box, cells, enclosed, _graph(box, cells, enclosed), points)
 
 
-def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> TransitionGraph:
+def _graph(box: ParameterBox, cells: Grid, enclosed: Sequence[Enclosures]) -> TransitionGraph:
     exits = kind_of(box.lo).exits
     target = Target.of(cells, exits)
-    # the arm's end as it is known, not the last border: what may land beyond it leaves
-    parts = [boxes_of(images, target, len(exits)) for images in found]
+    # the arm's end itself, not the last border: an image that may lie beyond the end may leave
+    parts = [boxes_of(images, target, len(exits)) for images in enclosed]
     cell = np.concatenate([part.cell + cells.offset[k] for k, part in enumerate(parts)])
     joined = [
         np.concatenate([getattr(part, name) for part in parts]) for name in ("side", "lo", "hi", "exits")
@@ -420,7 +420,7 @@ def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> Trans
     first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=cells.n_cells))])
     leaving = joined[3]
     outward = np.uint8(1 << list(exits).index("outward"))
-    for side, images in enumerate(found):
+    for side, images in enumerate(enclosed):
         for lo, hi in images.hulls.values():
             beyond = (lo <= hi) & (hi > box.lo.arm_length)
             leaving[cells.of_side(side)] |= np.where(beyond, outward, 0).astype(np.uint8)
@@ -428,21 +428,23 @@ def _graph(box: ParameterBox, cells: Grid, found: Sequence[Enclosures]) -> Trans
     return TransitionGraph(box.lo, cells, ranges, "boxes")
 
 
-def everywhere(found: Cover) -> list[NDArray[np.int32]]:
+def everywhere(covered: Cover) -> list[NDArray[np.int32]]:
     """First and last target cells, as `targets`, of every branch and every number of sides that it turns."""
-    sides = found.grid.sides
-    keys = {((to - side) % sides, of) for side, images in enumerate(found.images) for to, of in images.hulls}
-    return [targets(found, branch, turned) for turned, branch in sorted(keys)]
+    sides = covered.grid.sides
+    keys = {
+        ((to - side) % sides, of) for side, images in enumerate(covered.images) for to, of in images.hulls
+    }
+    return [targets(covered, branch, turned) for turned, branch in sorted(keys)]
 
 
-def targets(found: Cover, branch: int, turned: int | None = None) -> NDArray[np.int32]:
+def targets(covered: Cover, branch: int, turned: int | None = None) -> NDArray[np.int32]:
     """First and last target cell of one branch, -1 -1 where it is impossible.
 
     A branch that leads to several sides is asked for with the number of sides it turns.
     """
-    grid = found.grid
+    grid = covered.grid
     out = np.full((grid.n_cells, 2), -1, dtype=np.int32)
-    for side, images in enumerate(found.images):
+    for side, images in enumerate(covered.images):
         for (to, of_branch), (lo, hi) in images.hulls.items():
             if of_branch != branch or (turned is not None and (to - side) % grid.sides != turned):
                 continue

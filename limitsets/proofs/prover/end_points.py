@@ -21,7 +21,7 @@ point itself does not matter.  The proof does not claim that one orbit is dense 
 Where the map contracts, inward rounding makes B empty: the inner ends are then None, and `orbits.py` describes L there.
  With noise, both sets hold for every sequence of throws.
 
-Checked by machine: branches and signs of slopes on tiles of N, images of tile ends (`proved_pieces.py`), and the exact
+Checked by machine: branches and signs of slopes on tiles of N, images of tile ends, and the exact
 comparison of B with its image.  Source: docs/model.md, limit sets.
 """
 
@@ -52,8 +52,8 @@ from limitsets.systems.maps import codes
 # is, so that the image of an interval covers all between the images of two of its points.  Undecided or bent tiles are
 # halved down to the rounding error, which brackets critical and turning points.
 #
-# Brackets and images are a little wider (inward images a little narrower) than they are found, so that other arithmetic
-# of about the same quality can confirm what rests on them.
+# Brackets and images are widened slightly (inward images narrowed), so that other arithmetic of about the same accuracy
+# can confirm the claims that rest on them.
 
 
 Pair = tuple[float, float]
@@ -122,7 +122,7 @@ def _merged_tiles(tiles: Iterable[ProvedPiece]) -> list[ProvedPiece]:
 
 
 def _widened(tiles: list[ProvedPiece]) -> list[ProvedPiece]:
-    """Let tiles of which less is known grow a little into their neighbours."""
+    """Extend undecided tiles slightly into their decided neighbours."""
     wide = list(tiles)
     for k, piece in enumerate(tiles):
         more = WIDER * (piece.hi - piece.lo)
@@ -348,10 +348,10 @@ class ProvedEnds:
     @property
     def extents(self) -> dict[int, list[tuple[tuple[float, float | None], tuple[float | None, float]]]]:
         """Per side ``((lo_outer, lo_inner), (hi_inner, hi_outer))`` of every interval."""
-        found: dict[int, list[tuple[tuple[float, float | None], tuple[float | None, float]]]] = {}
+        intervals: dict[int, list[tuple[tuple[float, float | None], tuple[float | None, float]]]] = {}
         for lo, hi in zip(self.ends[::2], self.ends[1::2], strict=True):
-            found.setdefault(lo.side, []).append(((lo.outer, lo.inner), (hi.inner, hi.outer)))
-        return found
+            intervals.setdefault(lo.side, []).append(((lo.outer, lo.inner), (hi.inner, hi.outer)))
+        return intervals
 
     @property
     def width(self) -> float:
@@ -378,21 +378,21 @@ class ProvedEnds:
 
 def _critical(tiles: dict[int, list[ProvedPiece]]) -> tuple[CriticalBracket, ...]:
     """Undecided tiles between decided ones of different branches."""
-    found = []
+    brackets = []
     for side, row in tiles.items():
         groups = union_of((piece.lo, piece.hi) for piece in row if piece.branch == BOTH)
         before = {piece.hi: piece.branch for piece in row if piece.branch in (codes.JOG, codes.FLIP)}
         after = {piece.lo: piece.branch for piece in row if piece.branch in (codes.JOG, codes.FLIP)}
-        found += [
+        brackets += [
             CriticalBracket(side, lo, hi, before[lo], after[hi])
             for lo, hi in groups
             if lo in before and hi in after and before[lo] != after[hi]
         ]
-    return tuple(found)
+    return tuple(brackets)
 
 
 class _Step(NamedTuple):
-    """Where an end comes from in one throw: an x, and whether it is itself an end (by number of its interval)."""
+    """The start whose throw gives an end, and the number of the interval of which the start is itself an end."""
 
     side: int
     x: float
@@ -460,12 +460,12 @@ def _inner_ends(outer: Intervals, inner: Intervals) -> tuple[dict[tuple[int, int
     return ends, reason
 
 
-def proved_ends(found: Attraction) -> ProvedEnds:
+def proved_ends(attraction: Attraction) -> ProvedEnds:
     """Bracket the ends of the limit set.
 
     Parameters
     ----------
-    found : Attraction
+    attraction : Attraction
         Attracting cells.
 
     Returns
@@ -487,10 +487,10 @@ def proved_ends(found: Attraction) -> ProvedEnds:
     >>> [(round(lo, 9), round(hi, 9)) for (lo, _), (_, hi) in ends.extents[0]], ends.width < 1e-9
     ([(15.205338826, 19.752688015)], True)
     """
-    grid, box = found.cover.grid, found.cover.box
+    grid, box = attraction.cover.grid, attraction.cover.box
     tiles: dict[int, list[ProvedPiece]] = {}
     for side, (edges,) in enumerate(grid.edges):
-        mine = np.flatnonzero(found.component[grid.of_side(side)] >= 0)
+        mine = np.flatnonzero(attraction.component[grid.of_side(side)] >= 0)
         tiles[side] = proved_pieces_of(box, side, edges[mine], edges[mine + 1])
     images = UnionImages(box, tiles)
     cells = {side: union_of((piece.lo, piece.hi) for piece in row) for side, row in tiles.items() if row}

@@ -102,15 +102,15 @@ class RationalInterval:
             return NotImplemented
         if b.lo <= 0 <= b.hi:
             raise ZeroDivisionError
-        found: RationalInterval = self * RationalInterval(1 / b.hi, 1 / b.lo)
-        return found
+        quotient: RationalInterval = self * RationalInterval(1 / b.hi, 1 / b.lo)
+        return quotient
 
     def __rtruediv__(self, other: int) -> RationalInterval:
         return RationalInterval.of(other) / self
 
 
 def _span(value: Any) -> Any:
-    """Make a span of a number; None of anything else, which may know what to do with a span."""
+    """Make a span of a number; None of another operand, whose own class may take a span."""
     if isinstance(value, RationalInterval):
         return value
     return RationalInterval(Fraction(value), Fraction(value)) if isinstance(value, int) else None
@@ -311,7 +311,7 @@ class Intervals:
 
 
 def _as(value: object) -> Intervals | None:
-    """Make intervals of a number; None of anything else, which may know what to do with intervals."""
+    """Make intervals of a number; None of another operand, whose own class may take intervals."""
     if isinstance(value, Intervals):
         return value
     if isinstance(value, RationalInterval):
@@ -401,8 +401,8 @@ def root(x: Jet | Number) -> Any:
         return x.square_root()
     if isinstance(x, RationalInterval):
         return square_root(x)
-    found = root(x.value)
-    return Jet(found, tuple(d / (2 * found) for d in x.derivatives))
+    half_power = root(x.value)
+    return Jet(half_power, tuple(d / (2 * half_power) for d in x.derivatives))
 
 
 def about(

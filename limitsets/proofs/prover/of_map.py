@@ -49,7 +49,7 @@ from limitsets.systems.sets.basin import longest_stays, passing
 Floats: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = list[list[Intervals]]
 
-# Claims that are about slopes too, which are derived even where boxes are written by hand.
+# Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
 OF_SLOPES = ("cycles", "expanding")
 
 # Largest period of the search for cycles.
@@ -210,7 +210,7 @@ def _region(cells: CellSet, caption: str, proved: str) -> Table:
 
 
 def _missing(claim: Claim) -> str | None:
-    """Say what is not proved, of cycles also where others are."""
+    """Say what is not proved, also of the cycles where only some are proved."""
     rest = claim.section.get("missing", [])
     more = f"; and {len(rest) - 1} more" if len(rest) > 1 else ""
     return claim.reason or (f"{rest[0]}{more}" if rest else None)
@@ -241,8 +241,8 @@ def _invariant(proof: ProofOfMap) -> Claim:
 
 
 def _trapping(proof: ProofOfMap) -> Claim:
-    found = _invariant(proof)
-    return Claim("trapping", found.verdict, found.reason, {})
+    claim = _invariant(proof)
+    return Claim("trapping", claim.verdict, claim.reason, {})
 
 
 def _attracts_all(proof: ProofOfMap) -> Claim:
@@ -289,14 +289,14 @@ def _expanding(proof: ProofOfMap) -> Claim:
         mine = numbers[sides == side]
         lo, hi = grid.boxes(mine, side)
         for branch in range(len(kind_of(proof.map).branches)):
-            found = branch_boxes(proof.map, proof.upper, side, branch, lo, hi)
-            low, high = found.slope_lo[:, 0, 0], found.slope_hi[:, 0, 0]
+            boxes = branch_boxes(proof.map, proof.upper, side, branch, lo, hi)
+            low, high = boxes.slope_lo[:, 0, 0], boxes.slope_hi[:, 0, 0]
             slope = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
-            slope[found.state == UNKNOWN] = 0.0
-            slope[found.state == NEVER] = np.inf
+            slope[boxes.state == UNKNOWN] = 0.0
+            slope[boxes.state == NEVER] = np.inf
             largest = np.maximum(np.abs(low), np.abs(high))
-            largest[found.state == UNKNOWN] = np.inf
-            most = max(most, float(largest[found.state != NEVER].max(initial=0.0)))
+            largest[boxes.state == UNKNOWN] = np.inf
+            most = max(most, float(largest[boxes.state != NEVER].max(initial=0.0)))
             worst = int(slope.argmin())
             if slope[worst] < least:
                 least, place = float(slope[worst]), _place(grid, int(mine[worst]))
@@ -316,14 +316,14 @@ def _stepped(proof: ProofOfMap, lo: Floats, hi: Floats, cycle: Cycle) -> tuple[I
     image, slope = np.empty((2, *lo.shape)), np.empty((2, *lo.shape, lo.shape[1]))
     for side, branch in sorted(set(zip(cycle.side.tolist(), cycle.branches.tolist(), strict=True))):
         here = np.flatnonzero((cycle.side == side) & (cycle.branches == branch))
-        found = branch_boxes(proof.map, proof.upper, side, branch, lo[here], hi[here])
-        if (found.state == UNKNOWN).any():
+        boxes = branch_boxes(proof.map, proof.upper, side, branch, lo[here], hi[here])
+        if (boxes.state == UNKNOWN).any():
             return "its images are not bounded on the boxes that are tried"
-        if (found.state != SURE).any():
-            return f"the branch of point {here[np.argmax(found.state != SURE)]} is not proved"
-        if (cycle.side[(here + 1) % cycle.period] != found.side).any():
+        if (boxes.state != SURE).any():
+            return f"the branch of point {here[np.argmax(boxes.state != SURE)]} is not proved"
+        if (cycle.side[(here + 1) % cycle.period] != boxes.side).any():
             return "it ends on another side"
-        image[:, here], slope[:, here] = (found.lo, found.hi), (found.slope_lo, found.slope_hi)
+        image[:, here], slope[:, here] = (boxes.lo, boxes.hi), (boxes.slope_lo, boxes.slope_hi)
     return Intervals(*image), Intervals(*slope)
 
 
@@ -394,34 +394,34 @@ def _attracts(slope: Matrix) -> bool | None:
     return False if det.absolute().lo[0] > 1.0 or room.hi[0] < 0.0 else None
 
 
-@np.errstate(all="ignore")  # what is singular or runs away gives inf and nan, which prove nothing
+@np.errstate(all="ignore")  # a singular matrix or an overflow gives inf and nan, which prove nothing
 def _prove(proof: ProofOfMap, cycle: Cycle) -> CycleOfMap | str:
     """Prove that there is one orbit near one found in floats; or say what is missing."""
     middle = cycle.x.reshape(cycle.period, -1).astype(np.float64)
-    found = _stepped(proof, middle, middle, cycle)
-    if isinstance(found, str):
-        return found
-    c, least = _inverse(found[1]), FIRST * np.maximum(np.abs(middle), 1.0)
-    off, lo, hi = found[0] - _exactly(np.roll(middle, -1, axis=0)), middle, middle
+    step = _stepped(proof, middle, middle, cycle)
+    if isinstance(step, str):
+        return step
+    c, least = _inverse(step[1]), FIRST * np.maximum(np.abs(middle), 1.0)
+    off, lo, hi = step[0] - _exactly(np.roll(middle, -1, axis=0)), middle, middle
     for _ in range(TRIES):
-        held = _krawczyk(middle, c, off, found[1], Intervals(lo, hi) - _exactly(middle))
+        held = _krawczyk(middle, c, off, step[1], Intervals(lo, hi) - _exactly(middle))
         if ((lo < held.lo) & (held.hi < hi)).all():
             return _proved(proof, held, cycle)
         more = MORE * (held.hi - held.lo) + least
         lo, hi = np.minimum(held.lo - more, middle), np.maximum(held.hi + more, middle)
         if not np.isfinite([lo, hi]).all():
             break
-        found = _stepped(proof, lo, hi, cycle)
-        if isinstance(found, str):
-            return found
+        step = _stepped(proof, lo, hi, cycle)
+        if isinstance(step, str):
+            return step
     return "no box is found that Newton's operator contracts"
 
 
 def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
-    """Say what there is to know of an orbit that lies in boxes; or what is missing."""
-    found = _stepped(proof, at.lo, at.hi, cycle)
-    if isinstance(found, str):
-        return found
+    """Prove the sides, branches and slope of an orbit that lies in boxes; or say what is missing."""
+    step = _stepped(proof, at.lo, at.hi, cycle)
+    if isinstance(step, str):
+        return step
     points = list(zip(at.lo, at.hi, strict=True))
     if any(
         _meet(points[0], points[k])
@@ -431,7 +431,7 @@ def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
         return "its period may be smaller"
     if not _within(proof.cells, *points[0], int(cycle.side[0])):
         return "its box is not in the attracting cells"
-    slope = _slope(found[1])
+    slope = _slope(step[1])
     return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
 
 
@@ -455,9 +455,9 @@ def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
     cells, middle = proof.cells, between(proof.map, proof.upper)
     if cells.grid.dimension > 1:
         return cycles(replace(proof.graph, map=middle), UP_TO, cells), []
-    found = cycles_of(middle, cells.extents(), cells.grid.domain, UP_TO, most_words=MOST_WORDS)
+    candidates = cycles_of(middle, cells.extents(), cells.grid.domain, UP_TO, most_words=MOST_WORDS)
     beyond = f"longer cycles: there are more than {MOST_WORDS} itineraries of one length"
-    return found, [] if found.complete else [beyond]
+    return candidates, [] if candidates.complete else [beyond]
 
 
 def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[CycleOfMap, ...]]:
@@ -465,11 +465,11 @@ def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[
     if (len(kind.branches) > 1 and not kind.has_margin) or kind.dimension > 2 or not has_slope(proof.map):
         reason = "cycles need slopes, at most two dimensions, and `margin` where there are branches"
         return Claim("cycles", "undecided", reason, {}, final=True), ()
-    found, missing = _candidates(proof) if len(proof.cells) else ((), [])
+    candidates, missing = _candidates(proof) if len(proof.cells) else ((), [])
     proved: list[CycleOfMap] = []
-    for number, cycle in enumerate(found):
+    for number, cycle in enumerate(candidates):
         if progress is not None:
-            progress("cycles", number, len(found))
+            progress("cycles", number, len(candidates))
         answer = _prove(proof, cycle)
         if isinstance(answer, CycleOfMap):
             proved.append(answer)
@@ -497,7 +497,7 @@ CLAIMS_OF_MAP = (*PROVERS, "cycles")
 
 
 def _require_provable(lower: Any) -> None:
-    """Refuse maps whose boxes are not of what its orbits follow."""
+    """Refuse maps whose boxes do not enclose the map that their orbits follow."""
     kind = kind_of(lower)
     for name in ("scattered", "on_side"):
         if type(lower) in getattr(kernels, name).methods:
@@ -560,13 +560,13 @@ def certify_map(
     if progress is not None:
         progress("transitions", 0, 1)
     graph = transitions(lower, grid, "boxes", upper=upper)
-    proof = ProofOfMap(lower, upper, graph, _components(graph), (), (), 0.0)
-    found: tuple[CycleOfMap, ...] = ()
+    proof = ProofOfMap(lower, upper, graph, component=_components(graph), claims=(), cycles=(), seconds=0.0)
+    orbits: tuple[CycleOfMap, ...] = ()
     answers = []
     for word in wanted:
         if word == "cycles":
-            answer, found = _cycles(proof, progress)
+            answer, orbits = _cycles(proof, progress)
         else:
             answer = PROVERS[word](proof)
         answers.append(answer)
-    return replace(proof, claims=tuple(answers), cycles=found, seconds=time.perf_counter() - begin)
+    return replace(proof, claims=tuple(answers), cycles=orbits, seconds=time.perf_counter() - begin)

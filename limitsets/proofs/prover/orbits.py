@@ -290,11 +290,11 @@ def proved_cycle(box: ParameterBox, cycle: Cycle) -> ProvedCycle | str:
     word, x, side = np.ascontiguousarray(cycle.branches), float(cycle.x[0]), int(cycle.side[0])
     radius = FIRST * max(abs(x), 1.0)
     for _ in range(TRIES):
-        found = _crosses(box, x - radius, x + radius, side, word)
-        # half of it would do: other arithmetic about as good has to see the signs too
+        crossing = _crosses(box, x - radius, x + radius, side, word)
+        # half the radius would do; with the whole, other arithmetic of about the same accuracy proves the signs too
         lo, hi = x - 2.0 * radius, x + 2.0 * radius
         radius *= GROWTH
-        if not (found and _crosses(box, lo, hi, side, word)):
+        if not (crossing and _crosses(box, lo, hi, side, word)):
             continue
         orbit = follow(box, lo, hi, side, word)
         p = word.size
@@ -337,18 +337,18 @@ class ProvedCycles:
         return {"cycles": [cycle.section() for cycle in self.cycles], "complete": False}
 
 
-def _inside(found: Attraction, cycle: ProvedCycle) -> bool:
+def _inside(attraction: Attraction, cycle: ProvedCycle) -> bool:
     """Whether the orbit stays in the attracting cells: by invariance one point in them is enough."""
     side, lo, hi = int(cycle.side[0]), float(cycle.lo[0]), float(cycle.hi[0])
-    return any(bottom <= lo and hi <= top for bottom, top in found.cells.extents().get(side, ()))
+    return any(bottom <= lo and hi <= top for bottom, top in attraction.cells.extents().get(side, ()))
 
 
-def proved_cycles(found: Attraction, up_to: int | None = None) -> ProvedCycles:
+def proved_cycles(attraction: Attraction, up_to: int | None = None) -> ProvedCycles:
     """Search the attracting cells for periodic orbits and prove what is found.
 
     Parameters
     ----------
-    found : Attraction
+    attraction : Attraction
         Cells, attracting ones among them.
     up_to : int, optional
         Largest period; default, each of `PERIODS` in turn until one is found.
@@ -360,7 +360,7 @@ def proved_cycles(found: Attraction, up_to: int | None = None) -> ProvedCycles:
     Raises
     ------
     AnswerError
-        For noise: the orbit of the one throw is not one of the other.
+        For noise: an orbit of one throw of the noise is not an orbit of another.
 
     Examples
     --------
@@ -374,21 +374,21 @@ def proved_cycles(found: Attraction, up_to: int | None = None) -> ProvedCycles:
     7 False 4.343
     8 False 5.468
     """
-    box = found.cover.box
+    box = attraction.cover.box
     if box.noise:
         raise AnswerError(
             "periodic orbits", f"noise of {', '.join(box.noise)}", "no noise", "ask without noise"
         )
-    extents = found.cells.extents()
+    extents = attraction.cells.extents()
     for most in PERIODS if up_to is None else (up_to,):
-        cycles = cycles_of(box.lo, extents, found.cover.grid.domain, most) if extents else ()
+        cycles = cycles_of(box.lo, extents, attraction.cover.grid.domain, most) if extents else ()
         if cycles:
             break
     proved: list[ProvedCycle] = []
     missing: list[str] = []
     for cycle in cycles:
         answer = proved_cycle(box, cycle)
-        if isinstance(answer, ProvedCycle) and not _inside(found, answer):
+        if isinstance(answer, ProvedCycle) and not _inside(attraction, answer):
             answer = "its box is not in the attracting cells"
         if isinstance(answer, ProvedCycle):
             proved.append(answer)

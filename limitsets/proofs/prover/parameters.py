@@ -1,6 +1,6 @@
 """The box of map parameters given by a scene's decimals, tolerances and noise, and the effects that it can hold.
 
-From the text of the scene, in exact rational spans (`rational.py`), through the same formulas of `geometry` that floats
+From the text of the scene, in exact rational spans (`numbers.py`), through the same formulas of `geometry` that floats
 go through; only the last step rounds to doubles, outward.
 """
 
@@ -73,12 +73,12 @@ def simulated(scene: Scene) -> FullThrow | None:
             '"bounded": normal deviations have no bound, so that nothing holds for every sequence of throws',
             'write spread = "bounded", with bounds in [world] scatter',
         )
-    found = without(scene.map, Spread)
-    return found if isinstance(found, FullThrow) else None
+    throw = without(scene.map, Spread)
+    return throw if isinstance(throw, FullThrow) else None
 
 
 def scattered(scene: Scene) -> dict[str, str]:
-    """Return what the scene's bounded spread says, by quantity, as noise."""
+    """Return the scene's bounded spread as noise, by quantity."""
     if scene.effects.spread != "bounded":
         return {}
     table = scene.text["world"]["scatter"]
@@ -91,7 +91,7 @@ def joined(noise: Mapping[str, str], scatter: Mapping[str, str]) -> dict[str, st
     Raises
     ------
     AnswerError
-        Both say something of one quantity, and not the same.
+        The two give one quantity different deviations.
     """
     for name in noise.keys() & scatter.keys():
         if noise[name] != scatter[name]:
@@ -138,11 +138,11 @@ class SceneBox:
 
     def texts(self) -> dict[str, list[str]]:
         """Both ends of each quantity, as text with the unit in which the scene gives it."""
-        found = {}
+        spelled = {}
         for name, span in self.spans.items():
             unit = parse(text_at(self.scene.text, name), find(name).dimension).unit
-            found[name] = [f"{_decimal(span.lo, up=False)} {unit}", f"{_decimal(span.hi, up=True)} {unit}"]
-        return found
+            spelled[name] = [f"{_decimal(span.lo, up=False)} {unit}", f"{_decimal(span.hi, up=True)} {unit}"]
+        return spelled
 
     def tree(self) -> dict[str, Any]:
         """Write the scene as text, each of the quantities a pair of texts."""
@@ -230,7 +230,7 @@ VARYING = ("throw.speed", "gravity.tilt", "landing.x")
 
 @dataclass(frozen=True, eq=False)
 class ParameterBox:
-    """A box of parameters of the throw map, and what it stands for.
+    """A box of parameters of the throw map, and the scenes and the noise that it encloses.
 
     Attributes
     ----------
@@ -294,7 +294,7 @@ class _Spans(Numbers):
     noise : mapping of str to str, optional
         What differs at every throw.
     instead : mapping of str to RationalInterval or Jet, optional
-        What stands in for quantities.
+        Numbers that replace quantities.
     """
 
     def __init__(
@@ -309,7 +309,7 @@ class _Spans(Numbers):
 
     def number(self, name: str) -> Any:
         """Return a quantity, as throws have it."""
-        found = self.span(name)
+        span = self.span(name)
         if name == "throw.kappa":
             share, more = self.deviation("throw.speed")
             if more.hi > 0:
@@ -317,32 +317,32 @@ class _Spans(Numbers):
                     "the noise", self.noise, "percent, for a scene given by kappa", "give it in percent"
                 )
             speed = RationalInterval(1 - share.hi, 1 + share.hi)
-            return found * self.share_of_gravity() / (speed * speed)
+            return span * self.share_of_gravity() / (speed * speed)
         if name == "gravity.acceleration":
-            found = found * self.share_of_gravity()
+            span = span * self.share_of_gravity()
         elif name in VARYING:
             share, more = self.deviation(name)
-            found = RationalInterval((found * (1 - share) - more).lo, (found * (1 + share) + more).hi)
-        return self._possible(name, found)
+            span = RationalInterval((span * (1 - share) - more).lo, (span * (1 + share) + more).hi)
+        return self._possible(name, span)
 
-    def _possible(self, name: str, found: Any) -> Any:
+    def _possible(self, name: str, span: Any) -> Any:
         """Refuse a speed or a gravity that may be 0, and a tilt that may lie level or overhang."""
         if name == "gravity.tilt":
             most = (pi() / 2).lo if name in self.noise else (pi() / 2).hi
-            if not (found.lo > 0 and found.hi <= most):
+            if not (span.lo > 0 and span.hi <= most):
                 shown = self.tree["gravity"]["tilt"]
                 text = f"{shown} +- {self.noise[name]}" if name in self.noise else shown
                 raise AnswerError(name, text, "from 0 to 90 degrees", NARROWER)
-        elif name in ("throw.speed", "gravity.acceleration") and not found.lo > 0:
+        elif name in ("throw.speed", "gravity.acceleration") and not span.lo > 0:
             raise AnswerError("the speed or gravity", self.tree["throw"], "above 0 throughout", NARROWER)
-        return found
+        return span
 
     def span(self, name: str) -> Any:
         """Return a quantity, or the span between the two texts of a tolerance, or what stands in for it."""
         if name in self.instead:
             return self.instead[name]
-        found = text_at(self.tree, name)
-        pair = found if isinstance(found, list) else [found, found]
+        spelled = text_at(self.tree, name)
+        pair = spelled if isinstance(spelled, list) else [spelled, spelled]
         lo, hi = (self.constant(text, find(name).dimension) for text in pair)
         return RationalInterval(lo.lo, hi.hi)
 
@@ -365,7 +365,7 @@ class _Spans(Numbers):
         return RationalInterval.of(0), self.constant(text, find(name).dimension)
 
     def share_of_gravity(self) -> RationalInterval:
-        """Return what the noise of the tilt multiplies g by: sin(tilt +- dev) / sin(tilt).
+        """Return the factor by which the noise of the tilt changes g: sin(tilt +- dev) / sin(tilt).
 
         Both ends are farthest from 1 at the smallest tilt: (1 +- p) cot((1 +- p) t) against cot(t), and cot(t) alone.
         """
@@ -380,8 +380,8 @@ class _Spans(Numbers):
             )
         self.number("gravity.tilt")
         share, more = self.deviation("gravity.tilt")
-        found = text_at(self.tree, "gravity.tilt")
-        least = self.constant(found[0] if isinstance(found, list) else found, "angle")
+        spelled = text_at(self.tree, "gravity.tilt")
+        least = self.constant(spelled[0] if isinstance(spelled, list) else spelled, "angle")
         flat, steep = sine(least * (1 - share) - more), sine(least * (1 + share) + more)
         return RationalInterval((flat / sine(least)).lo, (steep / sine(least)).hi)
 
@@ -393,7 +393,7 @@ class _Spans(Numbers):
     def narrow_body(self) -> tuple[list[tuple[Any, ...]], RationalInterval]:
         """As `body`, but narrower where several of its numbers are known to a tolerance only."""
         plain, radius = self.body()
-        # pairs of texts are what has a tolerance
+        # a pair of texts is a quantity with a tolerance
         names = [name for name, text in texts(self.tree["part"], "part") if isinstance(text, list)]
         if not names:
             return plain, radius
@@ -446,7 +446,7 @@ def _require_rest(
     kappa: RationalInterval,
     radius: RationalInterval,
 ) -> None:
-    """Refuse parameters some of which are those of no part, or of one that falls over where the scene's rests."""
+    """Refuse parameters if some of them fit no part, or a part that tips over where the scene's part rests."""
     for side, ((a, d, length), stays) in enumerate(zip(sides, rests, strict=True)):
         good = a.lo > 0 and a.hi < length.lo if stays else a.hi <= 0 or a.lo >= length.hi
         if not (good and d.lo > 0):

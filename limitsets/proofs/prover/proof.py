@@ -72,7 +72,7 @@ def thrown_orbit(states: Sequence[State], recurs: Mapping[str, Any], varies: boo
 
 def write_refutation(
     path: str | Path,
-    found: Attraction,
+    attraction: Attraction,
     goal: Goal,
     states: Sequence[State],
     recurs: Mapping[str, Any],
@@ -87,7 +87,7 @@ def write_refutation(
     ----------
     path : str or Path
         The file.
-    found : Attraction
+    attraction : Attraction
         The cells, of the scene that refutes and its noise.
     goal : Goal
         What is refuted.
@@ -115,7 +115,7 @@ def write_refutation(
             "by an orbit that comes back, of a goal that the checker knows",
             "leave it",
         )
-    box = found.cover.box
+    box = attraction.cover.box
     section = {
         "goal": _goal(goal, scene),
         "recurs": {kind: recurs[kind]},
@@ -126,7 +126,7 @@ def write_refutation(
         section |= thrown_orbit(states, recurs, box.kappa_varies)
     write(
         path,
-        [found],
+        [attraction],
         [{"claim": "refuted", "section": section, "verdict": "refuted"}],
         noise=box.noise or None,
         tolerance=None,
@@ -145,7 +145,7 @@ SHARES = ("share", "leaves", "creeps", "open")
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim and what became of it.
+    """One claim and its verdict.
 
     Attributes
     ----------
@@ -156,9 +156,9 @@ class Claim:
     reason : str
         Why it is not proved: what is missing and where; empty if it is.
     section : dict
-        What a recheck needs, empty if nothing is proved.
+        The numbers that a recheck needs; empty if nothing is proved.
     counterexample : tuple of State
-        An orbit that refutes it, empty if none was found.
+        An orbit that refutes the claim; empty if there is none.
     fixed : dict of str to list of str
         The counterexample's values of what is fixed but unknown, as pairs of texts.
     final : bool
@@ -199,10 +199,10 @@ class Claim:
     def jog_fixed_points(self) -> dict[str, list[float]] | None:
         """Brackets of the jog's unstable fixed point by side, where the claim rests on them."""
         near = self.section.get("near_joint", {})
-        found = {
+        brackets = {
             side: [float.fromhex(end) for end in each.get("fixed_point", ())] for side, each in near.items()
         }
-        return found if found and all(found.values()) else None
+        return brackets if brackets and all(brackets.values()) else None
 
 
 def _starts(starts: Any) -> str | None:
@@ -268,7 +268,7 @@ class Proof(Tabled):
 
     @property
     def model(self) -> Model:
-        """Of which model the claims are, and which facts of the scene that leaves out."""
+        """The model for which the claims are proved, and the facts of the scene that this model leaves out."""
         return Model.of(self.scene, self.noise)
 
     def tables(self) -> tuple[Table, ...]:
@@ -298,7 +298,7 @@ class Proof(Tabled):
         return [self._tables(claim) for claim in self.claims]
 
     def _tables(self, claim: Claim) -> dict[str, Any]:
-        proved, found = claim.written, self.attractions
+        proved, attractions = claim.written, self.attractions
         slope = float.fromhex(claim.section["least_slope"]) if "least_slope" in claim.section else None
         return as_table(
             **picked(claim, "claim", "verdict", "starts"),
@@ -307,11 +307,7 @@ class Proof(Tabled):
             reason=claim.reason or None,
             recurs=claim.recurs or None,
             counterexample=[self._state(claim, state) for state in claim.counterexample] or None,
-            parameters=self.values(),
-            effects=self.effects or None,
-            noise=self.noise or None,
-            tolerance=self.tolerance or None,
-            laid=by_side(self.laid) or None,
+            **self._conditions(),
             max_throws=self.max_throws() if proved and claim.claim == "attracts-all" else None,
             jog_fixed_points=claim.jog_fixed_points,
             extents=self._extents(claim) if proved else None,
@@ -319,11 +315,21 @@ class Proof(Tabled):
             entropy=math.log(slope) if slope is not None and not self.noise else None,
             section=claim.section or None,
             model=self.model,
-            cells=sum(each.cover.grid.n_cells for each in found),
-            undecided=sum(_undecided(each) for each in found),
-            unresolved=_by_side(each.unresolved.extents() for each in found),
+            cells=sum(each.cover.grid.n_cells for each in attractions),
+            undecided=sum(_undecided(each) for each in attractions),
+            unresolved=_by_side(each.unresolved.extents() for each in attractions),
             timings={"certify": self.seconds},
         )
+
+    def _conditions(self) -> dict[str, Any]:
+        """Give the scenes and the starts for which the claims are made."""
+        return {
+            "parameters": self.values(),
+            "effects": self.effects or None,
+            "noise": self.noise or None,
+            "tolerance": self.tolerance or None,
+            "laid": by_side(self.laid) or None,
+        }
 
     def values(self) -> dict[str, str | list[str]]:
         """Name every quantity of the scene with its text: the two ends where it is fixed but unknown."""
@@ -340,17 +346,17 @@ class Proof(Tabled):
         kappa always, as it was replayed; the tilt that makes it, where the tilt alone differs; how far beyond the
         model's place it landed, where that differs.
         """
-        found, scene = {"throw.kappa": f"{state.kappa!r} {self.scene.unit}"}, self.scene
+        quantities, scene = {"throw.kappa": f"{state.kappa!r} {self.scene.unit}"}, self.scene
         if "gravity.tilt" in self.noise and "throw.speed" not in self.noise and state.kappa is not None:
             given = parse(scene.text["gravity"]["tilt"], "angle")
             nominal = convert(given, "rad")
             # kappa goes with the sine of the tilt
             tilt = math.asin(min(1.0, math.sin(nominal) * state.kappa / scene.kappa))
             degrees = given.unit == "deg"
-            found["gravity.tilt"] = f"{math.degrees(tilt) if degrees else tilt!r} {given.unit}"
+            quantities["gravity.tilt"] = f"{math.degrees(tilt) if degrees else tilt!r} {given.unit}"
         if state.landing is not None:
-            found["landing.x"] = f"{state.landing!r} {scene.unit}"
-        return found
+            quantities["landing.x"] = f"{state.landing!r} {scene.unit}"
+        return quantities
 
     def max_throws(self) -> dict[str, Any]:
         """Bound the throws until a start is in the attracting cells.
@@ -361,19 +367,21 @@ class Proof(Tabled):
             `throws` from `beyond` (x by side) on; below it, x - a grows by a factor of `near_joint` at least with each,
             or with the arm's surface above the joint x - R* does, down to the jog's fixed point R*.
         """
-        starts = [[float(edges[0]) for (edges,) in found.cover.grid.edges] for found in self.attractions]
+        starts = [
+            [float(edges[0]) for (edges,) in attraction.cover.grid.edges] for attraction in self.attractions
+        ]
         rests = self.scene.sides.rests
         return {
             "beyond": {
                 str(side): max(each) for side, each in enumerate(zip(*starts, strict=True)) if rests[side]
             },
-            "throws": max(found.max_rank for found in self.attractions),
-            "near_joint": min(near.q for found in self.attractions for near in found.joint),
+            "throws": max(attraction.max_rank for attraction in self.attractions),
+            "near_joint": min(near.q for attraction in self.attractions for near in attraction.joint),
         }
 
     def outer_extents(self) -> dict[int, list[tuple[float, float]]]:
         """Per side the intervals of attracting cells, of all pieces of a tolerance together."""
-        together = _by_side(found.cells.extents() for found in self.attractions)
+        together = _by_side(attraction.cells.extents() for attraction in self.attractions)
         return {side: union_of(together[side]) for side in sorted(together)}
 
     def _extents(self, claim: Claim) -> dict[int, Any]:
@@ -382,11 +390,11 @@ class Proof(Tabled):
         if ends is None:
             extents = self.outer_extents().items()
             return {side: [[[lo, None], [None, hi]] for lo, hi in parts] for side, parts in extents}
-        found: dict[int, Any] = {}
+        intervals: dict[int, Any] = {}
         for lo, hi in zip(ends[::2], ends[1::2], strict=True):
             pair = [[_float(lo["outer"]), _float(lo["inner"])], [_float(hi["inner"]), _float(hi["outer"])]]
-            found.setdefault(lo["side"], []).append(pair)
-        return found
+            intervals.setdefault(lo["side"], []).append(pair)
+        return intervals
 
     def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
         """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
@@ -449,7 +457,7 @@ class Proof(Tabled):
         return Path(path)
 
     def denied(self, claims: Mapping[str, str]) -> Proof:
-        """Return what is left of it where the checker denies some claims: these are undecided."""
+        """Return the proof where the checker denies some claims: these are undecided."""
         left = tuple(
             replace(
                 each,
@@ -469,10 +477,10 @@ def _float(text: str | None) -> float | None:
     return None if text is None else float.fromhex(text)
 
 
-def _undecided(found: Attraction) -> int:
+def _undecided(attraction: Attraction) -> int:
     """Count the cells on which both a jog and a flip are possible."""
     count = 0
-    for images in found.cover.images:
+    for images in attraction.cover.images:
         possible = [(lo <= hi).reshape(lo.shape[0], -1).all(axis=1) for lo, hi in images.hulls.values()]
         count += int((np.sum(possible, axis=0) > 1).sum()) if possible else 0
     return count

@@ -59,8 +59,8 @@ Sides = NDArray[np.int64]
 class _Raster:
     """Places evenly over the attracting cells, and the nearest of them to any place."""
 
-    def __init__(self, found: Attraction) -> None:
-        extents = found.cells.extents()
+    def __init__(self, attractors: Attraction) -> None:
+        extents = attractors.cells.extents()
         total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
         self.step = total / PLACES
         self.low, self.first = {}, {}
@@ -78,13 +78,13 @@ class _Raster:
 
     def nearest(self, x: Array, side: Sides) -> Sides:
         """Return the number of the nearest place; -1 where there is none."""
-        found = np.full(x.size, -1)
+        nearest = np.full(x.size, -1)
         for s, first in self.first.items():
             mine = np.flatnonzero(side == s)
             number = first + np.rint((x[mine] - self.low[s]) / self.step).astype(np.int64)
             last = first + int((self.side == s).sum())
-            found[mine] = np.where((number >= first) & (number < last), number, -1)
-        return found
+            nearest[mine] = np.where((number >= first) & (number < last), number, -1)
+        return nearest
 
 
 def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -95,12 +95,12 @@ def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return wide
 
 
-def worst_orbit(found: Attraction, wrong: Wrong) -> Refutation:
+def worst_orbit(attractors: Attraction, wrong: Wrong) -> Refutation:
     """Find a closed orbit that violates a goal, with the noise chosen at every throw, and prove it.
 
     Parameters
     ----------
-    found : Attraction
+    attractors : Attraction
         Cells and images, of a box of parameters with noise.
     wrong : callable
         From places and sides to whether each violates the goal.
@@ -110,9 +110,9 @@ def worst_orbit(found: Attraction, wrong: Wrong) -> Refutation:
     Refutation
         Empty if none is found.
     """
-    box, options = found.cover.box, throw_choices(found.cover.box, KAPPAS)
-    raster = _Raster(found)
-    start, on = on_limit_set(found)
+    box, options = attractors.cover.box, throw_choices(attractors.cover.box, KAPPAS)
+    raster = _Raster(attractors)
+    start, on = on_limit_set(attractors)
     path = orbit(box.at_kappa(box.middle_kappa), start, on, LENGTH)
     here = raster.nearest(path.x, path.side)
     levels = [_beside(wrong(raster.x, raster.side))]
@@ -128,14 +128,16 @@ def worst_orbit(found: Attraction, wrong: Wrong) -> Refutation:
         known |= good
         begin = np.flatnonzero((here >= 0) & levels[back][here])
         begin = begin[begin >= BEFORE][:KEPT]
-        refutation = _followed(found, wrong, raster, levels, path, begin, options)
+        refutation = _followed(
+            attractors, wrong, raster, levels=levels, path=path, begin=begin, options=options
+        )
         if refutation.states:
             return refutation
     return Refutation()
 
 
 def _followed(
-    found: Attraction,
+    attractors: Attraction,
     wrong: Wrong,
     raster: _Raster,
     levels: list[NDArray[np.bool_]],
@@ -148,7 +150,7 @@ def _followed(
         return Refutation()
     reached = ReachedStates.of(path.x[begin], path.side[begin].astype(np.int64))
     for back, level in reversed(list(enumerate(levels[:-1]))):
-        thrown = throws(found.cover.box, reached.x[-1], reached.side[-1], options)
+        thrown = throws(attractors.cover.box, reached.x[-1], reached.side[-1], options)
         if back == 0:
             keep = violation(thrown, wrong)
         else:
@@ -162,37 +164,27 @@ def _followed(
     same = (path.x[begin] == tail.x[0]) & (path.side[begin] == tail.side[0])
     first = int(begin[np.flatnonzero(same)[0]])
     before = slice(first - BEFORE, first)
-    usual = ThrowChoice(found.cover.box.middle_kappa, 0.0)
+    usual = ThrowChoice(attractors.cover.box.middle_kappa, 0.0)
     whole = Path(
         [*path.x[before].tolist(), *tail.x],
         [*path.side[before].tolist(), *tail.side],
         [*([usual] * BEFORE), *tail.thrown],
     )
-    return closed(found.cover.box, whole, wrong)
+    return closed(attractors.cover.box, whole, wrong)
 
 
 # ----------------------------------------------------------------
 # One claim of all pieces of a tolerance, from those of each: the weakest numbers, for the fewest starts.
 
 
-# For which starts a goal holds: the fewer the later.
+# The words for the starts of a goal, from the most starts to the fewest.
 STARTS = ("every", "within", "almost-every", "from", "cells")
 
 
-def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
+def weakest_of(claims: Sequence[Claim], attractions: Sequence[Attraction]) -> Claim:
     """Join one claim, proved on every piece by its cells: with the weakest of the numbers, for the fewest starts."""
     sections = [claim.section for claim in claims]
-    section = dict(sections[0])
-    near = [other["near_joint"] for other in sections if "near_joint" in other]
-    section.pop("near_joint", None)
-    if len(near) == len(sections):
-        section["near_joint"] = {side: _weakest([other[side] for other in near]) for side in near[0]}
-    for count in ("max_rank", "throws", "jogs", "thinning"):
-        counts = [other[count] for other in sections if count in other]
-        if counts:
-            section[count] = max(counts)
-    if "least_slope" in section:
-        section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
+    section = _weakest_numbers(sections)
     if claims[0].starts is None:
         return Claim(claims[0].claim, "proved", "", section)
     words = [one.starts if isinstance(one.starts, str) else next(iter(one.starts)) for one in claims]
@@ -200,18 +192,14 @@ def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
     starts = weakest.starts
     section.pop("lost", None)
     if isinstance(starts, dict) and "from" in starts:
-        given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
-        if len(near) < len(sections):  # of starts before the cells nothing is claimed then
-            first = [[float(edges[0]) for (edges,) in one.cover.grid.edges] for one in found]
-            given += [{side: cells[int(side)] for side in given[0]} for cells in first]
-        starts = {"from": {side: max(each[side] for each in given) for side in given[0]}}
+        starts = {"from": _farthest_start(claims, attractions, below_cells="near_joint" in section)}
         section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
         lost = [other["lost"] for other in sections if "lost" in other]
         if len(lost) == len(claims):
             section["lost"] = {
                 side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]
             }
-        most, whole = zip(*(one.shares_from(section) for one in found), strict=True)
+        most, whole = zip(*(one.shares_from(section) for one in attractions), strict=True)
     else:
         section["starts"] = weakest.section["starts"]
         most, whole = tuple(claim.shares for claim in claims), (True,)
@@ -228,6 +216,34 @@ def weakest_of(claims: Sequence[Claim], found: Sequence[Attraction]) -> Claim:
         f" of {share:g} % of the starts the same is not proved for all, and 1 % may be"
     )
     return replace(joined, verdict="proved-on-cells", reason=reason)
+
+
+def _weakest_numbers(sections: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Join the sections of one claim: the largest counts, the least slope, the least expansion near the joint."""
+    section = dict(sections[0])
+    near = [other["near_joint"] for other in sections if "near_joint" in other]
+    section.pop("near_joint", None)
+    if len(near) == len(sections):
+        section["near_joint"] = {side: _weakest([other[side] for other in near]) for side in near[0]}
+    for count in ("max_rank", "throws", "jogs", "thinning"):
+        counts = [other[count] for other in sections if count in other]
+        if counts:
+            section[count] = max(counts)
+    if "least_slope" in section:
+        section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
+    return section
+
+
+def _farthest_start(
+    claims: Sequence[Claim], attractions: Sequence[Attraction], *, below_cells: bool
+) -> dict[str, float]:
+    """Return by side from where on the goal holds on all pieces; only on their cells, unless `below_cells` too."""
+    given = [claim.starts["from"] for claim in claims if isinstance(claim.starts, dict)]
+    if not below_cells:
+        given += [
+            {side: float(one.cover.grid.edges[int(side)][0][0]) for side in given[0]} for one in attractions
+        ]
+    return {side: max(each[side] for each in given) for side in given[0]}
 
 
 def _weakest(near: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -255,7 +271,7 @@ LADDER = (512, 2048, 8192, 32_768)
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What became of the goals on one box.
+    """The verdict on the goals for one box of scenes.
 
     Attributes
     ----------
@@ -272,11 +288,11 @@ class Outcome:
     counterexample : tuple of State
         The orbit that does it.
     piece : SceneBox or None
-        The scenes it was asked of; None for the scene as it is.
+        The scenes of the query; None for the scene as it is.
     noise : dict of str to str
         The noise.
     within : dict of str to str
-        Deviations that those of a single scene do not exceed, by quantity.
+        Bounds, by quantity, of the deviations of the single scene that refutes.
     """
 
     verdict: str
@@ -310,10 +326,9 @@ class Query:
 
     @classmethod
     def of(cls, scene: Scene, goals: tuple[Goal, ...]) -> Query:
-        """Put goals to a scene, without what a margin is not asked about.
+        """Ask goals of a scene without its own goal and scatter.
 
-        The scene's own goal is left out, so that a certificate says what was asked; and its scatter, because no
-        quantity deviates in a margin but those asked about.
+        A certificate then names the goals of the query; and in a margin no quantity deviates but those of the query.
         """
         tree = scene.as_dict()
         tree.pop("goal", None)
@@ -354,12 +369,12 @@ class Query:
             box = self.box(piece, noise)
             for base in self._bases():
                 coarse = self._coarse(box, bases, base)
-                found, answers = self._refined(coarse, box, finest, base)
+                attractors, answers = self._refined(coarse, box, finest, base)
                 missing = answers[-1]
                 if missing.verdict == "proved":
                     self.known["base"] = base
-                    return Outcome("proved", "", found, answers, piece=piece, noise=noise)
-                # finer cells where nothing attracts are needed only for starts that are not proved to come
+                    return Outcome("proved", "", attractors, answers, piece=piece, noise=noise)
+                # finer cells off the attracting ones are needed only for starts that are not proved to reach these
                 if missing.final or missing.verdict != "proved-on-cells":
                     break
         except AnswerError as error:
@@ -369,32 +384,32 @@ class Query:
             share = 100.0 * missing.shares["share"]
             laid = " laid down" if any(goal.laid for goal in self.goals) else ""
             reason = f"the goal is proved for {math.floor(10.0 * share) / 10.0:g} % of the starts{laid} only: {reason}"
-        if not (found.component >= 0).any():
+        if not (attractors.component >= 0).any():
             reason = f"{reason}: from some of them, parts may leave the arm"
-        return Outcome("undecided", reason, found, piece=piece, noise=noise)
+        return Outcome("undecided", reason, attractors, piece=piece, noise=noise)
 
     def _bases(self) -> tuple[int, ...]:
         """Cells per side outside what attracts: first as many as proved the goals last, or the fewest; then more."""
         return BASES[:1] if self.anywhere else BASES[BASES.index(self.known.get("base", BASE)) :]
 
     def _refined(
-        self, found: Attraction, box: ParameterBox, finest: int, base: int
+        self, attractors: Attraction, box: ParameterBox, finest: int, base: int
     ) -> tuple[Attraction, tuple[Answer, ...]]:
         """Refine what attracts until the goals are proved, or finer cells cannot do it."""
         for step in range(finest + 1):
             if step:
-                found = self._finer(found, box, step, base)
-            answers = self._each(found)
+                attractors = self._finer(attractors, box, step, base)
+            answers = self._each(attractors)
             missing = answers[-1]
-            if missing.verdict == "proved" or missing.final or not (found.component >= 0).any():
+            if missing.verdict == "proved" or missing.final or not (attractors.component >= 0).any():
                 break
-        return found, answers
+        return attractors, answers
 
-    def _each(self, found: Attraction) -> tuple[Answer, ...]:
-        """Prove one goal after the other, up to the first that is not: it comes last then."""
+    def _each(self, attractors: Attraction) -> tuple[Answer, ...]:
+        """Prove one goal after the other, up to the first that is not proved, which comes last."""
         answers: list[Answer] = []
         for goal in self.goals:
-            answers.append(prove(found, self.scene, goal))
+            answers.append(prove(attractors, self.scene, goal))
             if answers[-1].verdict != "proved":
                 break
         return tuple(answers)
@@ -406,17 +421,17 @@ class Query:
 
     def _coarse(self, box: ParameterBox, bases: int = len(BASES), base: int = BASE) -> Attraction:
         for cells in (base, *(more for more in BASES[:bases] if more > base)):
-            found = attraction(cover(box, cells, cuts(self.goals, box.lo.a.size), PIECES[0]))
-            if (found.component >= 0).any():
+            attractors = attraction(cover(box, cells, cuts(self.goals, box.lo.a.size), PIECES[0]))
+            if (attractors.component >= 0).any():
                 break
-        return found
+        return attractors
 
-    def _finer(self, found: Attraction, box: ParameterBox, step: int, base: int = BASE) -> Attraction:
+    def _finer(self, attractors: Attraction, box: ParameterBox, step: int, base: int = BASE) -> Attraction:
         """Cut what attracts into more cells; or everything, where a goal is about every start."""
         borders = cuts(self.goals, box.lo.a.size)
         if self.anywhere:
             return attraction(cover(box, LADDER[step], borders, PIECES[step]))
-        extents = found.cells.extents()
+        extents = attractors.cells.extents()
         total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
         for side, parts in extents.items():
             for lo, hi in parts:
@@ -438,38 +453,45 @@ class Query:
         reason = "no orbit is found that violates it"
         try:
             box = self.box(piece, noise)
-            found = self._coarse(box)
+            attractors = self._coarse(box)
         except AnswerError as error:
             return Outcome("impossible", _said(error), piece=piece, noise=noise)
         for goal in self.goals:
-            answer = self._against(found, goal)
+            answer = self._against(attractors, goal)
             if answer.verdict == "refuted":
                 return Outcome(
-                    "refuted", answer.reason, found, (answer,), goal, answer.counterexample, piece, noise
+                    "refuted",
+                    answer.reason,
+                    attractors,
+                    answers=(answer,),
+                    refuted=goal,
+                    counterexample=answer.counterexample,
+                    piece=piece,
+                    noise=noise,
                 )
             reason = answer.reason or reason
-        return Outcome("undecided", reason, found, piece=piece, noise=noise)
+        return Outcome("undecided", reason, attractors, piece=piece, noise=noise)
 
-    def _against(self, found: Attraction, goal: Goal) -> Answer:
-        """Search for what refutes one goal: where throws differ, for the worst that they can do."""
+    def _against(self, attractors: Attraction, goal: Goal) -> Answer:
+        """Search for an orbit that refutes one goal: with noise, for the worst sequence of throws."""
         wrong = goal.wrong()
         if isinstance(goal, Reaches) and not goal.every_orbit:
-            # refuted by where attracting cells end; a periodic orbit that attracts is not looked for each time
-            finer = self._finer(found, found.cover.box, 2)
+            # the ends of the attracting cells refute it; the search for an attracting cycle would take too long here
+            finer = self._finer(attractors, attractors.cover.box, 2)
             finer = narrowed(finer, starts_in(finer, goal.laid)[0]) if goal.laid else finer
             return laid_only(falls_short(finer, goal) or undecided(""), finer, goal.laid)
-        if wrong is None or not found.cover.box.noise or goal.from_anywhere:
-            return prove_or_refute(found, self.scene, goal)
-        answer = prove(found, self.scene, goal)
-        found = narrowed(found, starts_in(found, goal.laid)[0]) if goal.laid else found
-        if not (found.component >= 0).any():
+        if wrong is None or not attractors.cover.box.noise or goal.from_anywhere:
+            return prove_or_refute(attractors, self.scene, goal)
+        answer = prove(attractors, self.scene, goal)
+        attractors = narrowed(attractors, starts_in(attractors, goal.laid)[0]) if goal.laid else attractors
+        if not (attractors.component >= 0).any():
             return answer
-        return laid_only(against(worst_orbit(found, wrong), answer.reason), found, goal.laid)
+        return laid_only(against(worst_orbit(attractors, wrong), answer.reason), attractors, goal.laid)
 
 
 def joined_claims(pieces: Sequence[Outcome]) -> tuple[Claim, ...]:
     """Join what is proved of several pieces: one claim for each goal, of the starts for which all of them prove it."""
-    found = [piece.found for piece in pieces if piece.found is not None]
+    attractions = [piece.found for piece in pieces if piece.found is not None]
     claims = [
         [
             Claim("goal", "proved", "", dict(one.section), starts=one.starts, shares=dict(one.shares))
@@ -477,7 +499,7 @@ def joined_claims(pieces: Sequence[Outcome]) -> tuple[Claim, ...]:
         ]
         for piece in pieces
     ]
-    return tuple(weakest_of(of_goal, found) for of_goal in zip(*claims, strict=True))
+    return tuple(weakest_of(of_goal, attractions) for of_goal in zip(*claims, strict=True))
 
 
 def unjoined(pieces: Sequence[Outcome]) -> str:

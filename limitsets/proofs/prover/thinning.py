@@ -15,7 +15,7 @@ most a share below 1 of what it was m throws ago, it is at most that share again
 bounds, all others left out, keep a share of themselves after one throw, they keep it after each.  So it is known long
 before whether bounds fall below 1.
 
-Cells of different groups are told apart: an orbit that goes from one group to another has left the first.
+Cells of different groups are kept apart: an orbit that goes from one group to another has left the first.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def _slopes(lo_map: Any, hi_map: Any, side: int, cuts: Any, out: Any) -> None:
             out[k, j] = slope.lo if proved else -1.0
 
 
-def least_slope(found: Cover, cells: CellSet) -> tuple[float, str]:
+def least_slope(cover: Cover, cells: CellSet) -> tuple[float, str]:
     """Lower bound of the slope on the given cells (the same for a jog, a flip and a roll), and where it is met.
 
     Returns
@@ -73,36 +73,36 @@ def least_slope(found: Cover, cells: CellSet) -> tuple[float, str]:
         The side and cell of the least slope.
     """
     least, place = np.inf, ""
-    for side, _, cuts, out in _pieces(found, cells):
+    for side, _, cuts, out in _pieces(cover, cells):
         k, j = divmod(int(out.argmin()), PIECES)
         if out[k, j] < least:
             least, place = float(out[k, j]), f"side {side}, x in [{cuts[k, j]:.6g}, {cuts[k, j + 1]:.6g}]"
     return least, place
 
 
-def slopes(found: Cover, cells: CellSet) -> NDArray[np.float64]:
+def slopes(cover: Cover, cells: CellSet) -> NDArray[np.float64]:
     """Lower bounds of the slope on each of the given cells; nan on the others, -1 where nothing is proved."""
-    least = np.full(found.grid.n_cells, np.nan)
-    for side, k, _, out in _pieces(found, cells):
-        least[found.grid.offset[side] + k] = out.min(axis=1)
+    least = np.full(cover.grid.n_cells, np.nan)
+    for side, k, _, out in _pieces(cover, cells):
+        least[cover.grid.offset[side] + k] = out.min(axis=1)
     return least
 
 
-def _pieces(found: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any]]:
+def _pieces(cover: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any]]:
     """Per side: the cells, the cuts between their pieces, and a lower bound of the slope on each piece."""
-    for side, (edges,) in enumerate(found.grid.edges):
-        k = np.flatnonzero(cells.mask[found.grid.of_side(side)])
+    for side, (edges,) in enumerate(cover.grid.edges):
+        k = np.flatnonzero(cells.mask[cover.grid.of_side(side)])
         if not k.size:
             continue
         weights = np.arange(PIECES + 1) / PIECES
         cuts = edges[k][:, None] + weights * (edges[k + 1] - edges[k])[:, None]
         cuts[:, -1] = edges[k + 1]
         out = np.empty((k.size, PIECES))
-        _slopes(*found.box.bare, side, cuts, out)
-        lowest = found.box.lo
+        _slopes(*cover.box.bare, side, cuts, out)
+        lowest = cover.box.lo
         if isinstance(lowest, FullThrow) and entry_of(lowest.effects, Landing) is not None:
             # where another vertex may land the displacement is another function
-            late = ~(found.images[side].witness[1, k] <= lowest.bare.corner[side])
+            late = ~(cover.images[side].witness[1, k] <= lowest.bare.corner[side])
             out[late] = -1.0
         yield side, k, cuts, out
 
@@ -122,7 +122,7 @@ FIRST = 32
 # Tries to find bounds that keep a share of themselves.
 TRIES = 8
 
-# It is given up, too, where a bound has grown so large.
+# The proof is given up, too, where a bound has grown so large.
 HOPELESS = 1e100
 
 # Slopes are lessened by this share of them, and bounds enlarged, against rounding and so that others can confirm them.
@@ -130,14 +130,14 @@ SLACK = 2.0**-20
 
 
 class DensityBound(NamedTuple):
-    """What became of the cells.
+    """The groups of cells that almost every start leaves, and those of which this is not proved.
 
     Attributes
     ----------
     throws : int
         After so many, or fewer, the bounds of every group that thins out are below 1.
     thick : ndarray of bool, shape (n_cells,)
-        Cells of the groups of which it is not proved.
+        Cells of the groups that are not proved to thin out.
     reason : str
         What is missing, empty if nothing.
     """
@@ -147,12 +147,12 @@ class DensityBound(NamedTuple):
     reason: str
 
 
-def perron_frobenius_bound(found: Cover, cells: Mask, group: NDArray[np.int32] | None = None) -> DensityBound:
+def perron_frobenius_bound(cover: Cover, cells: Mask, group: NDArray[np.int32] | None = None) -> DensityBound:
     """Prove that almost every start leaves the cells.
 
     Parameters
     ----------
-    found : Cover
+    cover : Cover
         Cells and images.
     cells : ndarray of bool, shape (n_cells,)
         The cells to be left; an image that leads elsewhere has left.
@@ -165,26 +165,26 @@ def perron_frobenius_bound(found: Cover, cells: Mask, group: NDArray[np.int32] |
     """
     of = np.zeros(cells.size, np.int64) if group is None else np.unique(group, return_inverse=True)[1]
     thick = np.zeros(of.max(initial=0) + 1, dtype=bool)
-    steep = slopes(found, CellSet(found.grid, cells))
+    steep = slopes(cover, CellSet(cover.grid, cells))
     flat = np.flatnonzero(cells & ~(steep > 0.0))
     thick[of[flat]] = True
     if flat.size:
-        reason = f"the slope is not proved positive on {found.place(int(flat[0]))}"
-    elif any(branch not in (0, 1) for images in found.images for _, branch in images.hulls):
+        reason = f"the slope is not proved positive on {cover.place(int(flat[0]))}"
+    elif any(branch not in (0, 1) for images in cover.images for _, branch in images.hulls):
         thick[:] = True
         reason = "some throws roll on, and of these it is not proved in this version that they thin out"
     else:
         reason = ""
-    throws = _rounds(found, cells & ~thick[of], steep, of, thick)
+    throws = _rounds(cover, cells & ~thick[of], steep, of, thick)
     if not reason and thick[of[cells]].any():
         reason = f"after {throws} throws the orbits that have not left are not proved to thin out"
     return DensityBound(throws, cells & thick[of], reason)
 
 
-def _rounds(found: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np.int64], thick: Mask) -> int:
+def _rounds(cover: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np.int64], thick: Mask) -> int:
     """Bound the densities throw by throw; mark the groups that do not thin out, and count the throws of the others."""
     number = np.flatnonzero(left)
-    thrown = _Thrown(_stretches(found, left, number, of), (1.0 + SLACK) / steep[number])
+    thrown = _Thrown(_stretches(cover, left, number, of), (1.0 + SLACK) / steep[number])
     names, group = np.unique(of[number], return_inverse=True)
     waiting, largest_of = np.ones(names.size, dtype=bool), _LargestOf(group)
     bound, earlier, since = np.ones(number.size), np.zeros(number.size), 0
@@ -253,20 +253,20 @@ class _Stretches(NamedTuple):
     target: NDArray[np.int64]
 
 
-def _stretches(found: Cover, left: Mask, number: NDArray[np.int64], of: NDArray[np.int64]) -> _Stretches:
+def _stretches(cover: Cover, left: Mask, number: NDArray[np.int64], of: NDArray[np.int64]) -> _Stretches:
     """Find the stretches among the cells left, `number`, within their groups.
 
     Images of neighbours overlap, so a stretch is told by its ends: where the image of a cell meets a target and that
     of the cell before it, or behind it, does not.  There are far fewer of these than of cells and targets that meet.
     """
     new = np.ones(number.size, dtype=bool)
-    new[1:] = (np.diff(number) > 1) | np.isin(number[1:], found.grid.offset)
+    new[1:] = (np.diff(number) > 1) | np.isin(number[1:], cover.grid.offset)
     run = np.cumsum(new)
     new[1:] |= np.diff(of[number]) != 0
     apart = np.append(new, True)
     parts = []
     for branch in (0, 1):
-        ends = targets(found, branch)[number].astype(np.int64)
+        ends = targets(cover, branch)[number].astype(np.int64)
         pairs = [_only_here(ends, apart[:-1], 1), _only_here(ends, apart[1:], -1)]
         kept = [left[to] & (of[to] == of[number[source]]) for source, to in pairs]
         (first, to), (last, _) = (

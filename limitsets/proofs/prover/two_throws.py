@@ -178,18 +178,18 @@ class TwoThrows(NamedTuple):
     second: int
 
 
-def kinds_of_two_throws(found: Attraction, bad: Mask) -> Iterator[tuple[TwoThrows, Array]]:
+def kinds_of_two_throws(attraction: Attraction, bad: Mask) -> Iterator[tuple[TwoThrows, Array]]:
     """Two throws from attracting cells that may end in bad ones, and the ranges of both angles, shape (2, 2)."""
-    grid, ways = found.cover.grid, (targets(found.cover, JOG), targets(found.cover, FLIP))
-    angles = np.concatenate([images.witness for images in found.cover.images], axis=1)
-    attracting = found.component >= 0
+    grid, ways = attraction.cover.grid, (targets(attraction.cover, JOG), targets(attraction.cover, FLIP))
+    angles = np.concatenate([images.witness for images in attraction.cover.images], axis=1)
+    attracting = attraction.component >= 0
 
     def before(cells: Mask, branch: int) -> Mask:
         """Attracting cells one throw before some."""
         begin, end = ways[branch].T
         number = np.concatenate([[0], np.cumsum(cells)])
-        found: Mask = attracting & (begin >= 0) & (number[end + 1] > number[begin])
-        return found
+        earlier: Mask = attracting & (begin >= 0) & (number[end + 1] > number[begin])
+        return earlier
 
     for second in (JOG, FLIP):
         last = before(bad, second)
@@ -204,12 +204,12 @@ def kinds_of_two_throws(found: Attraction, bad: Mask) -> Iterator[tuple[TwoThrow
                     yield TwoThrows(side, first, second), np.array(ranges)
 
 
-def stays_below(found: Attraction, scene: Scene, bad: Mask, x: float) -> bool:
+def stays_below(attraction: Attraction, scene: Scene, bad: Mask, x: float) -> bool:
     """Prove that no second throw from attracting cells, with the same parameters, leads beyond x to cells called bad.
 
     Parameters
     ----------
-    found : Attraction
+    attraction : Attraction
         Cells and images of a box of parameters; throws may land anywhere within the noise of the landing place.
     scene : Scene
         The scene.
@@ -223,11 +223,11 @@ def stays_below(found: Attraction, scene: Scene, bad: Mask, x: float) -> bool:
     bool
         Whether it is proved.
     """
-    box = found.cover.box
+    box = attraction.cover.box
     if box.effects or {"throw.speed", "gravity.tilt"} & box.noise.keys():
         return False  # nothing is the same at two throws
     boxes = _Boxes(box, scene, x)
-    return boxes.wide and all(boxes.settled(*each) for each in kinds_of_two_throws(found, bad))
+    return boxes.wide and all(boxes.settled(*each) for each in kinds_of_two_throws(attraction, bad))
 
 
 class _Boxes:
@@ -368,12 +368,12 @@ def _weights(values: list[Intervals], slopes: list[list[Intervals]], half: Array
             (none, none, handed),
             (-handed * steep[3, FIRST] / steep[1, FIRST], none, handed),
         ]
-    best, found = np.full(half.shape[1], np.inf), np.zeros((3, half.shape[1]))
+    best, chosen = np.full(half.shape[1], np.inf), np.zeros((3, half.shape[1]))
     for weights in map(np.array, some):
         good = np.isfinite(weights).all(axis=0) & (weights[:2] >= 0.0).all(axis=0)
         tried = np.where(good, weights, 0.0)
         loose = np.abs(steep[0] + (tried[:, None] * steep[1:]).sum(axis=0)) * half
         bound = at[0] + (tried * at[1:]).sum(axis=0) + loose.sum(axis=0)
         better = bound < best
-        best, found = np.where(better, bound, best), np.where(better, tried, found)
-    return [Intervals(each, each) for each in found]
+        best, chosen = np.where(better, bound, best), np.where(better, tried, chosen)
+    return [Intervals(each, each) for each in chosen]

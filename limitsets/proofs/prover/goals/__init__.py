@@ -42,7 +42,7 @@ __all__ = [
     "sentence",
 ]
 
-# A goal of whose starts so small a share is open, while others leave, is not asked again with finer cells.
+# If some starts leave and no more than this share is open, finer cells are not tried.
 LITTLE = 1e-3
 
 WHOLE = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
@@ -58,7 +58,7 @@ KINDS: dict[str, Kind] = {
 """What proves each goal, by its word."""
 
 
-def _nothing(found: Attraction, scene: Scene, goal: Goal) -> Answer:
+def _nothing(attraction: Attraction, scene: Scene, goal: Goal) -> Answer:
     return undecided(f"nothing proves {goal.kind} in this version", final=True)
 
 
@@ -75,12 +75,12 @@ def rechecked(goal: Goal) -> bool:
     return _kind(goal).rechecked
 
 
-def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
+def prove(attraction: Attraction, scene: Scene, goal: Goal) -> Answer:
     """Prove a goal, and say for which starts; or say what is missing.
 
     Parameters
     ----------
-    found : Attraction
+    attraction : Attraction
         What is proved of where starts end.
     scene : Scene
         The scene.
@@ -102,51 +102,51 @@ def prove(found: Attraction, scene: Scene, goal: Goal) -> Answer:
         raise unknown_goal(goal)
     kind = _kind(goal)
     if goal.laid:
-        return prove_laid(found, scene, goal, kind)
-    answer = kind.prove(found, scene, goal)
+        return prove_laid(attraction, scene, goal, kind)
+    answer = kind.prove(attraction, scene, goal)
     if answer.verdict != "proved":
         return answer
     if goal.from_anywhere and not goal.of_every_start:  # of every start, as its kind proves it
         starts = "almost-every" if kind.almost(goal) else "every"
         return answer._replace(section={**answer.section, "starts": starts}, starts=starts, shares=WHOLE)
-    return _for_starts(found, answer, almost=kind.almost(goal))
+    return _for_starts(attraction, answer, almost=kind.almost(goal))
 
 
-def prove_or_refute(found: Attraction, scene: Scene, goal: Goal) -> Answer:
+def prove_or_refute(attraction: Attraction, scene: Scene, goal: Goal) -> Answer:
     """Prove a goal, as `prove`; where it is not proved, search for what refutes it."""
-    answer = prove(found, scene, goal)
+    answer = prove(attraction, scene, goal)
     if answer.verdict == "proved":
         return answer
     if goal.laid:
-        found = narrowed(found, starts_in(found, goal.laid)[0])
-    against = _kind(goal).refute(found, scene, goal)
+        attraction = narrowed(attraction, starts_in(attraction, goal.laid)[0])
+    against = _kind(goal).refute(attraction, scene, goal)
     if goal.laid:
-        against = laid_only(against, found, goal.laid)
+        against = laid_only(against, attraction, goal.laid)
     if against.verdict == "refuted":
         return against._replace(reason=against.reason or answer.reason)
     return answer
 
 
-def _for_starts(found: Attraction, answer: Answer, *, almost: bool) -> Answer:
+def _for_starts(attraction: Attraction, answer: Answer, *, almost: bool) -> Answer:
     """Say for which starts a goal holds that is proved of the attracting cells."""
-    basin, starts = found.basin, found.basin.starts
+    basin, starts = attraction.basin, attraction.basin.starts
     shares, missing = basin.shares, basin.missing
     if almost:
         starts = "almost-every" if starts == "every" else starts
-        flat = not_null(found) if starts != "cells" else ""
+        flat = not_null(attraction) if starts != "cells" else ""
         if starts == "cells" or flat:
             starts, missing = "cells", missing or flat
-            shares = found.shares
+            shares = attraction.shares
     section: dict[str, Any] = {**answer.section, "starts": starts}
     if isinstance(starts, dict):
         section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
-        if found.cover.box.landing > 0.0:
+        if attraction.cover.box.landing > 0.0:
             finite = ((side, float(x)) for side, x in enumerate(basin.explained) if np.isfinite(x))
             section["lost"] = {str(side): x.hex() for side, x in finite}
     if basin.thinning:
         section["thinning"] = basin.thinning
     if basin.near:
-        section["near_joint"] = near_section(found)
+        section["near_joint"] = near_section(attraction)
     if starts != "cells":
         return answer._replace(section=section, starts=starts, shares=shares)
     # finer cells do not bring back starts that leave

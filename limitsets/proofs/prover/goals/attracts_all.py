@@ -19,30 +19,30 @@ TWO_BASINS = (
 )
 
 
-def _prove(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
-    several = int(found.component.max(initial=-1)) + 1
+def _prove(attraction: Attraction, _: Scene, goal: AttractsAll) -> Answer:
+    several = int(attraction.component.max(initial=-1)) + 1
     if several > 1:  # each is mapped into itself, however fine the cells are
         reason = f"{several} attracting components are each mapped into themselves: none takes every start"
         return undecided(reason, final=True)
-    missing = common(found, anywhere=False)
+    missing = common(attraction, anywhere=False)
     if missing:
         return undecided(missing)
-    if found.basin.creeps:
+    if attraction.basin.creeps:
         return undecided(TWO_BASINS, final=True)
-    starts = found.basin.starts
+    starts = attraction.basin.starts
     if goal.laid:
-        starts = "almost-every" if found.basin.thinning else "every"
+        starts = "almost-every" if attraction.basin.thinning else "every"
     if starts != "every" and (goal.from_anywhere or starts != "almost-every"):
-        return undecided(found.missing)
+        return undecided(attraction.missing)
     return Answer("proved", "", {"kind": goal.kind})
 
 
-def _refute(found: Attraction, _: Scene, goal: AttractsAll) -> Answer:
-    if found.basin.creeps:
-        side = int(np.argmax([point.lo for point in found.cover.points]))
-        x = 0.5 * (float(found.cover.box.bare[1].a[side]) + found.cover.points[side].lo)
+def _refute(attraction: Attraction, _: Scene, goal: AttractsAll) -> Answer:
+    if attraction.basin.creeps:
+        side = int(np.argmax([point.lo for point in attraction.cover.points]))
+        x = 0.5 * (float(attraction.cover.box.bare[1].a[side]) + attraction.cover.points[side].lo)
         return against(Refutation((State(x, x, side, None),), "almost-every"), TWO_BASINS)
-    return once(start_that_leaves(found, goal.laid), found.missing)
+    return once(start_that_leaves(attraction, goal.laid), attraction.missing)
 
 
 def _sentence(_: Mapping[str, Any]) -> str:

@@ -31,47 +31,49 @@ from limitsets.systems.maps import codes
 AGAINST = "a flip leads from each side to the one that is next in number, and the last one's to side 0"
 
 
-def _prove(found: Attraction, _: Scene, goal: FlipOrder) -> Answer:
-    missing = common(found, anywhere=False)
+def _prove(attraction: Attraction, _: Scene, goal: FlipOrder) -> Answer:
+    missing = common(attraction, anywhere=False)
     if missing:
         return undecided(missing)
-    inside = found.component >= 0
+    inside = attraction.component >= 0
     if len(goal.order) == 1 and not goal.from_anywhere:
         here = np.zeros_like(inside)
-        here[found.cover.grid.of_side(goal.order[0])] = True
+        here[attraction.cover.grid.of_side(goal.order[0])] = True
         if not (inside & ~here).any():
             return Answer("proved", "", {"kind": goal.kind, "order": list(goal.order), "jogs": 0})
-    if not _is_cycle(goal.order, found.cover.grid.sides):
+    if not _is_cycle(goal.order, attraction.cover.grid.sides):
         return undecided(AGAINST, final=True)
-    if goal.from_anywhere and found.missing:
-        return undecided(found.missing, final=found.cover.box.landing > 0.0 and not goal.laid)
-    if any((ends[inside, 0] >= 0).any() for ends in _rolls(found)):
+    if goal.from_anywhere and attraction.missing:
+        return undecided(attraction.missing, final=attraction.cover.box.landing > 0.0 and not goal.laid)
+    if any((ends[inside, 0] >= 0).any() for ends in _rolls(attraction)):
         return undecided(
             "parts may roll on to other sides than the next, in this version no order is proved then"
         )
-    visits, left = throws_to_reach(found, inside, np.zeros_like(inside), codes.JOG)
+    visits, left = throws_to_reach(attraction, inside, np.zeros_like(inside), codes.JOG)
     if left.size:
-        return undecided(f"orbits may jog for ever on {found.cover.place(int(left[0]))}")
+        return undecided(f"orbits may jog for ever on {attraction.cover.place(int(left[0]))}")
     section = {"kind": goal.kind, "order": list(goal.order), "jogs": max(visits - 1, 0)}
     return Answer("proved", "", section | ({"from_anywhere": True} if goal.from_anywhere else {}))
 
 
-def _refute(found: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
-    if common(found, anywhere=False):
-        return undecided(common(found, anywhere=False))
+def _refute(attraction: Attraction, scene: Scene, goal: FlipOrder) -> Answer:
+    if common(attraction, anywhere=False):
+        return undecided(common(attraction, anywhere=False))
 
     def otherwise(loop: Loop) -> bool:
         return meets(loop, goal.laid) and _flips_otherwise(loop, goal.order)
 
-    if not _is_cycle(goal.order, found.cover.grid.sides):
-        return against(cycle_that(found, scene, otherwise), AGAINST)
-    return against(cycle_that(found, scene, lambda loop: meets(loop, goal.laid) and not loop.branches.any()))
+    if not _is_cycle(goal.order, attraction.cover.grid.sides):
+        return against(cycle_that(attraction, scene, otherwise), AGAINST)
+    return against(
+        cycle_that(attraction, scene, lambda loop: meets(loop, goal.laid) and not loop.branches.any())
+    )
 
 
-def _rolls(found: Attraction) -> list[NDArray[np.int32]]:
+def _rolls(attraction: Attraction) -> list[NDArray[np.int32]]:
     """Target cells of all branches but jog and flip."""
-    others = {of for images in found.cover.images for _, of in images.hulls} - {codes.JOG, codes.FLIP}
-    return [targets(found.cover, branch) for branch in sorted(others)]
+    others = {of for images in attraction.cover.images for _, of in images.hulls} - {codes.JOG, codes.FLIP}
+    return [targets(attraction.cover, branch) for branch in sorted(others)]
 
 
 def _is_cycle(order: tuple[int, ...], sides: int) -> bool:

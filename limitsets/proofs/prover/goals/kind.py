@@ -28,7 +28,7 @@ Mask = NDArray[np.bool_]
 
 
 class Answer(NamedTuple):
-    """What became of a goal; the words are those of `limitsets.proofs.prover.certifying.Claim`."""
+    """The verdict on a goal; the words are those of `limitsets.proofs.prover.certifying.Claim`."""
 
     verdict: str
     reason: str = ""
@@ -75,7 +75,7 @@ def undecided(reason: str, *, final: bool = False) -> Answer:
 
 
 def against(refutation: Refutation, reason: str = "") -> Answer:
-    """Answer by a refutation: `starts` of which it is not true; undecided if it is empty."""
+    """Answer by a refutation, with the starts for which the goal fails; undecided if the refutation is empty."""
     if not refutation.of:
         return undecided(reason)
     states, of, recurs = refutation
@@ -83,37 +83,39 @@ def against(refutation: Refutation, reason: str = "") -> Answer:
 
 
 def once(orbit: tuple[State, ...], reason: str = "") -> Answer:
-    """Answer by one passage, which refutes what is asked of every start on the arm; undecided without one."""
+    """Answer by one passage, which refutes a goal about every start on the arm; undecided without one."""
     return against(Refutation(orbit, "every", {"once": True}) if orbit else Refutation(), reason)
 
 
-def common(found: Attraction, *, anywhere: bool) -> str:
-    """Say what is missing that every goal needs: attracting cells, or that no start leaves; empty if nothing."""
+def common(attraction: Attraction, *, anywhere: bool) -> str:
+    """Say which need of every goal is not proved: attracting cells, or that no start leaves; empty if all are."""
     if not anywhere:
-        return "" if (found.component >= 0).any() else "there are no attracting cells"
-    if found.cover.points:
+        return "" if (attraction.component >= 0).any() else "there are no attracting cells"
+    if attraction.cover.points:
         return BELOW
-    for side, near in enumerate(found.joint):
+    for side, near in enumerate(attraction.joint):
         if not near.proved:
             return f"near the joint on side {side}: {near.reason}"
-    leaving = np.flatnonzero(found.cover.graph.ranges.exits)
-    return f"the image of {found.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
+    leaving = np.flatnonzero(attraction.cover.graph.ranges.exits)
+    return (
+        f"the image of {attraction.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
+    )
 
 
 def begins(section: Mapping[str, Any]) -> str:
-    """Say where the orbits begin that a goal from anywhere speaks of."""
+    """Say where orbits begin in a goal about every start on the arm."""
     laid = isinstance(section.get("starts"), dict)
     return "where they are laid down" if laid else "anywhere on the arm"
 
 
-def thrown_into(found: Attraction, bad: Mask) -> str:
+def thrown_into(attraction: Attraction, bad: Mask) -> str:
     """Name a cell from which a throw may land in one of some cells; empty if there is none."""
     number = np.concatenate([[0], np.cumsum(bad)])
-    for ends in everywhere(found.cover):
+    for ends in everywhere(attraction.cover):
         cells = np.flatnonzero(ends[:, 0] >= 0)
         hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
         if hit.size:
-            return found.cover.place(int(hit[0]))
+            return attraction.cover.place(int(hit[0]))
     return ""
 
 
@@ -136,13 +138,13 @@ def above(x: float) -> float:
 
 
 def throws_to_reach(
-    found: Attraction, cells: Mask, wanted: Mask, branch: int | None = None
+    attraction: Attraction, cells: Mask, wanted: Mask, branch: int | None = None
 ) -> tuple[int, NDArray[np.int64]]:
     """Count the throws after which every orbit from the cells has come to those wanted.
 
     Parameters
     ----------
-    found : Attraction
+    attraction : Attraction
         Cells and images.
     cells : ndarray of bool, shape (n_cells,)
         Where orbits begin.
@@ -158,24 +160,24 @@ def throws_to_reach(
     ndarray of int64
         Cells from which it is not proved.
     """
-    ranges = found.cover.graph.ranges if branch is None else _of_branch(found, branch)
+    ranges = attraction.cover.graph.ranges if branch is None else _of_branch(attraction, branch)
     owner = np.repeat(np.arange(cells.size), np.diff(ranges.first))
     ranges = ranges._replace(box=ranges.box.copy())
-    ranges.box[wanted[owner], RUN] = 0  # what has arrived goes no farther
+    ranges.box[wanted[owner], RUN] = 0  # an orbit that has arrived is followed no farther
     parts = strong_components(ranges)
     stay = (parts.recurrent[parts.label] | (ranges.exits > 0)) & ~wanted
     late = reach(ranges, parts, stay.astype(np.uint8)) > 0
     steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
     throws = int(steps[cells & ~late].max(initial=0))
-    # of one branch the last throw is one that is not followed
+    # with one branch given, the last throw is one of another branch
     return throws + (0 if branch is None else 1), np.flatnonzero(cells & late)
 
 
-def _of_branch(found: Attraction, branch: int) -> Ranges:
+def _of_branch(attraction: Attraction, branch: int) -> Ranges:
     """Target cells of one branch as ranges, with the exits of all."""
-    grid, ends = found.cover.grid, targets(found.cover, branch)
+    grid, ends = attraction.cover.grid, targets(attraction.cover, branch)
     some = ends[:, 0] >= 0
     side = grid.side_of(ends[some, 0]).astype(np.int32)
     lo, hi = (((ends[some, k] - grid.offset[side])[:, None]).astype(np.int32) for k in (0, 1))
     first = np.concatenate([[0], np.cumsum(some)])
-    return build(grid, first, side, lo, hi, found.cover.graph.ranges.exits)
+    return build(grid, first, side, lo, hi, attraction.cover.graph.ranges.exits)

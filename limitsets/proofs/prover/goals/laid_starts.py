@@ -1,7 +1,7 @@
 """A goal whose starts are ranges in which parts are laid down: what these starts can come to, and their shares.
 
-Nothing is asked of the rest of the arm: cells to which no orbit from the ranges can come count neither as starts nor as
-attracting cells.  Source: docs/certificates.md, "Parts that are laid down".
+The goal says nothing about the rest of the arm: cells to which no orbit from the ranges can come count neither as
+starts nor as attracting cells.  Source: docs/certificates.md, "Parts that are laid down".
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.images.enclosed import Enclosures
 from limitsets.systems.graph.ranges import RUN
 
-# Of whose starts so small a share is open, while others leave, finer cells are not asked.
+# If some starts leave and no more than this share is open, finer cells are not tried.
 LITTLE = 1e-3
 
 
-def starts_in(found: Attraction, laid: Laid) -> tuple[Mask, bool]:
+def starts_in(attraction: Attraction, laid: Laid) -> tuple[Mask, bool]:
     """Find the cells that meet the ranges, and whether the ranges lie in the cells as far as they lie on the arm."""
-    grid, box = found.cover.grid, found.cover.box
+    grid, box = attraction.cover.grid, attraction.cover.box
     meets, inside = np.zeros(grid.n_cells, dtype=bool), True
     for side, lo, hi in laid:
         (edges,) = grid.edges[side]
@@ -39,9 +39,9 @@ def starts_in(found: Attraction, laid: Laid) -> tuple[Mask, bool]:
     return meets, inside
 
 
-def reached_from(found: Attraction, cells: Mask) -> Mask:
+def reached_from(attraction: Attraction, cells: Mask) -> Mask:
     """Return the cells to which an orbit from the given ones can come, these included."""
-    met, new, ways = cells.copy(), cells.copy(), everywhere(found.cover)
+    met, new, ways = cells.copy(), cells.copy(), everywhere(attraction.cover)
     while new.any():
         marks = np.zeros(met.size + 1, dtype=np.int64)
         for ends in ways:
@@ -53,9 +53,9 @@ def reached_from(found: Attraction, cells: Mask) -> Mask:
     return met
 
 
-def narrowed(found: Attraction, cells: Mask) -> Attraction:
+def narrowed(attraction: Attraction, cells: Mask) -> Attraction:
     """Keep what orbits from some cells can come to: other cells have no images, and neither attract nor recur."""
-    keep, cover = reached_from(found, cells), found.cover
+    keep, cover = reached_from(attraction, cells), attraction.cover
     grid, ranges = cover.grid, cover.graph.ranges
     images = []
     for side, one in enumerate(cover.images):
@@ -69,9 +69,9 @@ def narrowed(found: Attraction, cells: Mask) -> Attraction:
     targets[~keep[np.repeat(np.arange(grid.n_cells), np.diff(ranges.first))], RUN] = 0
     leaving = np.where(keep, ranges.exits, 0).astype(np.uint8)
     graph = TransitionGraph(cover.graph.map, grid, ranges._replace(box=targets, exits=leaving), "boxes")
-    of = np.where(keep, found.component, -1)
+    of = np.where(keep, attraction.component, -1)
     component = np.where(of >= 0, np.searchsorted(np.unique(of[of >= 0]), of), -1).astype(np.int32)
-    again = CellSet(grid, found.unresolved.mask & keep)
+    again = CellSet(grid, attraction.unresolved.mask & keep)
     reason = ""
     if len(again):
         reason = f"{len(again)} recurrent cells do not attract: first {cover.place(again.numbers()[0])}"
@@ -87,25 +87,25 @@ def narrowed(found: Attraction, cells: Mask) -> Attraction:
         reason,
         again,
     )
-    basin = found.basin
+    basin = attraction.basin
     thinning = basin.thinning if (basin.thin & keep).any() else 0
-    # in place of what it would find of all cells
+    # in place of the basin of all cells
     vars(part)["basin"] = replace(
         basin, rank=np.where(keep, basin.rank, -1), thinning=thinning, near=True, creeps=0.0
     )
     return part
 
 
-def prove_laid(found: Attraction, scene: Scene, goal: Goal, kind: Kind) -> Answer:
+def prove_laid(attraction: Attraction, scene: Scene, goal: Goal, kind: Kind) -> Answer:
     """Prove a goal of the starts that are laid down, all or those in some cells; or say what is missing."""
-    meets, inside = starts_in(found, goal.laid)
-    good = meets & (found.basin.rank >= 0)
-    missing = found.basin.missing if (meets & ~good).any() else ""
+    meets, inside = starts_in(attraction, goal.laid)
+    good = meets & (attraction.basin.rank >= 0)
+    missing = attraction.basin.missing if (meets & ~good).any() else ""
     if not inside:
         missing = missing or "parts are laid down nearer to the joint than the first cells"
     if not good.any():
         return undecided(missing or "no start that is laid down lies in the cells")
-    part = narrowed(found, good)
+    part = narrowed(attraction, good)
     answer = kind.prove(part, scene, goal)
     if answer.verdict != "proved":
         return laid_only(answer, part, goal.laid)
@@ -118,7 +118,7 @@ def prove_laid(found: Attraction, scene: Scene, goal: Goal, kind: Kind) -> Answe
     section: dict[str, Any] = {**answer.section, "starts": {"within" if whole else "cells": hexed(goal.laid)}}
     if part.basin.thinning and not anywhere:
         section["thinning"] = part.basin.thinning
-    shares = _shares(found, good, goal.laid)
+    shares = _shares(attraction, good, goal.laid)
     if whole:
         shares = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
         return answer._replace(section=section, starts={"within": spans}, shares=shares)
@@ -134,10 +134,10 @@ def hexed(laid: Laid) -> dict[str, list[list[str]]]:
     return {side: [[end.hex() for end in pair] for pair in pairs] for side, pairs in by_side(laid).items()}
 
 
-def _shares(found: Attraction, good: Mask, laid: Laid) -> dict[str, float]:
+def _shares(attraction: Attraction, good: Mask, laid: Laid) -> dict[str, float]:
     """Shares of the ranges that are claimed, leave, creep to the joint, and are open."""
-    grid, basin, box = found.cover.grid, found.basin, found.cover.box
-    gone = leaving_cells(found.cover) if box.landing == 0.0 else np.zeros_like(good)
+    grid, basin, box = attraction.cover.grid, attraction.basin, attraction.cover.box
+    gone = leaving_cells(attraction.cover) if box.landing == 0.0 else np.zeros_like(good)
     whole = claimed = left = before = 0.0
     for side, lo, hi in laid:
         (edges,), own = grid.edges[side], grid.of_side(side)
@@ -153,7 +153,7 @@ def _shares(found: Attraction, good: Mask, laid: Laid) -> dict[str, float]:
     return {"share": share, "leaves": gone_share, "creeps": crept, "open": rest}
 
 
-def laid_only(answer: Answer, found: Attraction, laid: Laid) -> Answer:
+def laid_only(answer: Answer, attraction: Attraction, laid: Laid) -> Answer:
     """Keep a refutation if an orbit or a component that refutes begins where parts are laid down, else nothing of it.
 
     Without ranges it is kept as it is.
@@ -166,8 +166,8 @@ def laid_only(answer: Answer, found: Attraction, laid: Laid) -> Answer:
     )
     number = answer.recurs.get("component")
     if number is not None:
-        meets: NDArray[np.bool_] = starts_in(found, laid)[0]
-        begins |= bool((meets & (found.component == number)).any())
+        meets: NDArray[np.bool_] = starts_in(attraction, laid)[0]
+        begins |= bool((meets & (attraction.component == number)).any())
     if begins:
         return answer
     other = "an orbit refutes it, and no start that is laid down is proved to come to that orbit"

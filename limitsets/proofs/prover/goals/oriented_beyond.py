@@ -31,33 +31,33 @@ from limitsets.proofs.prover.two_throws import stays_below
 from limitsets.systems.cells import CellSet
 
 
-def _exceptions(found: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
+def _exceptions(attraction: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
     """Cells that lie, in part, beyond x on another side."""
-    bad = np.zeros(found.component.size, dtype=bool)
-    for side, (edges,) in enumerate(found.cover.grid.edges):
+    bad = np.zeros(attraction.component.size, dtype=bool)
+    for side, (edges,) in enumerate(attraction.cover.grid.edges):
         if side != goal.side:
-            bad[found.cover.grid.of_side(side)] = edges[1:] > below(goal.x)
+            bad[attraction.cover.grid.of_side(side)] = edges[1:] > below(goal.x)
     return bad
 
 
-def _prove(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
-    missing = common(found, anywhere=goal.from_anywhere)
-    bad = _exceptions(found, goal)
+def _prove(attraction: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
+    missing = common(attraction, anywhere=goal.from_anywhere)
+    bad = _exceptions(attraction, goal)
     more: dict[str, Any] = {}
     if goal.from_anywhere:
-        reason = _thrown_there(found, goal, bad)
+        reason = _thrown_there(attraction, goal, bad)
         # above the joint no cells are near enough: say that, not that a throw from there may land anywhere
-        reason = missing if found.cover.points else reason or missing
+        reason = missing if attraction.cover.points else reason or missing
     else:
-        bad &= found.component >= 0
+        bad &= attraction.component >= 0
         cells = "1 attracting cell reaches" if bad.sum() == 1 else f"{bad.sum()} attracting cells reach"
         beyond = f"{cells} beyond x = {goal.x:g} {scene.unit} on other sides than {goal.side}"
         reason = missing or (beyond if bad.any() else "")
-        if reason and not missing and stays_below(found, scene, bad, below(goal.x)):
+        if reason and not missing and stays_below(attraction, scene, bad, below(goal.x)):
             reason, more = "", {"throws": 2}
     if reason:
         return undecided(reason)
-    ends = max(hi for parts in found.cells.extents().values() for _, hi in parts)
+    ends = max(hi for parts in attraction.cells.extents().values() for _, hi in parts)
     before = f"the attracting cells end at x = {ends:.6g} {scene.unit}, before x = {goal.x:g}"
     vacuous = f"{before}: the goal asks nothing of them"
     note = vacuous if ends <= goal.x and not goal.from_anywhere else ""
@@ -70,43 +70,43 @@ def section_of(goal: OrientedBeyond, scene: Scene) -> dict[str, Any]:
     return section | ({"from_anywhere": True} if goal.from_anywhere else {})
 
 
-def _refute(found: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
+def _refute(attraction: Attraction, scene: Scene, goal: OrientedBeyond) -> Answer:
     wrong = goal.wrong()
     if not goal.from_anywhere:
-        refutation = recurrent_violation(found, scene, wrong, goal.laid)
-        again = _again(found, goal) if refutation.of == "every" else {}
+        refutation = recurrent_violation(attraction, scene, wrong, goal.laid)
+        again = _again(attraction, goal) if refutation.of == "every" else {}
         if again:
             refutation = refutation._replace(of="almost-every", recurs={**refutation.recurs, **again})
         return against(refutation)
-    reason = _thrown_there(found, goal, _exceptions(found, goal))
-    return once(one_throw(found, wrong, laid=goal.laid) if reason else (), reason)
+    reason = _thrown_there(attraction, goal, _exceptions(attraction, goal))
+    return once(one_throw(attraction, wrong, laid=goal.laid) if reason else (), reason)
 
 
-def _again(found: Attraction, goal: OrientedBeyond) -> dict[str, int]:
+def _again(attraction: Attraction, goal: OrientedBeyond) -> dict[str, int]:
     """Find an attracting component almost every orbit of which violates the goal again and again.
 
     Almost every orbit leaves the cells of the component that do not violate the goal.  Where the slope is positive, a
     throw carries no set of positive length into one of length zero: so almost every orbit leaves them after each throw.
     """
-    bad = np.zeros(found.component.size, dtype=bool)
-    for side, (edges,) in enumerate(found.cover.grid.edges):
+    bad = np.zeros(attraction.component.size, dtype=bool)
+    for side, (edges,) in enumerate(attraction.cover.grid.edges):
         if side != goal.side:
-            bad[found.cover.grid.of_side(side)] = edges[:-1] >= above(goal.x)
-    for number in np.unique(found.component[bad & (found.component >= 0)]).tolist():
-        mine = found.component == number
-        if (slopes(found.cover, CellSet(found.cover.grid, mine))[mine] > 0.0).all():
-            throws, _, reason = perron_frobenius_bound(found.cover, mine & ~bad)
+            bad[attraction.cover.grid.of_side(side)] = edges[:-1] >= above(goal.x)
+    for number in np.unique(attraction.component[bad & (attraction.component >= 0)]).tolist():
+        mine = attraction.component == number
+        if (slopes(attraction.cover, CellSet(attraction.cover.grid, mine))[mine] > 0.0).all():
+            throws, _, reason = perron_frobenius_bound(attraction.cover, mine & ~bad)
             if not reason:
                 return {"component": number, "thinning": throws}
     return {}
 
 
-def _thrown_there(found: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
+def _thrown_there(attraction: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
     """Name a throw that may land beyond x on another side; empty if there is none."""
-    start = thrown_into(found, bad)
+    start = thrown_into(attraction, bad)
     if start:
         return f"a throw from {start} may land beyond x = {goal.x:g} on another side than {goal.side}"
-    for side, near in enumerate(found.joint):
+    for side, near in enumerate(attraction.joint):
         if (side != goal.side or near.rolls) and not near.reach <= below(goal.x):
             return f"a throw from near the joint on side {side} may land beyond x = {goal.x:g}"
     return ""

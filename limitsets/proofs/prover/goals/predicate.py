@@ -1,7 +1,7 @@
 """A predicate of the caller: of every attracting cell, or of every landing from anywhere on the arm.
 
-The caller's code is believed: no certificate can hold it, and nothing rechecks it.  An orbit refutes it where it says
-no at both ends and in the middle of what encloses the orbit's last state.
+The proof trusts the caller's code: no certificate can hold the code, and nothing rechecks it.  An orbit refutes the
+predicate if it is false at both ends and in the middle of the enclosure of the orbit's last state.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ def _good(goal: Predicate, lo: NDArray[np.float64], hi: NDArray[np.float64], sid
     return said
 
 
-def _bad_cells(found: Attraction, goal: Predicate) -> NDArray[np.bool_]:
-    grid = found.cover.grid
+def _bad_cells(attraction: Attraction, goal: Predicate) -> NDArray[np.bool_]:
+    grid = attraction.cover.grid
     parts = [_good(goal, edges[:-1], edges[1:], side) for side, (edges,) in enumerate(grid.edges)]
     return ~np.concatenate(parts)
 
 
-def _missing(found: Attraction, goal: Predicate) -> str:
+def _missing(attraction: Attraction, goal: Predicate) -> str:
     """Say where it is not proved; empty if it is."""
-    bad = _bad_cells(found, goal)
+    bad = _bad_cells(attraction, goal)
     if not goal.from_anywhere:
-        wrong = np.flatnonzero(bad & (found.component >= 0))
-        return f"{goal.name}: not on {found.cover.place(int(wrong[0]))}" if wrong.size else ""
-    start = thrown_into(found, bad)
+        wrong = np.flatnonzero(bad & (attraction.component >= 0))
+        return f"{goal.name}: not on {attraction.cover.place(int(wrong[0]))}" if wrong.size else ""
+    start = thrown_into(attraction, bad)
     if start:
         return f"{goal.name}: not where a throw from {start} may land"
-    foot = found.cover.box.bare[0].a
-    for side, near in enumerate(found.joint):
+    foot = attraction.cover.box.bare[0].a
+    for side, near in enumerate(attraction.joint):
         if near.empty:
             continue
         landing = np.array([foot[side]]), np.array([near.reach])
@@ -57,13 +57,13 @@ def _missing(found: Attraction, goal: Predicate) -> str:
     return ""
 
 
-def _prove(found: Attraction, _: Scene, goal: Predicate) -> Answer:
-    missing = common(found, anywhere=goal.from_anywhere)
-    reason = missing or _missing(found, goal)
+def _prove(attraction: Attraction, _: Scene, goal: Predicate) -> Answer:
+    missing = common(attraction, anywhere=goal.from_anywhere)
+    reason = missing or _missing(attraction, goal)
     return undecided(reason) if reason else Answer("proved", "", {"kind": goal.kind, "name": goal.name})
 
 
-def _refute(found: Attraction, scene: Scene, goal: Predicate) -> Answer:
+def _refute(attraction: Attraction, scene: Scene, goal: Predicate) -> Answer:
     def wrong(x: Any, side: Any) -> NDArray[np.bool_]:
         bad = np.zeros(x.shape, dtype=bool)
         for s in np.unique(side).tolist():
@@ -72,8 +72,8 @@ def _refute(found: Attraction, scene: Scene, goal: Predicate) -> Answer:
         return bad
 
     if not goal.from_anywhere:
-        return against(recurrent_violation(found, scene, wrong, goal.laid))
-    orbit = one_throw(found, wrong, laid=goal.laid)
+        return against(recurrent_violation(attraction, scene, wrong, goal.laid))
+    orbit = one_throw(attraction, wrong, laid=goal.laid)
     return once(orbit if orbit and _throughout(goal, orbit[-1]) else ())
 
 

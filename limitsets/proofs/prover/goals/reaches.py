@@ -29,70 +29,70 @@ from limitsets.proofs.prover.thinning import perron_frobenius_bound, slopes
 from limitsets.systems.cells import CellSet
 
 
-def _wanted(found: Attraction, goal: Reaches) -> Mask:
+def _wanted(attraction: Attraction, goal: Reaches) -> Mask:
     """Cells on the side that lie at x or beyond."""
-    wanted = np.zeros(found.component.size, dtype=bool)
-    edges = found.cover.grid.edges[goal.side][0]
-    wanted[found.cover.grid.of_side(goal.side)] = edges[:-1] >= above(goal.x)
+    wanted = np.zeros(attraction.component.size, dtype=bool)
+    edges = attraction.cover.grid.edges[goal.side][0]
+    wanted[attraction.cover.grid.of_side(goal.side)] = edges[:-1] >= above(goal.x)
     return wanted
 
 
-def _refute(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
+def _refute(attraction: Attraction, scene: Scene, goal: Reaches) -> Answer:
     every = goal.every_orbit
 
     def refutes(loop: Loop) -> bool:
         return (every or loop.attracts) and meets(loop, goal.laid) and not _arrives(loop, goal)
 
-    never = cycle_that(found, scene, refutes, attracting=not every)
-    short = falls_short(found, goal)
+    never = cycle_that(attraction, scene, refutes, attracting=not every)
+    short = falls_short(attraction, goal)
     if short is None:
         return against(never)
     return short._replace(counterexample=never.states) if never.states else short
 
 
-def _prove(found: Attraction, scene: Scene, goal: Reaches) -> Answer:
-    missing = common(found, anywhere=False)
+def _prove(attraction: Attraction, scene: Scene, goal: Reaches) -> Answer:
+    missing = common(attraction, anywhere=False)
     if missing:
         return undecided(missing)
-    wanted, inside = _wanted(found, goal), found.component >= 0
-    short = falls_short(found, goal)
+    wanted, inside = _wanted(attraction, goal), attraction.component >= 0
+    short = falls_short(attraction, goal)
     if short is not None:
         return short
     if goal.every_orbit:
-        return _every(found, scene, goal, wanted)
-    missing = (found.missing or not_null(found)) if goal.from_anywhere else ""
+        return _every(attraction, scene, goal, wanted)
+    missing = (attraction.missing or not_null(attraction)) if goal.from_anywhere else ""
     if missing:
-        return undecided(missing, final=found.cover.box.landing > 0.0 and not goal.laid)
-    throws, _, reason = perron_frobenius_bound(found.cover, inside & ~wanted)
+        return undecided(missing, final=attraction.cover.box.landing > 0.0 and not goal.laid)
+    throws, _, reason = perron_frobenius_bound(attraction.cover, inside & ~wanted)
     if reason:
         return undecided(reason)
     # a little more, so that other arithmetic can confirm it
     return Answer("proved", "", _section(scene, goal, throws + throws // 8 + 1))
 
 
-def not_null(found: Attraction) -> str:
+def not_null(attraction: Attraction) -> str:
     """Say what is missing for this: almost no start of the basin comes to a given set of length zero.
 
-    Where the slope is positive, what is thrown to a set of length zero has length zero.
+    Where the slope is positive, the starts that are thrown to a set of length zero have length zero.
     """
-    basin = found.basin
-    for side, near in enumerate(found.joint):
+    basin = attraction.basin
+    for side, near in enumerate(attraction.joint):
         if basin.near and not near.rises:
             return f"near the joint on side {side}: the landing is not proved to rise with the start"
-    off = (found.component < 0) & (basin.rank >= 0)
-    flat = np.flatnonzero(off & ~(slopes(found.cover, CellSet(found.cover.grid, off)) > 0.0))
-    return f"the slope is not proved positive on {found.cover.place(int(flat[0]))}" if flat.size else ""
+    off = (attraction.component < 0) & (basin.rank >= 0)
+    flat = np.flatnonzero(off & ~(slopes(attraction.cover, CellSet(attraction.cover.grid, off)) > 0.0))
+    return f"the slope is not proved positive on {attraction.cover.place(int(flat[0]))}" if flat.size else ""
 
 
-def _every(found: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answer:
-    missing = common(found, anywhere=True) if goal.from_anywhere else ""
-    cells = found.basin.rank >= 0 if goal.laid else np.ones_like(wanted)
-    cells = cells if goal.from_anywhere else found.component >= 0
-    throws, left = throws_to_reach(found, cells, wanted)
+def _every(attraction: Attraction, scene: Scene, goal: Reaches, wanted: Mask) -> Answer:
+    missing = common(attraction, anywhere=True) if goal.from_anywhere else ""
+    cells = attraction.basin.rank >= 0 if goal.laid else np.ones_like(wanted)
+    cells = cells if goal.from_anywhere else attraction.component >= 0
+    throws, left = throws_to_reach(attraction, cells, wanted)
     if left.size:
-        return undecided(f"an orbit from {found.cover.place(int(left[0]))} may never get there")
+        return undecided(f"an orbit from {attraction.cover.place(int(left[0]))} may never get there")
     if missing:
-        return undecided(missing, final=found.cover.box.landing > 0.0 and not goal.laid)
+        return undecided(missing, final=attraction.cover.box.landing > 0.0 and not goal.laid)
     return Answer("proved", "", _section(scene, goal, throws))
 
 
@@ -112,21 +112,24 @@ def _arrives(loop: Loop, goal: Reaches) -> bool:
     return bool(((loop.side == goal.side) & (loop.hi >= below(goal.x))).any())
 
 
-def falls_short(found: Attraction, goal: Reaches) -> Answer | None:
+def falls_short(attraction: Attraction, goal: Reaches) -> Answer | None:
     """Refute the goal by an attracting component that ends below x: no orbit in it gets there.
 
-    It is mapped into itself and has an interior: so many starts never get there.  The orbit is shown, not needed.
+    The component is mapped into itself and has an interior, so a set of starts of positive length never gets there.
+    The orbit is an illustration; the proof does not need it.
     """
-    edges = found.cover.grid.edges[goal.side][0]
-    reach = np.zeros(found.component.size, dtype=bool)
-    reach[found.cover.grid.of_side(goal.side)] = edges[1:] >= below(goal.x)
-    for number in range(int(found.component.max(initial=-1)) + 1):
-        mine = found.component == number
+    edges = attraction.cover.grid.edges[goal.side][0]
+    reach = np.zeros(attraction.component.size, dtype=bool)
+    reach[attraction.cover.grid.of_side(goal.side)] = edges[1:] >= below(goal.x)
+    for number in range(int(attraction.component.max(initial=-1)) + 1):
+        mine = attraction.component == number
         if not (mine & reach).any():
             cells = np.flatnonzero(mine)
-            reason = f"no orbit in the attracting component of {found.cover.place(int(cells[0]))} gets there"
+            reason = (
+                f"no orbit in the attracting component of {attraction.cover.place(int(cells[0]))} gets there"
+            )
             return against(
-                Refutation(sample_passage(found, cells), "almost-every", {"component": number}), reason
+                Refutation(sample_passage(attraction, cells), "almost-every", {"component": number}), reason
             )
     return None
 

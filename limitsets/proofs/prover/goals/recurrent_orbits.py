@@ -105,12 +105,12 @@ class Loop(NamedTuple):
     recurs: Mapping[str, Any]
 
 
-def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong, laid: Laid = ()) -> Refutation:
+def recurrent_violation(attraction: Attraction, scene: Scene, wrong: Wrong, laid: Laid = ()) -> Refutation:
     """Find an orbit that violates a goal again and again, and prove it.
 
     Parameters
     ----------
-    found : Attraction
+    attraction : Attraction
         Cells and images.
     scene : Scene
         The scene.
@@ -124,8 +124,8 @@ def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong, laid: Lai
     Refutation
         Empty if none is found.
     """
-    box = _quiet(found, scene)
-    for path in _paths(found, box):
+    box = _quiet(attraction, scene)
+    for path in _paths(attraction, box):
         bad = np.flatnonzero(wrong(path.x * MORE_THAN_ROUNDING, path.side))
         tried = TRIED if path.code.size > SHORT else FEW
         loop = cycle_near(
@@ -136,11 +136,11 @@ def recurrent_violation(found: Attraction, scene: Scene, wrong: Wrong, laid: Lai
             tried,
         )
         if loop is not None:
-            return _of(loop, box, found)
-    if not found.cover.box.noise or not (found.component >= 0).any():
+            return _of(loop, box, attraction)
+    if not attraction.cover.box.noise or not (attraction.component >= 0).any():
         return Refutation()
-    noisy = violating_path(found, wrong)
-    return Refutation() if noisy is None else closed(found.cover.box, noisy, wrong)
+    noisy = violating_path(attraction, wrong)
+    return Refutation() if noisy is None else closed(attraction.cover.box, noisy, wrong)
 
 
 def meets(loop: Loop, laid: Laid) -> bool:
@@ -150,7 +150,7 @@ def meets(loop: Loop, laid: Laid) -> bool:
 
 
 def cycle_that(
-    found: Attraction,
+    attraction: Attraction,
     scene: Scene,
     refutes: Callable[[Loop], bool],
     longest: int = PERIODS[0],
@@ -161,7 +161,7 @@ def cycle_that(
 
     Parameters
     ----------
-    found : Attraction
+    attraction : Attraction
         Cells and images.
     scene : Scene
         The scene.
@@ -177,50 +177,54 @@ def cycle_that(
     Refutation
         Empty if none is found.
     """
-    box = _quiet(found, scene)
+    box = _quiet(attraction, scene)
     if not box.effects:
-        quiet = replace(found, cover=replace(found.cover, box=box))
+        quiet = replace(attraction, cover=replace(attraction.cover, box=box))
         for cycle in () if attracting else proved_cycles(quiet, longest).cycles:
             loop = _loop(cycle)
             if refutes(loop):
-                return _of(loop, box, found)
-    for path in _paths(found, box):
+                return _of(loop, box, attraction)
+    for path in _paths(attraction, box):
         ends = np.arange(max(path.x.size - 2 * LONGEST, 0), max(path.x.size - LONGEST, 1))
         best = cycle_near(box, path, ends, refutes, FEW)
         if best is not None:
-            return _of(best, box, found)
+            return _of(best, box, attraction)
     return Refutation()
 
 
-def _quiet(found: Attraction, scene: Scene) -> ParameterBox:
+def _quiet(attraction: Attraction, scene: Scene) -> ParameterBox:
     """Return the scene's parameters without noise."""
-    box = found.cover.box
+    box = attraction.cover.box
     return parameter_box(scene, tree=box.scene) if box.noise else box
 
 
-def _paths(found: Attraction, box: ParameterBox) -> Iterator[Orbit]:
+def _paths(attraction: Attraction, box: ParameterBox) -> Iterator[Orbit]:
     """Long orbits where starts end: one in each attracting component that is met, and wherever else starts end."""
     map_now, met = box.at_kappa(box.middle_kappa), set()
-    if (found.component >= 0).any():
-        first = on_limit_set(found)
-        met.add(_component(found, *first))
+    if (attraction.component >= 0).any():
+        first = on_limit_set(attraction)
+        met.add(_component(attraction, *first))
         yield _lasting(map_now, *first, SEARCHED)
-    for side, (edges,) in enumerate(found.cover.grid.edges):
+    for side, (edges,) in enumerate(attraction.cover.grid.edges):
         for x in np.linspace(edges[0], edges[-1], OTHERS + 2)[1:-1].tolist():
-            last = _unmet(found, map_now, x, side, met)
+            last = _unmet(attraction, map_now, x, side, met)
             if last is None:
                 continue
-            met.add(_component(found, *last))
-            met.discard(-1)  # off the attracting cells any two may end in different places
+            met.add(_component(attraction, *last))
+            met.discard(
+                -1
+            )  # two starts whose orbits end off the attracting cells may end in different places
             yield _lasting(map_now, *last, SHORT)
 
 
-def _unmet(found: Attraction, map_now: Any, x: float, side: int, met: set[int]) -> tuple[float, int] | None:
+def _unmet(
+    attraction: Attraction, map_now: Any, x: float, side: int, met: set[int]
+) -> tuple[float, int] | None:
     """Where a start ends; None where it stops, or comes to an attracting component that was met: it stays there."""
     for count in (QUICK, SETTLING - QUICK):
         path = _lasting(map_now, x, side, count)
         x, side = float(path.x[-1]), int(path.side[-1])
-        if path.stopped is not None or _component(found, x, side) in met:
+        if path.stopped is not None or _component(attraction, x, side) in met:
             return None
     return x, side
 
@@ -236,10 +240,10 @@ def _lasting(map_now: Any, x: float, side: int, throws: int) -> Orbit:
     )
 
 
-def _component(found: Attraction, x: float, side: int) -> int:
+def _component(attraction: Attraction, x: float, side: int) -> int:
     """Return the number of the attracting component in which a place lies, -1 if in none."""
-    (cell,) = found.cover.grid.index([x], side)
-    return int(found.component[cell]) if cell >= 0 else -1
+    (cell,) = attraction.cover.grid.index([x], side)
+    return int(attraction.component[cell]) if cell >= 0 else -1
 
 
 def _violates(wrong: Wrong, lo: float, hi: float, side: int) -> bool:
@@ -373,9 +377,9 @@ def _continuous(box: ParameterBox) -> bool:
     return bool((box.bare[0].kappa > np.hypot(bare.a, bare.d) * (1.0 + 1e-12)).all())
 
 
-def _of(loop: Loop, box: ParameterBox, found: Attraction) -> Refutation:
-    """Put a periodic orbit as what refutes: its first point comes again at the end."""
-    kappa, landing = box.middle_kappa, 0.0 if found.cover.box.landing > 0.0 else None
+def _of(loop: Loop, box: ParameterBox, attraction: Attraction) -> Refutation:
+    """Make a refutation of a periodic orbit: its first point comes again at the end."""
+    kappa, landing = box.middle_kappa, 0.0 if attraction.cover.box.landing > 0.0 else None
     points = zip(loop.lo.tolist(), loop.hi.tolist(), loop.side.tolist(), strict=True)
     states = [State(lo, hi, side, kappa, landing) for lo, hi, side in points]
     last = replace(states[0], kappa=None, landing=None)

@@ -12,15 +12,15 @@ from limitsets.proofs.prover.goals.kind import Answer, Kind, common, once, undec
 from limitsets.proofs.prover.goals.violating_orbits import start_that_leaves
 
 
-def _prove(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
-    missing = common(found, anywhere=goal.from_anywhere)
+def _prove(attraction: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
+    missing = common(attraction, anywhere=goal.from_anywhere)
     if missing:
         return undecided(missing)
     return Answer("proved", "", {"kind": goal.kind} | ({"from_anywhere": True} if goal.from_anywhere else {}))
 
 
-def _refute(found: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
-    return once(start_that_leaves(found, goal.laid), found.missing)
+def _refute(attraction: Attraction, _: Scene, goal: StaysOnArm) -> Answer:
+    return once(start_that_leaves(attraction, goal.laid), attraction.missing)
 
 
 def _sentence(section: Mapping[str, Any]) -> str:

@@ -85,7 +85,7 @@ class Path(NamedTuple):
 def throw_choices(box: ParameterBox, kappas: int = CHOICES) -> list[ThrowChoice]:
     """List what a throw may be like: values of kappa across its noise, the ends and the middle of the landing's.
 
-    A little inside the bounds, so that each is one of the noise's whatever the last digit.
+    The ends lie slightly inside the bounds, so that rounding takes none of them out of the noise.
     """
     ends, shift = (box.lo.kappa, box.hi.kappa), box.landing * (1.0 - 1e-9)
     margin = 1e-9 * (ends[1] - ends[0])
@@ -108,7 +108,7 @@ class ThrownStates(NamedTuple):
 
 def throws(box: ParameterBox, x: Any, side: Any, options: list[ThrowChoice]) -> ThrownStates:
     """Images of all states under all choices."""
-    found = []
+    landings = []
     for kappa in sorted({option.kappa for option in options}):
         map_now = box.at_kappa(kappa)
         for s in np.unique(side).tolist():
@@ -120,8 +120,8 @@ def throws(box: ParameterBox, x: Any, side: Any, options: list[ThrowChoice]) -> 
                 if option.kappa == kappa:
                     after = got.x[landed] + option.landing
                     stays = (after > box.hi.a[to]) & (after <= box.lo.arm_length)
-                    found.append((after, to, state, np.full(to.size, number), stays))
-    return ThrownStates(*(np.concatenate(part) for part in zip(*found, strict=True)))
+                    landings.append((after, to, state, np.full(to.size, number), stays))
+    return ThrownStates(*(np.concatenate(part) for part in zip(*landings, strict=True)))
 
 
 def violation(thrown: ThrownStates, wrong: Wrong) -> NDArray[np.int64]:
@@ -170,34 +170,34 @@ class ReachedStates:
         return Path(x[order].tolist(), side[order].tolist(), [options[k] for k in choice[order[1:]]])
 
 
-def middle(found: Attraction, cells: NDArray[np.int64]) -> tuple[float, int]:
+def middle(attraction: Attraction, cells: NDArray[np.int64]) -> tuple[float, int]:
     """Middle of the middle one of some cells, and its side."""
     cell = int(cells[cells.size // 2])
-    side = int(found.cover.grid.side_of(cell))
-    lo, hi = found.cover.grid.boxes([cell], side)
+    side = int(attraction.cover.grid.side_of(cell))
+    lo, hi = attraction.cover.grid.boxes([cell], side)
     return 0.5 * float(lo[0, 0] + hi[0, 0]), side
 
 
-def on_limit_set(found: Attraction) -> tuple[float, int]:
+def on_limit_set(attraction: Attraction) -> tuple[float, int]:
     """Follow an orbit from the attracting cells until it is as near to the limit set as floats come, and its end.
 
-    Cells surround the limit set: what starts in one of them may violate a goal once, on its way, and never again.
+    Cells surround the limit set: an orbit from one of them may violate a goal once, on its way, and never again.
     """
-    start, on = middle(found, found.cells.numbers())
-    box = found.cover.box
+    start, on = middle(attraction, attraction.cells.numbers())
+    box = attraction.cover.box
     path = orbit(box.at_kappa(box.middle_kappa), start, on, SETTLING)
     return float(path.x[-1]), int(path.side[-1])
 
 
-def violating_path(found: Attraction, wrong: Wrong) -> Path | None:
+def violating_path(attraction: Attraction, wrong: Wrong) -> Path | None:
     """Breadth first from an attracting cell, one state per cell, until a state violates the goal."""
-    grid: Grid = found.cover.grid
-    start, on = on_limit_set(found)
+    grid: Grid = attraction.cover.grid
+    start, on = on_limit_set(attraction)
     x, side = np.array([start]), np.array([on])
     seen = np.zeros(grid.n_cells, dtype=bool)
-    reached, options = ReachedStates.of(x, side), throw_choices(found.cover.box)
+    reached, options = ReachedStates.of(x, side), throw_choices(attraction.cover.box)
     for _ in range(MOST_THROWS):
-        thrown = throws(found.cover.box, x, side, options)
+        thrown = throws(attraction.cover.box, x, side, options)
         bad = violation(thrown, wrong)
         if bad.size:
             reached.add(thrown, bad)
@@ -216,11 +216,11 @@ def violating_path(found: Attraction, wrong: Wrong) -> Path | None:
     return None
 
 
-def sample_passage(found: Attraction, cells: NDArray[np.int64]) -> tuple[State, ...]:
+def sample_passage(attraction: Attraction, cells: NDArray[np.int64]) -> tuple[State, ...]:
     """Prove some throws from the middle of some cells, to be shown."""
-    box = found.cover.box
+    box = attraction.cover.box
     choice = ThrowChoice(box.middle_kappa, 0.0)
-    path = orbit(box.at_kappa(choice.kappa), *middle(found, cells), SHOWN)
+    path = orbit(box.at_kappa(choice.kappa), *middle(attraction, cells), SHOWN)
     return replayed(box, Path(path.x.tolist(), path.side.tolist(), [choice] * path.code.size))
 
 
@@ -261,9 +261,11 @@ def replayed(box: ParameterBox, path: Path) -> tuple[State, ...]:
 STARTS, UNTIL_GONE, TRIED = 256, 400, 8
 
 
-def one_throw(found: Attraction, wrong: Wrong, up_to: float = math.inf, laid: Laid = ()) -> tuple[State, ...]:
+def one_throw(
+    attraction: Attraction, wrong: Wrong, up_to: float = math.inf, laid: Laid = ()
+) -> tuple[State, ...]:
     """Find a start, laid down up to some x, whose next landing violates the goal, and prove it; empty if none is."""
-    grid, box = found.cover.grid, found.cover.box
+    grid, box = attraction.cover.grid, attraction.cover.box
     x = np.concatenate([0.5 * (edges[:-1] + edges[1:]) for (edges,) in grid.edges])
     side = np.repeat(np.arange(grid.sides), [edges.size - 1 for (edges,) in grid.edges])
     good = (x < up_to) & _lies_in(laid, x, side)
@@ -281,12 +283,12 @@ def one_throw(found: Attraction, wrong: Wrong, up_to: float = math.inf, laid: La
     return states if states and states[-1].hi <= box.lo.arm_length else ()
 
 
-def start_that_leaves(found: Attraction, laid: Laid = ()) -> tuple[State, ...]:
+def start_that_leaves(attraction: Attraction, laid: Laid = ()) -> tuple[State, ...]:
     """Find a start on the arm whose orbit lands off it, x <= a or beyond the end, and prove it.
 
     Parameters
     ----------
-    found : Attraction
+    attraction : Attraction
         Cells and images.
     laid : Laid
         Where it begins, in one of these ranges; () for anywhere on the arm.
@@ -294,11 +296,11 @@ def start_that_leaves(found: Attraction, laid: Laid = ()) -> tuple[State, ...]:
     Returns
     -------
     tuple of State
-        The orbit, the landing off the arm last; empty if none is found.
+        The orbit, the landing off the arm last; empty if the search finds none.
     """
-    box = found.cover.box
+    box = attraction.cover.box
     for option in throw_choices(box, 3):
-        for path in _first_to_leave(found, option, laid):
+        for path in _first_to_leave(attraction, option, laid):
             states = replayed(box, path)
             if states and _is_off(box, states[-1]):
                 return states
@@ -308,19 +310,21 @@ def start_that_leaves(found: Attraction, laid: Laid = ()) -> tuple[State, ...]:
 def _lies_in(laid: Laid, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether starts lie in some ranges; all do where there are none."""
     some = [(side == on) & (lo < x) & (x < hi) for on, lo, hi in laid]
-    found: NDArray[np.bool_] = np.any(some, axis=0) if some else np.ones_like(x, dtype=bool)
-    return found
+    inside: NDArray[np.bool_] = np.any(some, axis=0) if some else np.ones_like(x, dtype=bool)
+    return inside
 
 
-def _starts(found: Attraction, laid: Laid) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _starts(attraction: Attraction, laid: Laid) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Choose starts on all of the arm; with scattered landings also one nearer to the joint than these scatter."""
-    box, x, side = found.cover.box, [], []
-    for s, (edges,) in enumerate(found.cover.grid.edges):
+    box, x, side = attraction.cover.box, [], []
+    for s, (edges,) in enumerate(attraction.cover.grid.edges):
         if not box.rests[s]:
             continue
         centres = 0.5 * (edges[:-1] + edges[1:])
         centres = centres[_lies_in(laid, centres, np.full(centres.size, s))]
-        near = [box.hi.a[s] + 0.125 * box.landing] if box.landing > 0.0 and not found.cover.points else []
+        near = (
+            [box.hi.a[s] + 0.125 * box.landing] if box.landing > 0.0 and not attraction.cover.points else []
+        )
         x.append(np.concatenate([near, centres[:: max(1, centres.size // STARTS)]]))
         side.append(np.full(x[-1].size, s))
     starts, sides = np.concatenate(x), np.concatenate(side)
@@ -328,14 +332,14 @@ def _starts(found: Attraction, laid: Laid) -> tuple[NDArray[np.float64], NDArray
     return starts[good], sides[good]
 
 
-def _first_to_leave(found: Attraction, option: ThrowChoice, laid: Laid) -> Iterator[Path]:
+def _first_to_leave(attraction: Attraction, option: ThrowChoice, laid: Laid) -> Iterator[Path]:
     """Throw some starts again and again, always in the same way, until some have left the arm: their orbits."""
-    x, side = _starts(found, laid)
+    x, side = _starts(attraction, laid)
     if not x.size:
         return
     reached = ReachedStates.of(x, side)
     for _ in range(UNTIL_GONE):
-        thrown = throws(found.cover.box, x, side, [option])
+        thrown = throws(attraction.cover.box, x, side, [option])
         for k in np.flatnonzero(~thrown.stays)[:TRIED]:
             yield reached.plus(thrown, np.array([k])).path(0, [option])
         keep = np.flatnonzero(thrown.stays)
