@@ -60,9 +60,9 @@ BEYOND = "the struck corner is beyond the end of the arm: the map throws as if t
 NEAR = 0.005
 
 
-def film_of_feeding(found: Feeding, asked: Asked) -> Film:
+def film_of_feeding(feeding: Feeding, asked: Asked) -> Film:
     """Show a part until it is fed."""
-    return film_of_end(found.end, asked)
+    return film_of_end(feeding.end, asked)
 
 
 def film_of_end(end: ArmEnd, asked: Asked) -> Film:
@@ -73,8 +73,8 @@ def film_of_end(end: ArmEnd, asked: Asked) -> Film:
         allowed = f"below {end.x:g} {end.scene.unit}, where the arm ends, and where throws act beyond the end"
         raise AnswerError("x of the start", start[0], allowed, "start on the arm")
     goes_on = f"where the arm ends: side {end.side} is wanted"
-    found, lanes = known_of(end.scene, asked.progress, lines=((end.x, goes_on),))
-    scene, pace = found.scene, asked.pace(found.scene)
+    analysis, lanes = known_of(end.scene, asked.progress, lines=((end.x, goes_on),))
+    scene, pace = analysis.scene, asked.pace(analysis.scene)
     most = MOST_THROWS if throws is None else throws
     x, side = _longest(end, most if throws else USUAL) if start is None else require_start(scene, start)
     made = _until_fed(end, scene, x, side, most)
@@ -197,8 +197,8 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
 
 def _corners(about_end: Array, tipped: float) -> Array:
     cos, sin = math.cos(tipped), math.sin(tipped)
-    found: Array = about_end @ np.array([[cos, -sin], [sin, cos]])
-    return found
+    corners: Array = about_end @ np.array([[cos, -sin], [sin, cos]])
+    return corners
 
 
 def _first_contact(cavity: Cavity, about_end: Array) -> float:
@@ -236,10 +236,10 @@ def _tipping(
     patience = (40.0 + max(0.0, math.log(height / max(beyond, 1e-300)))) * math.sqrt(
         inertia / (gravity * height)
     )
-    found = solve_ivp(
+    fall = solve_ivp(
         rates, (0.0, patience), [0.0, rate], "DOP853", dense_output=True, events=down, rtol=1e-10, atol=1e-14
     )
-    end, solution = float(found.t[-1]), found.sol
+    end, solution = float(fall.t[-1]), fall.sol
     return end, lambda at: np.minimum(solution(at)[0], most)
 
 
@@ -331,28 +331,28 @@ def film_of_recording(
     )
 
 
-def film_of_assembly(found: Assembly, asked: Asked) -> Film:
+def film_of_assembly(assembly: Assembly, asked: Asked) -> Film:
     """Show the first pair that was assembled, or else the first pair: its last throws."""
-    example = found.example("assembled")
+    example = assembly.example("assembled")
     number = 0 if example is None else example
-    scenes, last = found.pair.scenes, LAST if asked.throws is None else asked.throws
-    title = f"{scenes[0].name} and {scenes[1].name}, trial {number}: {found.rows[number]['outcome']}"
-    recording, carried = found.film(number, last), found.series.carried
+    scenes, last = assembly.pair.scenes, LAST if asked.throws is None else asked.throws
+    title = f"{scenes[0].name} and {scenes[1].name}, trial {number}: {assembly.rows[number]['outcome']}"
+    recording, carried = assembly.film(number, last), assembly.series.carried
     return film_of_recording(recording, asked._replace(throws=None), scenes, title, carried=carried)
 
 
-def film_of_tray(found: TrayFill, asked: Asked) -> Film:
+def film_of_tray(filling: TrayFill, asked: Asked) -> Film:
     """Show a tray pass by pass: one depression, or many parts at once that push each other, if they were asked for."""
     from limitsets.cell.trays import Pouring, filmed
 
-    scene, passes = found.scene, PASSES if asked.throws is None else asked.throws
-    if found.crowds:
-        parts, depressions = found.crowds[0].parts, found.crowds[0].depressions
-        pouring = Pouring(found.passes, parts, depressions, passes, found.seed)
+    scene, passes = filling.scene, PASSES if asked.throws is None else asked.throws
+    if filling.crowds:
+        parts, depressions = filling.crowds[0].parts, filling.crowds[0].depressions
+        pouring = Pouring(filling.passes, parts, depressions, passes, filling.seed)
         recording = pouring.film(0, last=passes)
         title = f"{scene.name}, {parts} parts a pass over {depressions} depressions"
     else:
-        recording = filmed(scene, passes, seed=found.seed)
+        recording = filmed(scene, passes, seed=filling.seed)
         title = f"{scene.name}, one depression of a tray"
     film = film_of_recording(recording, asked._replace(throws=None), title=title)
     pace = asked.pace(scene)
@@ -407,7 +407,7 @@ def _swung(recording: Recording, kept: NDArray[np.int64], shown: list[_Frame], t
 
 def _marks(recording: Recording, at: Array, thrown: list[float]) -> tuple[Mark, ...]:
     """Say where things happen: at the lowest corner of the part."""
-    found = []
+    marks = []
     for time, part, word in sorted(recording.marks):
         if time <= at[-1]:
             frame = int(np.searchsorted(at, time))
@@ -417,8 +417,8 @@ def _marks(recording: Recording, at: Array, thrown: list[float]) -> tuple[Mark, 
             corners = recording.corners(number, part)
             x, y = corners[int(np.argmin(corners[:, 1]))].tolist()
             if math.isfinite(x):
-                found.append(Mark(frame, until, part, word, x, y))
-    return tuple(found)
+                marks.append(Mark(frame, until, part, word, x, y))
+    return tuple(marks)
 
 
 def _words(recording: Recording, thrown: list[float], frame: _Frame) -> tuple[str, str]:

@@ -300,15 +300,15 @@ def require_length(frames: int) -> None:
 def labels_of(scene: Scene) -> tuple[Label, ...]:
     """Name each side of a part, inside it next to the middle of the side."""
     corners = about_centre(scene)
-    n, found = len(corners), []
+    n, labels = len(corners), []
     size = float(np.abs(corners).max())
     for side in range(n):
         left, right = corners[-side % n], corners[(1 - side) % n]
         middle, along = 0.5 * (left + right), right - left
         inward = np.array([-along[1], along[0]]) / float(np.hypot(*along))
         x, y = (middle + 0.1 * size * inward).tolist()
-        found.append(Label(str(side), x, y))
-    return tuple(found)
+        labels.append(Label(str(side), x, y))
+    return tuple(labels)
 
 
 def cut(

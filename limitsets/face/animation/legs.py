@@ -37,34 +37,34 @@ def known_of(scene: Scene, progress: Progress = None, **more: Any) -> tuple[Anal
     """Analyse a scene, and keep what the lanes show of it; its effects by `auto` are then chosen."""
     from limitsets.parameters.analysis import analyse
 
-    found = analyse(scene, CELLS, progress=progress)
-    return found, lanes_of(found.scene, found, **more)
+    analysis = analyse(scene, CELLS, progress=progress)
+    return analysis, lanes_of(analysis.scene, analysis, **more)
 
 
-def lanes_of(scene: Scene, found: Analysis | None = None, goal: Goal | None = None, **more: Any) -> Lanes:
+def lanes_of(scene: Scene, analysis: Analysis | None = None, goal: Goal | None = None, **more: Any) -> Lanes:
     """Lay the lanes out; without an analysis they show no sets.  The goal is the scene's, or another."""
     goal = scene.goal if goal is None else goal
     return Lanes(
         tuple(scene.sides.a.tolist()),
         scene.arm_length,
         ()
-        if found is None
-        else tuple({side: list(parts) for side, parts in each.items()} for each in found.extents),
+        if analysis is None
+        else tuple({side: list(parts) for side, parts in each.items()} for each in analysis.extents),
         {}
-        if found is None
-        else {s: tuple(p.x for p in points) for s, points in found.critical_points.items()},
+        if analysis is None
+        else {s: tuple(p.x for p in points) for s, points in analysis.critical_points.items()},
         (goal.x, goal.side) if isinstance(goal, OrientedBeyond | Reaches) else None,
         **more,
     )
 
 
-def good_start(found: Analysis, throws: int) -> tuple[float, int]:
+def good_start(analysis: Analysis, throws: int) -> tuple[float, int]:
     """Choose a start on the limit set: where whole rounds of the sides begin; else the middle of the longest side."""
-    for extents in found.extents[:1]:
-        path = stretch(found.scene, extents, throws)
+    for extents in analysis.extents[:1]:
+        path = stretch(analysis.scene, extents, throws)
         if path is not None:
             return float(path.x[0]), int(path.side[0])
-    return 0.5 * (float(found.scene.sides.a[0]) + found.scene.arm_length), 0
+    return 0.5 * (float(analysis.scene.sides.a[0]) + analysis.scene.arm_length), 0
 
 
 def require_start(scene: Scene, start: tuple[float, int]) -> tuple[float, int]:

@@ -119,29 +119,29 @@ class LanePicture:
         """Draw everything in the lanes that stays where it is."""
         lanes = self.lanes
         top, foot = self.height(-0.45), self.height(len(lanes.begin) - 0.5)
-        found = []
+        shapes = []
         for side, begin in enumerate(lanes.begin):
             y, ends = self.height(side), (self.place(begin), self.place(lanes.end))
-            found.append(text_of(f"side {side}", 8.0, y + 4.5, size=13.0))
-            found.append(shape_of("line", [(ends[0], y), (ends[1], y)], stroke="#b9b9b9", width=1.0))
+            shapes.append(text_of(f"side {side}", 8.0, y + 4.5, size=13.0))
+            shapes.append(shape_of("line", [(ends[0], y), (ends[1], y)], stroke="#b9b9b9", width=1.0))
         for number, extents in enumerate(lanes.sets):
             face, _ = style.SETS[number % len(style.SETS)]
-            found += self.bars(extents, 6.0, fill=face, stroke=style.INK, width=0.8, what="limit set")
+            shapes += self.bars(extents, 6.0, fill=face, stroke=style.INK, width=0.8, what="limit set")
         for side, points in lanes.critical.items():
             for x in points:
                 px, y = self.place(x), self.height(side)
-                found.append(
+                shapes.append(
                     shape_of(
                         "line", [(px, y - 10), (px, y + 10)], stroke=style.INK, width=2.2, what="critical"
                     )
                 )
         for number, (x, words) in enumerate(lanes.lines):
-            found += self._upright(x, top - 12.0 * (number + 1), foot, style.INK, (6.0, 3.0), words)
+            shapes += self._upright(x, top - 12.0 * (number + 1), foot, style.INK, (6.0, 3.0), words)
         if lanes.goal is not None:
             x, side = lanes.goal
             words = f"goal: side {side} from {x:g} {self.unit} on"
-            found += self._upright(x, top, foot, style.GOAL, (2.0, 2.5), words)
-        return [*found, *self._axis(foot), *self._key(foot + AXIS + 16.0)]
+            shapes += self._upright(x, top, foot, style.GOAL, (2.0, 2.5), words)
+        return [*shapes, *self._axis(foot), *self._key(foot + AXIS + 16.0)]
 
     def _axis(self, y: float) -> list[Shape]:
         """Draw ticks of x under the lanes."""
@@ -155,44 +155,44 @@ class LanePicture:
             ),
             end,
         )
-        found = []
+        shapes = []
         for k in range(int(end / step) + 1):
             px = self.place(k * step)
             words = f"{k * step:g} {unit}" if k == int(end / step) else f"{k * step:g}"
-            found.append(shape_of("line", [(px, y), (px, y + 4.0)], stroke="#8c8c8c", width=1.0))
-            found.append(text_of(words, px, y + 15.0, anchor="middle", size=11.0, fill="#5a5a5a"))
-        return found
+            shapes.append(shape_of("line", [(px, y), (px, y + 4.0)], stroke="#8c8c8c", width=1.0))
+            shapes.append(text_of(words, px, y + 15.0, anchor="middle", size=11.0, fill="#5a5a5a"))
+        return shapes
 
     def _key(self, y: float) -> list[Shape]:
         """Say what the signs in the lanes mean."""
-        lanes, x, found = self.lanes, LEFT, []
+        lanes, x, shapes = self.lanes, LEFT, []
         small: dict[str, Any] = {"size": 11.0, "fill": "#3d3d3d"}
         if lanes.sets:
             bar = [(x, y - 7), (x + 18, y - 7), (x + 18, y + 1), (x, y + 1)]
-            found.append(shape_of("polygon", bar, fill=style.SETS[0][0], stroke=style.INK, width=0.8))
-            found.append(text_of("limit set", x + 23, y, **small))
+            shapes.append(shape_of("polygon", bar, fill=style.SETS[0][0], stroke=style.INK, width=0.8))
+            shapes.append(text_of("limit set", x + 23, y, **small))
             x += 88
         if any(lanes.critical.values()):
-            found.append(shape_of("line", [(x + 3, y - 10), (x + 3, y + 3)], stroke=style.INK, width=2.2))
-            found.append(text_of("critical point", x + 10, y, **small))
+            shapes.append(shape_of("line", [(x + 3, y - 10), (x + 3, y + 3)], stroke=style.INK, width=2.2))
+            shapes.append(text_of("critical point", x + 10, y, **small))
             x += 100
         if lanes.known:
             bar = [(x, y - 8), (x + 18, y - 8), (x + 18, y + 2), (x, y + 2)]
-            found.append(shape_of("polygon", bar, fill=KNOWN["fill"], stroke=KNOWN["stroke"], width=0.8))
-            found.append(text_of("known to be here", x + 23, y, **small))
+            shapes.append(shape_of("polygon", bar, fill=KNOWN["fill"], stroke=KNOWN["stroke"], width=0.8))
+            shapes.append(text_of("known to be here", x + 23, y, **small))
             x += 132
-        found.append(
+        shapes.append(
             shape_of("circle", (x + 5, y - 4), radius=5.5, fill=style.FLIP, stroke="#ffffff", width=1.2)
         )
-        found.append(text_of("the part", x + 14, y, **small))
-        found.append(shape_of("circle", (x + 80, y - 4), radius=3.0, fill=style.INK, opacity=0.55))
-        found.append(text_of("earlier rests", x + 88, y, **small))
-        found.append(shape_of("polygon", pointer(x + 178.0, y - 10.0), fill=style.FLIP))
-        found.append(text_of("impact", x + 188, y, **small))
+        shapes.append(text_of("the part", x + 14, y, **small))
+        shapes.append(shape_of("circle", (x + 80, y - 4), radius=3.0, fill=style.INK, opacity=0.55))
+        shapes.append(text_of("earlier rests", x + 88, y, **small))
+        shapes.append(shape_of("polygon", pointer(x + 178.0, y - 10.0), fill=style.FLIP))
+        shapes.append(text_of("impact", x + 188, y, **small))
         if self.rolls:
-            found.append(shape_of("polygon", pointer(x + 244.0, y - 10.0), fill=style.ROLL))
-            found.append(text_of("rolls on", x + 254, y, **small))
-        return found
+            shapes.append(shape_of("polygon", pointer(x + 244.0, y - 10.0), fill=style.ROLL))
+            shapes.append(text_of("rolls on", x + 254, y, **small))
+        return shapes
 
     def _upright(
         self, x: float, top: float, foot: float, colour: str, dash: tuple[float, ...], words: str
@@ -207,15 +207,15 @@ class LanePicture:
 
     def bars(self, extents: Extents, half: float, **look: Any) -> list[Shape]:
         """Draw intervals in the lanes."""
-        found = []
+        shapes = []
         for side, parts in extents.items():
             y = self.height(side)
             for lo, hi in parts:
                 left = self.place(lo)
                 right = max(self.place(hi), left + 1.0)
                 corners = [(left, y - half), (right, y - half), (right, y + half), (left, y + half)]
-                found.append(shape_of("polygon", corners, **look))
-        return found
+                shapes.append(shape_of("polygon", corners, **look))
+        return shapes
 
 
 # ----------------------------------------------------------------
@@ -279,8 +279,8 @@ class Picture:
 
     def at(self, points: Any) -> Array:
         """Turn lengths from the joint into pixels."""
-        found: Array = np.asarray(points) * np.array([self.scale, -self.scale]) + np.array(self.origin)
-        return found
+        pixels: Array = np.asarray(points) * np.array([self.scale, -self.scale]) + np.array(self.origin)
+        return pixels
 
     @property
     def rows(self) -> LanePicture | None:
@@ -298,54 +298,54 @@ class Picture:
     def still(self) -> list[Shape]:
         """Everything that stays where it is."""
         film = self.film
-        found = [] if film.arm.any() else self._ground(0)
+        shapes = [] if film.arm.any() else self._ground(0)
         if self.rows is not None:
-            found += self.rows.still()
+            shapes += self.rows.still()
         words = f"{film.title}: {film.about}" if film.about else film.title
         for number, line in enumerate(_wrapped(words, int(self.size[0] / 6.6))):
             y = self.size[1] - 22.0 + 14.0 * number
-            found.append(text_of(line, 12.0, y, size=11.0, fill="#5a5a5a", what="about"))
-        return found
+            shapes.append(text_of(line, 12.0, y, size=11.0, fill="#5a5a5a", what="about"))
+        return shapes
 
     def _ground(self, k: int) -> list[Shape]:
         pieces = [self._in_sight(each) for each in self.film.ground_polygons(k)]
-        found = [shape_of("polygon", each, fill=GROUND, what="ground") for each in pieces]
-        return found + [shape_of("line", [*each, each[0]], stroke="#9a9a9a", width=1.0) for each in pieces]
+        shapes = [shape_of("polygon", each, fill=GROUND, what="ground") for each in pieces]
+        return shapes + [shape_of("line", [*each, each[0]], stroke="#9a9a9a", width=1.0) for each in pieces]
 
     def _in_sight(self, polygon: Array) -> Array:
         """Clip a polygon to the upper part: ground is as thick as parts are long."""
-        found = self.at(polygon)
-        return np.clip(found, (2.0, TOP - 20.0), (self.size[0] - 2.0, self.bottom))
+        pixels = self.at(polygon)
+        return np.clip(pixels, (2.0, TOP - 20.0), (self.size[0] - 2.0, self.bottom))
 
     # ---------------------------------------------------------------- what moves
 
     def moving(self, k: int) -> list[Shape]:
         """Everything else, in a frame."""
         film = self.film
-        found = self._known(k)
-        found += self._ground(k) if film.arm.any() else []
-        found += self._arm(k)
+        shapes = self._known(k)
+        shapes += self._ground(k) if film.arm.any() else []
+        shapes += self._arm(k)
         first, last = (int(each) for each in film.trail[k])
         if last > first:
             path = self.at(film.poses[first : last + 1, 0, :2])
             ghost = self.at(film.polygon(first))
-            found.append(
+            shapes.append(
                 shape_of(
                     "line", [*ghost, ghost[0]], stroke="#a9a9a9", width=1.0, dash=(3.0, 3.0), what="left"
                 )
             )
-            found.append(shape_of("line", path, stroke=style.FLIP, width=1.6, dash=(5.0, 3.0), what="trail"))
+            shapes.append(shape_of("line", path, stroke=style.FLIP, width=1.6, dash=(5.0, 3.0), what="trail"))
         for part in range(len(film.outlines)):
-            found += self._part(k, part)
-        found += self._marks(k)
-        found += self._in_lanes(k)
+            shapes += self._part(k, part)
+        shapes += self._marks(k)
+        shapes += self._in_lanes(k)
         caption, note = film.captions[int(film.caption[k])], film.notes[int(film.note[k])]
         clock = f"{film.times[k]:.2f} {film.clock.removeprefix('1')}"
-        found.append(text_of(caption, 12.0, 26.0, size=18.0, weight="bold", what="caption"))
-        found.append(text_of(clock, self.size[0] - 12.0, 26.0, anchor="end", fill="#5a5a5a", what="clock"))
+        shapes.append(text_of(caption, 12.0, 26.0, size=18.0, weight="bold", what="caption"))
+        shapes.append(text_of(clock, self.size[0] - 12.0, 26.0, anchor="end", fill="#5a5a5a", what="clock"))
         if note:
-            found.append(text_of(note, 12.0, 48.0, fill="#3d3d3d", what="note"))
-        return found
+            shapes.append(text_of(note, 12.0, 48.0, fill="#3d3d3d", what="note"))
+        return shapes
 
     def _known(self, k: int) -> list[Shape]:
         rows, stage = self.rows, int(self.film.stage[k])
@@ -370,46 +370,46 @@ class Picture:
         if not math.isfinite(x):
             return []
         look = {"fill": PARTS[part % len(PARTS)], "stroke": EDGES[part % len(EDGES)], "width": 2.0}
-        found = [shape_of("polygon", self.at(film.polygon(k, part)), what="part", **look)]
+        shapes = [shape_of("polygon", self.at(film.polygon(k, part)), what="part", **look)]
         cos, sin = math.cos(angle), math.sin(angle)
         for label in film.labels[part]:
             px, py = self.at((x + cos * label.x - sin * label.y, y + sin * label.x + cos * label.y))
-            found.append(text_of(label.word, px, py + 4.5, anchor="middle", size=13.0, what="label"))
+            shapes.append(text_of(label.word, px, py + 4.5, anchor="middle", size=13.0, what="label"))
         if film.labels[part]:
-            found.append(
+            shapes.append(
                 shape_of("circle", self.at((x, y)), radius=3.2, fill="#ffffff", stroke=style.INK, width=1.4)
             )
-        return found
+        return shapes
 
     def _marks(self, k: int) -> list[Shape]:
-        found = []
+        shapes = []
         for mark in self.film.marks:
             if mark.word in ("impact", "roll") and mark.frame <= k < mark.until:
                 x, y = self.at((mark.x, mark.y)).tolist()
                 corners = pointer(x, y)
                 fill = style.FLIP if mark.word == "impact" else style.ROLL
-                found.append(shape_of("polygon", corners, fill=fill, what=mark.word))
-        return found
+                shapes.append(shape_of("polygon", corners, fill=fill, what=mark.word))
+        return shapes
 
     def _in_lanes(self, k: int) -> list[Shape]:
         film, rows = self.film, self.rows
         x, side = film.position[k].tolist()
         if rows is None or not math.isfinite(x):
             return []
-        found = []
+        shapes = []
         for rest in film.rests:
             if rest.frame <= k:
                 place = rows.place(rest.x), rows.height(rest.side)
-                found.append(
+                shapes.append(
                     shape_of("circle", place, radius=3.0, fill=style.INK, opacity=0.55, what="visited")
                 )
         px, y = rows.place(x), rows.height(side)
         centre = self.at(film.poses[k, 0, :2])
         if abs(float(centre[0]) - px) < LEANS:
             dots = {"stroke": "#7d7d7d", "width": 0.9, "dash": (1.5, 2.5)}
-            found.append(shape_of("line", [centre, (px, y)], what="plumb", **dots))
+            shapes.append(shape_of("line", [centre, (px, y)], what="plumb", **dots))
         look = {"fill": style.FLIP, "stroke": "#ffffff", "width": 1.4}
-        return [*found, shape_of("circle", (px, y), radius=6.5, what="here", **look)]
+        return [*shapes, shape_of("circle", (px, y), radius=6.5, what="here", **look)]
 
 
 def _bounds(film: Film) -> tuple[Array, Array]:

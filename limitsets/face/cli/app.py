@@ -196,13 +196,13 @@ def _plain(message: str, words: Sequence[str]) -> str:
     """
     kinds = {"integer": "a whole number", "number": "a number", "boolean": "true or false"}
     about, colon, reason = message.partition(": ")
-    if found := re.match(r"Input should be a valid (integer|number|boolean)", reason):
+    if match := re.match(r"Input should be a valid (integer|number|boolean)", reason):
         name = next(iter(re.findall(r"'(--?[\w-]+)'", about)), "")
         given = next((after for word, after in pairwise(words) if word == name), "")
-        return f"{about}{colon}{repr(given) + ' is not' if given else 'it is not'} {kinds[found[1]]}"
+        return f"{about}{colon}{repr(given) + ' is not' if given else 'it is not'} {kinds[match[1]]}"
     reason = reason.removeprefix("Value error, ")
-    if found := re.match(r"'([^']*)' is not one of (.*)", reason):
-        (near,) = difflib.get_close_matches(found[1], re.findall(r"'([^']*)'", found[2]), n=1, cutoff=0.0)
+    if match := re.match(r"'([^']*)' is not one of (.*)", reason):
+        (near,) = difflib.get_close_matches(match[1], re.findall(r"'([^']*)'", match[2]), n=1, cutoff=0.0)
         return f"{about}{colon}{reason}; did you mean {near!r}?"
     value_set = next((word for word in words if re.fullmatch(r"[a-z][\w.\[\]]*=[^=]+", word)), None)
     if value_set and about.startswith(("Got unexpected extra argument", "No such option")):

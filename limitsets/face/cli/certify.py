@@ -94,7 +94,7 @@ def certify(
 def _text(proof: Proof, file: Path | None, kept: str, seconds: float | None) -> None:
     from limitsets.face.report.pages import after_unproved
 
-    cells = sum(found.cover.grid.n_cells for found in proof.attractions)
+    cells = sum(attraction.cover.grid.n_cells for attraction in proof.attractions)
     typer.echo(f"{proof.scene.name}: {cells} cells, {proof.seconds:.2g} s")
     for name, (lo, hi) in proof.spans.items():
         typer.echo(f"for every {name} from {_short(lo)} to {_short(hi)}, the same at every throw")
@@ -330,6 +330,6 @@ def recheck(
 
     from limitsets.checker import EXITS, show
 
-    found = Table(("claim", "verdict", "reason"), report.claims, str(file))
-    answer(report, json, lambda: show(report, str(file)), out, (csv, lambda: found))
+    claims = Table(("claim", "verdict", "reason"), report.claims, str(file))
+    answer(report, json, lambda: show(report, str(file)), out, (csv, lambda: claims))
     raise typer.Exit(EXITS[report.verdict])

@@ -130,9 +130,9 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     Console(width=None if told else LONGEST).print(grid)
 
 
-def show(found: Table) -> None:
+def show(listing: Table) -> None:
     """Print a table of an answer, its numbers rounded."""
-    table(found.heads, found.shown())
+    table(listing.heads, listing.shown())
 
 
 def opened(
@@ -178,15 +178,15 @@ def stem_of(scene: SceneOf) -> str:
 def _require_own(folder: Path, scene: SceneOf) -> None:
     """Refuse a folder with the report of another scene; say where it is that of other values of this one."""
     for file in sorted(folder.glob("*.json")):
-        found = {}
+        record = {}
         with suppress(OSError, ValueError, TypeError, KeyError):
-            found = dict(loads(file.read_text(encoding="utf-8"))["scene"])
-        if found and found.get("name") != scene.name:
+            record = dict(loads(file.read_text(encoding="utf-8"))["scene"])
+        if record and record.get("name") != scene.name:
             raise LimitsetsError(
                 "the folder of the report", str(folder), f"one of {scene.name}, or a new one",
-                f"it holds that of {found.get('name')}; name another with --out, or delete it",
+                f"it holds that of {record.get('name')}; name another with --out, or delete it",
             )  # fmt: skip
-        if found and found != scene.as_dict():
+        if record and record != scene.as_dict():
             said = f"limitsets: {folder} holds the report of {scene.name} with other values: it is replaced"
             print(said, file=sys.stderr)
             return

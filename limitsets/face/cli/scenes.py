@@ -52,8 +52,8 @@ def scenes(out: Out = None, csv: Csv = None, json: Json = False) -> None:
         "goal",
     )
     words = ("name", "sides", "kappa", "arm_length", "unit", "flight", "flip", "goal")
-    found = Table(columns, [[record[word] for word in words] for record in records], "Built-in scenes")
-    answer(records, json, lambda: show(found), out, (csv, lambda: found))
+    listing = Table(columns, [[record[word] for word in words] for record in records], "Built-in scenes")
+    answer(records, json, lambda: show(listing), out, (csv, lambda: listing))
 
 
 # ---------------------------------------------------------------- `limitsets new`: a scene to start from
@@ -93,22 +93,22 @@ def check(scene: Scene, out: Out = None, csv: Csv = None, json: Json = False) ->
     from limitsets.feeder.scene import load
     from limitsets.feeder.scene.checking import examined
 
-    found, doubts = examined(scene)
-    records = [{"improbable": False, **picked(error, *WORDS, "file")} for error in found]
+    errors, doubts = examined(scene)
+    records = [{"improbable": False, **picked(error, *WORDS, "file")} for error in errors]
     records += [{"improbable": True, **picked(doubt, *WORDS, "file")} for doubt in doubts]
     heads = (*WORDS, "improbable")
     rows = Table(heads, [[str(record[word] or "") for word in heads] for record in records], scene)
 
     def text() -> None:
-        for each in (*found, *doubts):
+        for each in (*errors, *doubts):
             typer.echo(str(each))
         unlikely = f", {_count(len(doubts), 'improbable')}" if doubts else ""
-        typer.echo(f"{scene}: {_count(len(found), 'wrong')}{unlikely}")
-        if not found and (note := _beside_kappa(load(scene))):
+        typer.echo(f"{scene}: {_count(len(errors), 'wrong')}{unlikely}")
+        if not errors and (note := _beside_kappa(load(scene))):
             typer.echo(f"{scene}: {note}")
 
     answer(records, json, text, out, (csv, lambda: rows))
-    raise typer.Exit(2 if found else 0)
+    raise typer.Exit(2 if errors else 0)
 
 
 def _beside_kappa(scene: SceneOf) -> str:
@@ -175,7 +175,7 @@ def _packages() -> list[dict[str, str | None]]:
         lines = requires("limitsets") or []
     except PackageNotFoundError:  # a folder on the path, not installed
         return []
-    found: list[dict[str, str | None]] = []
+    packages: list[dict[str, str | None]] = []
     for line in lines:
         match = _REQUIREMENT.match(line)
         if match is None or match[2] in INNER or match[1] == "limitsets":
@@ -184,8 +184,8 @@ def _packages() -> list[dict[str, str | None]]:
             there: str | None = version(match[1])
         except PackageNotFoundError:
             there = None
-        found.append({"package": match[1], "version": there, "extra": match[2]})
-    return found
+        packages.append({"package": match[1], "version": there, "extra": match[2]})
+    return packages
 
 
 def _cache(*, clear: bool) -> dict[str, Any]:
@@ -198,7 +198,7 @@ def _cache(*, clear: bool) -> dict[str, Any]:
         return {"folder": None, "bytes": 0, "versions": 0, "cleared": False, "reason": "it cannot be written"}
     root = FOLDER.parent
     files = [each for each in root.rglob("*") if each.is_file()]
-    found = {
+    record = {
         "folder": str(root),
         "bytes": sum(each.stat().st_size for each in files),
         "versions": sum(each.is_dir() for each in root.iterdir()),
@@ -215,7 +215,7 @@ def _cache(*, clear: bool) -> dict[str, Any]:
                 "a folder that can be deleted",
                 f"it could not be: {error.strerror}",
             ) from None
-    return found
+    return record
 
 
 def _text(record: dict[str, Any], table: Table) -> None:

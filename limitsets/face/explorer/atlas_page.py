@@ -83,10 +83,10 @@ class Background:
 
     def answers(self) -> list[dict[str, Any]]:
         """Take what has been answered since the last call, without waiting."""
-        found = []
+        lines = []
         while not self._lines.empty():
-            found.append(self._lines.get())
-        return found
+            lines.append(self._lines.get())
+        return lines
 
     def wait(self) -> list[dict[str, Any]]:
         """Wait for all answers."""

@@ -133,18 +133,18 @@ def _of_mass(scene: Scene) -> list[Knob]:
                 float(max(m[1] for m in measured)),
             ),
         ]
-    found = []
+    knobs = []
     lo, hi = scene.vertices.min(axis=0), scene.vertices.max(axis=0)
     for k in range(min(len(tree["part"]["mass"].get("points", [])), MOST_POINTS)):
         for axis, word in enumerate("xy"):
             name = f"part.mass.points[{k}].{word}"
             ends = float(lo[axis]), float(hi[axis])
-            found.append(Knob(name, f"point mass {k}, {word}", unit, scene.value(name), *ends))
+            knobs.append(Knob(name, f"point mass {k}, {word}", unit, scene.value(name), *ends))
         name = f"part.mass.points[{k}].mass"
         text, own = text_at(tree, name), unit_read(tree, unit, name)
         mass = convert(parse(text, "mass"), own)
-        found.append(Knob(name, f"point mass {k}, mass", own, mass, LIGHTEST * mass, HEAVIEST * mass))
-    return found
+        knobs.append(Knob(name, f"point mass {k}, mass", own, mass, LIGHTEST * mass, HEAVIEST * mass))
+    return knobs
 
 
 def _of_throw(scene: Scene) -> Knob:
@@ -227,12 +227,12 @@ def knobs_of_map(params: Any) -> tuple[Knob, ...]:
     >>> [(knob.name, knob.lo, knob.hi) for knob in knobs_of_map(maps.Henon())]
     [('a', 0.7, 2.1), ('b', 0.15, 0.45)]
     """
-    found = []
+    knobs = []
     for name, value in zip(params._fields, params, strict=True):
         if isinstance(value, float | int | np.floating):
             ends = sorted((0.5 * float(value), 1.5 * float(value))) if value else [-1.0, 1.0]
-            found.append(Knob(name, name, "", float(value), round(ends[0], 9), round(ends[1], 9)))
-    return tuple(found)
+            knobs.append(Knob(name, name, "", float(value), round(ends[0], 9), round(ends[1], 9)))
+    return tuple(knobs)
 
 
 def map_with(params: Any, values: Mapping[str, float]) -> Any:
@@ -331,16 +331,16 @@ def estimate_of_map(params: Any, domain: Domain) -> Estimate:
 
 def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
     graph = transitions(params, grid(domain, cells=CELLS))
-    found = attractors(graph, throws=THROWS)
-    split = basins(graph, found)
-    told = _told(params, domain, len(found))
-    sharpened = [_sharpened(each, params, told) for each in found]
+    limit_sets = attractors(graph, throws=THROWS)
+    split = basins(graph, limit_sets)
+    topology = _told(params, domain, len(limit_sets))
+    sharpened = [_sharpened(each, params, topology) for each in limit_sets]
     sets = tuple(extents for extents, _ in sharpened)
     goal: dict[str, Any] = {}
     if scene is not None and scene.goal is not None:
         from limitsets.parameters.analysis.checks import goal_outcome
 
-        outcome = goal_outcome(scene.goal, graph, found, split, sets)
+        outcome = goal_outcome(scene.goal, graph, limit_sets, split, sets)
         goal = {"holds": outcome.holds, "vacuous": outcome.vacuous, "threshold": outcome.threshold}
     labels, counts = np.unique(split.labels, return_inverse=True)
     weight = np.bincount(counts, weights=graph.grid.measure) / graph.grid.measure.sum()
@@ -349,8 +349,8 @@ def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
         tuple(domain.hi[:, 0].tolist()),
         sets,
         tuple(bands for _, bands in sharpened),
-        told is not None,
-        tuple(each.flip_order for each in found),
+        topology is not None,
+        tuple(each.flip_order for each in limit_sets),
         tuple(zip(labels.tolist(), weight.tolist(), strict=True)),
         tuple(_runs(split)),
         tuple(
@@ -367,46 +367,46 @@ def _told(params: Any, domain: Domain, count: int) -> Topologies | None:
     if not has_slope(params) or not count:
         return None
     anchor = None if domain.anchor is None else domain.anchor[None]
-    found = topologies(stacked([params]), domain.lo[:, 0][None], domain.hi[:, 0][None], anchor)
-    return found if found.undecided[0] == DECIDED and found.attractors[0] == count else None
+    topology = topologies(stacked([params]), domain.lo[:, 0][None], domain.hi[:, 0][None], anchor)
+    return topology if topology.undecided[0] == DECIDED and topology.attractors[0] == count else None
 
 
-def _sharpened(attractor: Attractor, params: Any, told: Topologies | None) -> tuple[Extents, int]:
+def _sharpened(attractor: Attractor, params: Any, topology: Topologies | None) -> tuple[Extents, int]:
     """Replace the cells of a cycle by its points, and move the outermost ends of other attractors to their own.
 
     Both where they lie in the cells, which may join what are several intervals; how many these are, 0 if not known.
     """
-    found = {side: list(parts) for side, parts in attractor.extents.items()}
-    for k in range(0 if told is None else int(told.attractors[0])):
-        assert told is not None  # the range is empty
-        lowest, reach, period = told.lowest[0, k], told.reach[0, k], int(told.period[0, k])
+    ends = {side: list(parts) for side, parts in attractor.extents.items()}
+    for k in range(0 if topology is None else int(topology.attractors[0])):
+        assert topology is not None  # the range is empty
+        lowest, reach, period = topology.lowest[0, k], topology.reach[0, k], int(topology.period[0, k])
         sides = [int(side) for side in np.flatnonzero(np.isfinite(lowest))]
-        if sides != sorted(found) or not all(
-            found[side][0][0] <= reach[side] and lowest[side] <= found[side][-1][1] for side in sides
+        if sides != sorted(ends) or not all(
+            ends[side][0][0] <= reach[side] and lowest[side] <= ends[side][-1][1] for side in sides
         ):
             continue
         if period:
-            cycle = orbit(params, float(told.start[0, k]), int(told.start_side[0, k]), period - 1)
+            cycle = orbit(params, float(topology.start[0, k]), int(topology.start_side[0, k]), period - 1)
             points = {side: np.sort(cycle.x[cycle.side == side]).tolist() for side in sides}
             return {side: [(x, x) for x in points[side]] for side in sides}, period
         for side in sides:
-            found[side][0] = float(lowest[side]), found[side][0][1]
-            found[side][-1] = found[side][-1][0], float(reach[side])
-        return found, int(told.bands[0, k].sum())
-    return found, 0
+            ends[side][0] = float(lowest[side]), ends[side][0][1]
+            ends[side][-1] = ends[side][-1][0], float(reach[side])
+        return ends, int(topology.bands[0, k].sum())
+    return ends, 0
 
 
 def _runs(split: Basins) -> list[tuple[int, float, float, int]]:
     """Join cells of one label that lie side by side."""
-    found = []
+    runs = []
     for side in range(split.grid.sides):
         edges, labels = split.grid.edges[side][0], split.labels[split.grid.of_side(side)]
         if not labels.size:
             continue
         border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
         for first, last in pairwise(border.tolist()):
-            found.append((side, float(edges[first]), float(edges[last]), int(labels[first])))
-    return found
+            runs.append((side, float(edges[first]), float(edges[last]), int(labels[first])))
+    return runs
 
 
 class Points(NamedTuple):
@@ -444,7 +444,7 @@ def points_of_map(params: Any, domain: Domain) -> Points:
     """
     share = np.array([0.5 + 0.5 * math.cos(2.4 * k) * math.sqrt((k + 0.5) / STARTS) for k in range(STARTS)])
     other = np.roll(share, 3)
-    found, gone = [np.empty((0, kind_of(params).dimension))], Counter[str]()
+    samples, gone = [np.empty((0, kind_of(params).dimension))], Counter[str]()
     for side in range(domain.sides):
         lo, hi = domain.lo[side], domain.hi[side]
         for k in range(STARTS):
@@ -454,8 +454,8 @@ def points_of_map(params: Any, domain: Domain) -> Points:
             if fate:
                 gone[fate] += 1
             else:
-                found.append(path.x[SKIP:])
-    return Points(np.concatenate(found), STARTS * domain.sides, dict(gone))
+                samples.append(path.x[SKIP:])
+    return Points(np.concatenate(samples), STARTS * domain.sides, dict(gone))
 
 
 def _fate(path: Orbit, lo: npt.NDArray[np.float64], hi: npt.NDArray[np.float64]) -> str:

@@ -109,12 +109,12 @@ class MapPage:
                 self.points.show(points.x)
                 self._words = points_words(points)
             else:
-                found = estimate_of_map(params, self._domain)
+                answer = estimate_of_map(params, self._domain)
                 if self._refit:
-                    self.lanes.frame(found, "")
+                    self.lanes.frame(answer, "")
                     self._refit = False
-                self.lanes.show(found)
-                self._words = estimate_words(found, None, "")
+                self.lanes.show(answer)
+                self._words = estimate_words(answer, None, "")
         except LimitsetsError as error:
             self.say(error)
         else:
@@ -269,18 +269,18 @@ class ScenePage:
         self.atlas.tell()
 
     def _redraw(self, scene: Scene) -> None:
-        found = estimate(scene)
+        answer = estimate(scene)
         self.scene = scene
         self.say()
         if self._refit:
-            self.lanes.frame(found, scene.unit)
+            self.lanes.frame(answer, scene.unit)
             self._title.object = (
                 f"<h1>limitsets: {scene.name}</h1>"  # a name of letters, digits, dots and dashes
             )
             self._refit = False
         if not self._startable(scene):
             side, parts = (
-                next(iter(found.sets[0].items())) if found.sets else (0, [(found.lo[0], found.hi[0])])
+                next(iter(answer.sets[0].items())) if answer.sets else (0, [(answer.lo[0], answer.hi[0])])
             )
             self.start = 0.5 * sum(parts[0]), side
             self._x.value, self._side.value = round(self.start[0], 3), side
@@ -288,8 +288,8 @@ class ScenePage:
         self.part.show(scene)
         self.arm.rest(scene, *self.start)
         self.lanes.mark(*self.start)
-        self.lanes.show(found, scene)
-        self._found, self._told = found, False
+        self.lanes.show(answer, scene)
+        self._found, self._told = answer, False
         self._proofs.stop()  # also where nothing is answered yet: an answer would be of another scene
         self._lines = []
         self._proved.object = proof_words([], (), "waits until the sliders rest", self._of)
@@ -373,8 +373,8 @@ class ScenePage:
     def _svg(self) -> io.BytesIO:
         from limitsets.face.plot import limit_set
 
-        found, written = estimate(self.scene), io.BytesIO()
-        limit_set(self.scene, found.sets).savefig(written, format="svg")
+        answer, written = estimate(self.scene), io.BytesIO()
+        limit_set(self.scene, answer.sets).savefig(written, format="svg")
         written.seek(0)
         return written
 

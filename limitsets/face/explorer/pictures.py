@@ -237,9 +237,9 @@ class LanesPicture:
         layers = [*shapes, self._points, self._limit, self._asked]
         self.canvas = Canvas("lanes", layers, 285, touched, margins=MARGINS, across="x", up="", lanes=[])
 
-    def frame(self, found: Estimate, unit: str) -> None:
+    def frame(self, estimate: Estimate, unit: str) -> None:
         """Lay the lanes out."""
-        count, lo, hi = len(found.lo), min(found.lo), max(found.hi)
+        count, lo, hi = len(estimate.lo), min(estimate.lo), max(estimate.hi)
         room = 0.01 * (hi - lo)
         self.canvas.view |= {
             "x": [min(lo, 0.0) - room, hi + room],
@@ -248,37 +248,37 @@ class LanesPicture:
             "lanes": [f"side {side}" for side in range(count)],
         }
 
-    def show(self, found: Estimate, scene: Scene | None = None) -> None:
+    def show(self, estimate: Estimate, scene: Scene | None = None) -> None:
         """Draw an estimate."""
         rows = [
-            (lo, hi, -side - 0.3, -side + 0.3, *look_of(label)[:2]) for side, lo, hi, label in found.basins
+            (lo, hi, -side - 0.3, -side + 0.3, *look_of(label)[:2]) for side, lo, hi, label in estimate.basins
         ]
         self._basins.data = _columns(rows, "left", "right", "bottom", "top", "face", "hatch")
         rows = []
-        for k, extents in enumerate(found.sets):
+        for k, extents in enumerate(estimate.sets):
             face, hatch = style.SETS[k % len(style.SETS)]
             for side, parts in extents.items():
                 rows += [(lo, hi, -side - 0.14, -side + 0.14, face, pattern(hatch)) for lo, hi in parts]
         self._sets.data = _columns(rows, "left", "right", "bottom", "top", "face", "hatch")
-        marks = [(x, -side - 0.3, -side + 0.3) for side, _, x in found.critical]
+        marks = [(x, -side - 0.3, -side + 0.3) for side, _, x in estimate.critical]
         self._critical.data = _columns(marks, "x", "y0", "y1")
         names = [
             (x, -side - 0.3, f"r{side}{chr(39) * number} {x:.2f}", "center", f"r{side}{chr(39) * number}")
-            for side, number, x in found.critical
+            for side, number, x in estimate.critical
         ]
         self._points.data = _columns(names, *WRITTEN, "short")
         goal = None if scene is None else scene.goal
         asked: list[tuple[Any, ...]] = []
         if scene is not None and isinstance(goal, OrientedBeyond | Reaches):
-            align = "right" if goal.x > 0.5 * max(found.hi) else "left"
+            align = "right" if goal.x > 0.5 * max(estimate.hi) else "left"
             asked = [(goal.x, 0.62, f" goal: side {goal.side} from {goal.x:g} {scene.unit} on ", align)]
-        ends = [(x, y) for x, *_ in asked for y in (0.15 - len(found.lo), 0.55)]
+        ends = [(x, y) for x, *_ in asked for y in (0.15 - len(estimate.lo), 0.55)]
         self._goal.data, self._asked.data = _columns(ends, "x", "y"), _columns(asked, *WRITTEN)
-        low = 0.28 - len(found.lo)
-        at = [] if found.threshold is None else [found.threshold]
+        low = 0.28 - len(estimate.lo)
+        at = [] if estimate.threshold is None else [estimate.threshold]
         limits = [(x, low, f"threshold {x:.3f}", "right") for x in at]
         self._threshold.data = self._limit.data = _columns(limits, *WRITTEN)
-        self.canvas.heading = f"estimate: limit sets, basins{', critical points' * bool(found.critical)}"
+        self.canvas.heading = f"estimate: limit sets, basins{', critical points' * bool(estimate.critical)}"
 
     def mark(self, x: float, side: float) -> None:
         """Show where the part is."""

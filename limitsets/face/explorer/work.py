@@ -155,14 +155,14 @@ def _proofs(scene: Scene, margins: list[str]) -> Iterator[dict[str, Any]]:
         return
     for name in margins:
         try:
-            (found,) = margin(scene, name, reading="fixed")
+            (bracket,) = margin(scene, name, reading="fixed")
         except LimitsetsError as error:
             yield {"margin": name, "error": str(error)}
             continue
-        refuted = None if found.refuted is None else bound(found.refuted, found.unit, up=True)
+        refuted = None if bracket.refuted is None else bound(bracket.refuted, bracket.unit, up=True)
         yield {
             "margin": name,
-            "proved": bound(found.proved, found.unit)
+            "proved": bound(bracket.proved, bracket.unit)
             + (f" {WITHOUT_SCATTER}" if scene.effects.spread else ""),
             "refuted": refuted,
         }

@@ -98,13 +98,15 @@ def _words(source: Any) -> tuple[str, str]:
     return f" of {kind_of(getattr(source, 'map', source)).name}", ""
 
 
-def _cells_of(found: Any) -> list[CellSet]:
+def _cells_of(attractors: Any) -> list[CellSet]:
     """Read sets of cells off attractors, or one of them."""
-    several = found if isinstance(found, Iterable) else [found]
+    several = attractors if isinstance(attractors, Iterable) else [attractors]
     cells = [getattr(each, "cells", None) for each in several]
     known = [each for each in cells if isinstance(each, CellSet)]
     if len(known) < len(cells):
-        raise AnswerError("what to draw", type(found).__name__, "attractors", "pass those of ls.attractors")
+        raise AnswerError(
+            "what to draw", type(attractors).__name__, "attractors", "pass those of ls.attractors"
+        )
     return known
 
 

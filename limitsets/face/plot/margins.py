@@ -370,18 +370,18 @@ def audit(found: Audit) -> Figure:
     return figure
 
 
-def _strip(axes: Axes, found: Audit, finding: Finding, side: int, row: int) -> None:
-    first, last = float(found.scene.sides.a[side]), found.scene.arm_length
+def _strip(axes: Axes, findings: Audit, finding: Finding, side: int, row: int) -> None:
+    first, last = float(findings.scene.sides.a[side]), findings.scene.arm_length
     gid, look = ("cannot tell", UNKNOWN) if finding.missing else ("holds", HOLDS)
     style.bar(axes, first, last, row, HALF, gid=gid, zorder=2, **look)
     for lo, hi in finding.ranges.get(side, ()):
         style.bar(axes, lo, hi, row, HALF, gid="broken", zorder=2, **BROKEN)
 
 
-def _legend(found: Audit, rows: tuple[Finding, ...]) -> list[Any]:
+def _legend(findings: Audit, rows: tuple[Finding, ...]) -> list[Any]:
     handles: list[Any] = [Patch(label="holds", **HOLDS), Patch(label="breaks", **BROKEN)]
     if any(finding.missing for finding in rows):
         handles.append(Patch(label="cannot tell: a fact is missing", **UNKNOWN))
-    if found.extents:
+    if findings.extents:
         handles.append(style.key("between these lines: the limit set", color=style.JOG, lw=1.4))
     return handles

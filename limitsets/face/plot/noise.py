@@ -39,11 +39,11 @@ WORDS = {
 }
 
 
-def _main(found: NoiseStatistics) -> NoisyClass:
-    if not found.classes:
+def _main(statistics: NoiseStatistics) -> NoisyClass:
+    if not statistics.classes:
         remedy = "nothing stays: nothing to draw"
         raise AnswerError("the classes of the noisy scene", "none", "one at least", remedy)
-    return max(found.classes, key=lambda part: len(part.cells))
+    return max(statistics.classes, key=lambda part: len(part.cells))
 
 
 def _plain(axes: Axes) -> None:
@@ -141,8 +141,8 @@ def noise_arrivals(found: NoiseStatistics, thrown: SampledStatistics | None = No
     return figure
 
 
-def _marks(axes: Axes, found: NoiseStatistics) -> None:
-    mean, most = found.feeding.mean, found.feeding.quantile(0.95)
+def _marks(axes: Axes, statistics: NoiseStatistics) -> None:
+    mean, most = statistics.feeding.mean, statistics.feeding.quantile(0.95)
     if mean is not None:
         axes.axvline(mean, color=style.FLIP, lw=1.2, label=f"mean {mean:.1f}")
     if most is not None:

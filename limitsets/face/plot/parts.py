@@ -95,12 +95,12 @@ def part(scene: Scene) -> Figure:
     return figure
 
 
-def refused_part(found: Sketch, why: str) -> Figure:
+def refused_part(sketch: Sketch, why: str) -> Figure:
     """Draw a part that is refused as it is written: its corners by number, its sides, what is wrong.
 
     Parameters
     ----------
-    found : Sketch
+    sketch : Sketch
         From `limitsets.feeder.scene.reading.sketch`.
     why : str
         The error.
@@ -109,7 +109,7 @@ def refused_part(found: Sketch, why: str) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    corners, count = found.vertices, len(found.vertices)
+    corners, count = sketch.vertices, len(sketch.vertices)
     size = max(float(np.ptp(corners, axis=0).max()), 1e-300)
     figure, (axes,) = style.canvas(7.6, 6.0)
     axes.set_aspect("equal")
@@ -131,17 +131,17 @@ def refused_part(found: Sketch, why: str) -> Figure:
         left, right = (corners[k] for k in side_ends(count, side))
         length = float(np.hypot(*(right - left)))
         outward = turn * np.array([right[1] - left[1], left[0] - right[0]]) / max(length, 1e-300)
-        words = f"side {side}: {length:.5g} {found.unit}"
+        words = f"side {side}: {length:.5g} {sketch.unit}"
         away = _clear(words, style.SMALL, outward) * outward
         halfway = tuple((0.5 * (left + right)).tolist())
         style.note(axes, words, halfway, tuple(away.tolist()), ha="center", va="center", zorder=4, gid="side")
-    if found.centre is not None:
-        axes.plot(*found.centre, zorder=5, gid="centre of mass", **CENTRE)
-        style.note(axes, "centre of mass", found.centre, (9, 0), va="center", zorder=5)
+    if sketch.centre is not None:
+        axes.plot(*sketch.centre, zorder=5, gid="centre of mass", **CENTRE)
+        style.note(axes, "centre of mass", sketch.centre, (9, 0), va="center", zorder=5)
     reason = "\n".join(textwrap.wrap(why, 92))
-    axes.set_xlabel(f"x [{found.unit}]\n\n{reason}", fontsize=style.SMALL)
-    axes.set_ylabel(f"y [{found.unit}]")
-    style.title(figure, f"{found.name}: the part as it is written, which is refused")
+    axes.set_xlabel(f"x [{sketch.unit}]\n\n{reason}", fontsize=style.SMALL)
+    axes.set_ylabel(f"y [{sketch.unit}]")
+    style.title(figure, f"{sketch.name}: the part as it is written, which is refused")
     return figure
 
 
@@ -202,13 +202,13 @@ def _centre(axes: Axes, scene: Scene, size: float) -> None:
 def _masses(scene: Scene) -> list[tuple[Array, str]]:
     """Give the masses added to a plate: where they are drawn, and how heavy, as the scene writes it."""
     points = scene.text["part"]["mass"].get("points", ())
-    found = []
+    masses = []
     for k, point in enumerate(points):
         name = f"part.mass.points[{k}]"
         about = np.array([[scene.value(f"{name}.{axis}") for axis in "xy"]]) - np.asarray(scene.centre)
         place = turned(about, angle_on_side(scene, 0))[0] + _centre_at(scene)
-        found.append((place, str(point["mass"])))
-    return found
+        masses.append((place, str(point["mass"])))
+    return masses
 
 
 def _added(axes: Axes, scene: Scene, masses: list[tuple[Array, str]]) -> None:

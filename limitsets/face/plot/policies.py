@@ -101,17 +101,17 @@ def _label(table: Any, k: int) -> str:
     return f"{k}: {throw}" + (f" → {after}" if after else "")
 
 
-def _keys(found: Synthesis) -> list[Any]:
+def _keys(synthesis: Synthesis) -> list[Any]:
     from matplotlib.patches import Patch
 
     keys: list[Any] = [
         Patch(facecolor=COLOURS[k % 4], edgecolor="white", hatch=HATCHES[k % 4], label=f"throw: {name}")
-        for k, name in enumerate(found.throws)
+        for k, name in enumerate(synthesis.throws)
     ]
-    if found.mode == "stop":
+    if synthesis.mode == "stop":
         keys.append(Patch(facecolor="white", edgecolor=style.GOAL, lw=1.4, label="stop: the part is there"))
-    words = "side {} from here on" if found.mode == "stop" else "caught from here on: right on side {}"
-    keys.append(style.key(f"goal: {words.format(found.goal[1])}", **style.GOAL_LINE))
-    if hasattr(found.sensor, "x"):
+    words = "side {} from here on" if synthesis.mode == "stop" else "caught from here on: right on side {}"
+    keys.append(style.key(f"goal: {words.format(synthesis.goal[1])}", **style.GOAL_LINE))
+    if hasattr(synthesis.sensor, "x"):
         keys.append(style.key("sensor", color=style.INK, lw=1.0, ls=(0, (5, 2))))
     return keys

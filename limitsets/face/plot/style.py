@@ -152,19 +152,19 @@ def panels(
     """
     rows = math.ceil(count / columns)
     wide, tall = size[0] * columns + room[0], size[1] * rows + room[1]
-    figure, found = canvas(wide, tall, rows, columns, sharex=True, sharey=True)
-    for axes in found[count:]:
+    figure, frames = canvas(wide, tall, rows, columns, sharex=True, sharey=True)
+    for axes in frames[count:]:
         axes.set_axis_off()
-    for k, axes in enumerate(found[:count]):
+    for k, axes in enumerate(frames[:count]):
         lowest = k + columns >= count
         axes.xaxis.set_tick_params(labelbottom=lowest)
         axes.set_xlabel(below if lowest else "")
-    return figure, found[:count]
+    return figure, frames[:count]
 
 
-def extents_of(found: Any) -> list[Extents]:
+def extents_of(source: Any) -> list[Extents]:
     """Read intervals off an attractor, a limit set, an analysis, or several of them."""
-    extents = getattr(found, "extents", found)
+    extents = getattr(source, "extents", source)
     if isinstance(extents, Mapping):
         return [extents]
     if isinstance(extents, Iterable) and not isinstance(extents, str):
@@ -173,7 +173,7 @@ def extents_of(found: Any) -> list[Extents]:
         if len(known) == len(parts):
             return known
     allowed = "attractors, limit sets or an analysis"
-    raise AnswerError("what to draw", type(found).__name__, allowed, "pass one of these")
+    raise AnswerError("what to draw", type(source).__name__, allowed, "pass one of these")
 
 
 def ends_of(sets: Iterable[Extents]) -> list[float]:

@@ -54,8 +54,8 @@ def outline(scene: Scene, side: int) -> Array:
 def turned(points: Array, angle: float) -> Array:
     """Turn points counterclockwise about the origin."""
     cosine, sine = math.cos(angle), math.sin(angle)
-    found: Array = points @ np.array([[cosine, sine], [-sine, cosine]])
-    return found
+    images: Array = points @ np.array([[cosine, sine], [-sine, cosine]])
+    return images
 
 
 def centre_in_flight(
@@ -184,7 +184,7 @@ def _pendulum(
 
     for event, way in ((low, -1.0), (high, 1.0)):
         event.terminal, event.direction = True, way  # type: ignore[attr-defined]  # scipy reads them there
-    found = solve_ivp(
+    swing = solve_ivp(
         rates,
         (0.0, LONGEST),
         [0.0, rate],
@@ -194,11 +194,11 @@ def _pendulum(
         rtol=1e-10,
         atol=1e-12,
     )
-    if found.status != 1:
+    if swing.status != 1:
         return None
-    number = 0 if found.t_events[0].size else 1
-    end, solution = float(found.t[-1]), found.sol
-    return end, float(found.y[1, -1]), lambda at: solution(at)[0], number
+    number = 0 if swing.t_events[0].size else 1
+    end, solution = float(swing.t[-1]), swing.sol
+    return end, float(swing.y[1, -1]), lambda at: solution(at)[0], number
 
 
 def _ends(corners: Array, vertex: int) -> tuple[float, float]:
@@ -245,15 +245,15 @@ def turned_to_rest(
     scatters : bool
         Whether the landing place may deviate.
     """
-    found = _pendulums(hit, sides, rho, gravity, rolls) if pendulum else None
-    if found is not None:
-        last = found[-1]
+    pieces = _pendulums(hit, sides, rho, gravity, rolls) if pendulum else None
+    if pieces is not None:
+        last = pieces[-1]
         off = rest[0] - last.pose(np.array([last.begin + last.time]))[0, :2]
         size = float(np.abs(hit.corners - hit.centre).max())
         shift = float(off[0]) if scatters else 0.0
         if max(abs(float(off[0]) - shift), abs(float(off[1]))) <= SAME * size:
             aside = np.array([shift, 0.0])
-            return _joined([piece._replace(vertex=piece.vertex + aside) for piece in found], rest, shift)
+            return _joined([piece._replace(vertex=piece.vertex + aside) for piece in pieces], rest, shift)
     return _drawn(hit, rest)
 
 
@@ -404,7 +404,7 @@ class Motion(NamedTuple):
 
 def throws_of(scene: Scene, path: Trace, kappa: float | None = None) -> list[Throw]:
     """Read throws off a trace; those outside the model, which have no impact, are left out with all after them."""
-    found = []
+    throws = []
     for k in range(path.code.size):
         if path.code[k] == codes.OUTSIDE_MODEL or not math.isfinite(float(path.phi[k])):
             break
@@ -421,8 +421,8 @@ def throws_of(scene: Scene, path: Trace, kappa: float | None = None) -> list[Thr
         )
         if scene.effects.spread is not None:
             throw = throw._replace(kappa=kappa_of(scene, throw), scatters=True)
-        found.append(throw)
-    return found
+        throws.append(throw)
+    return throws
 
 
 def stroke_of(scene: Scene) -> float:

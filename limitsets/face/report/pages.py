@@ -144,13 +144,13 @@ def bands(extents: Extents) -> list[tuple[float, float, tuple[int, ...]]]:
     [(1.0, 2.0, (0,)), (2.0, 3.0, (0, 1)), (3.0, 4.0, (1,))]
     """
     cuts = sorted({x for parts in extents.values() for pair in parts for x in pair})
-    found = []
+    pieces = []
     for lo, hi in pairwise(cuts):
         middle = 0.5 * (lo + hi)
         sides = tuple(sorted(s for s, parts in extents.items() if any(a <= middle <= b for a, b in parts)))
         if sides:
-            found.append((lo, hi, sides))
-    return found
+            pieces.append((lo, hi, sides))
+    return pieces
 
 
 # ---------------------------------------------------------------- Goals as sentences
@@ -358,13 +358,13 @@ def environment() -> Environment:
     """Give the templates, with what they call."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    found = Environment(
+    templates = Environment(
         loader=PackageLoader("limitsets.face.report"),
         trim_blocks=True,
         undefined=StrictUndefined,
         autoescape=False,  # Markdown, no HTML
     )
-    found.filters |= {
+    templates.filters |= {
         "bands": bands,
         "count_of": lambda pair: count(*pair),
         "degrees": math.degrees,
@@ -373,7 +373,7 @@ def environment() -> Environment:
         "intervals": intervals,
         "percent": percent,
     }
-    found.globals |= {
+    templates.globals |= {
         "next_command": next_command,
         "order_of": order_of,
         "proposed": proposed,
@@ -382,7 +382,7 @@ def environment() -> Environment:
         "verdict_of": verdict_of,
         "void_of": void_of,
     }
-    return found
+    return templates
 
 
 def words(template: str, figures: Mapping[str, str] | None = None, **answers: Any) -> str:
@@ -486,32 +486,32 @@ def as_html(text: str, images: Mapping[str, str]) -> str:
 # next.
 
 
-def lines_of(found: Fit) -> list[str]:
+def lines_of(fit: Fit) -> list[str]:
     """Write the sentences, one a line."""
-    unit = found.scene.unit
-    lines = [f"{name} is kept as it was: {why}" for name, why in found.held.items()]
+    unit = fit.scene.unit
+    lines = [f"{name} is kept as it was: {why}" for name, why in fit.held.items()]
     lines += [
         f"{name} is not determined by these throws: its value goes with that of {others}, which they do not tell"
-        for name, others in found.undetermined.items()
+        for name, others in fit.undetermined.items()
     ]
-    if found.error is None:
+    if fit.error is None:
         lines.append(
             "no measurement error is given: the scatter is an upper bound (give --error or a column error)"
         )
     else:
-        lines.append(f"measurement error: {found.error:.3g} {unit} (standard deviation of a measured place)")
-    for row, column, recorded, fits in found.misread:
+        lines.append(f"measurement error: {fit.error:.3g} {unit} (standard deviation of a measured place)")
+    for row, column, recorded, fits in fit.misread:
         lines.append(f"row {row}: {column} is recorded as {recorded}, but the part landed as on side {fits}")
-    if found.misread_rate[0] > MOST_MISREAD:
+    if fit.misread_rate[0] > MOST_MISREAD:
         lines.append(
-            f"{100.0 * found.misread_rate[0]:.0f} % of the sides do not fit where parts landed, and no other reading of"
+            f"{100.0 * fit.misread_rate[0]:.0f} % of the sides do not fit where parts landed, and no other reading of"
             " the columns explains it: the sides are recorded wrong, or the part is another one"
         )
-    test = found.misfit
+    test = fit.misfit
     if test.lacking:
         why = "the throws do something that it leaves out, like rolling or slipping, or a number is wrong"
         lines.append(
-            f"the model does not fit (p = {test.p:.2g}): {found.explained or why}; do not trust the values"
+            f"the model does not fit (p = {test.p:.2g}): {fit.explained or why}; do not trust the values"
         )
     else:
         lines.append(f"the model fits: such residuals or larger ones have probability {test.p:.2g}")
@@ -519,11 +519,11 @@ def lines_of(found: Fit) -> list[str]:
         lines.append(
             f"far off: the landings of row{'s' * (len(test.strange) > 1)} {', '.join(map(str, test.strange))}"
         )
-    for each in found.further[:1]:
+    for each in fit.further[:1]:
         name, factor = max(each.shrinks.items(), key=lambda pair: pair[1])
         gain = f"ten of them shorten the interval of {name} {factor:.2g} times"
-        if not found[name].bounded:
+        if not fit[name].bounded:
             gain = f"they tell most of {name}, which these throws do not bound"
-        where = "the left corner at" if found.rows.throws.corner else "x ="
+        where = "the left corner at" if fit.rows.throws.corner else "x ="
         lines.append(f"film next: throws from {where} {each.x:.3g} {unit} on side {each.side}; {gain}")
     return lines

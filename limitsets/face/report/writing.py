@@ -294,9 +294,9 @@ def _needed(finding: Finding, unit: str) -> str:
     return f"matters {'below' if finding.missing == 'bounce_threshold' else 'from'} {at:.2g}"
 
 
-def lines_of(found: Audit) -> list[list[str]]:
+def lines_of(audit: Audit) -> list[list[str]]:
     """Give the table, one line per assumption; columns as in `HEADS`."""
-    unit = found.scene.unit
+    unit = audit.scene.unit
     return [
         [
             f"{here.effect} (on)" if here.simulated else here.effect,
@@ -305,21 +305,21 @@ def lines_of(found: Audit) -> list[list[str]]:
             _worst(here, unit),
             _verdict(everywhere),
         ]
-        for here, everywhere in zip(found.on("limit-set"), found.on("domain"), strict=True)
+        for here, everywhere in zip(audit.on("limit-set"), audit.on("domain"), strict=True)
     ]
 
 
-def summary(found: Audit) -> list[str]:
+def summary(audit: Audit) -> list[str]:
     """Say in a few sentences what the scene calls for."""
-    return words("audit_summary", found=found).split("\n\n")
+    return words("audit_summary", audit=audit).split("\n\n")
 
 
-def audit_page(found: Audit, figures: Mapping[str, str] | None = None) -> str:
+def audit_page(audit: Audit, figures: Mapping[str, str] | None = None) -> str:
     """Write the page.
 
     Parameters
     ----------
-    found : Audit
+    audit : Audit
         From `limitsets.audit`.
     figures : mapping of str to str, optional
         File names of the pictures by kind: "part", "audit".
@@ -335,11 +335,11 @@ def audit_page(found: Audit, figures: Mapping[str, str] | None = None) -> str:
     >>> audit_page(ls.audit("paper-designed")).splitlines()[0]
     '# paper-designed: what the model leaves out'
     """
-    told = {"summary": summary(found), "heads": HEADS, "rows": lines_of(found)}
-    return words("audit", figures or {}, found=found, **told) + "\n"
+    told = {"summary": summary(audit), "heads": HEADS, "rows": lines_of(audit)}
+    return words("audit", figures or {}, audit=audit, **told) + "\n"
 
 
-def write_audit(found: Audit, folder: str | Path, form: str = "png") -> list[Path]:
+def write_audit(audit: Audit, folder: str | Path, form: str = "png") -> list[Path]:
     """Write audit.md, audit.json and the figures into a folder, all of them or none.
 
     Raises
@@ -349,7 +349,7 @@ def write_audit(found: Audit, folder: str | Path, form: str = "png") -> list[Pat
     """
     return laid(
         folder,
-        [("part", plot.part(found.scene)), ("audit", plot.audit(found))],
-        lambda figures: {"audit.md": audit_page(found, figures), "audit.json": as_json(found)},
+        [("part", plot.part(audit.scene)), ("audit", plot.audit(audit))],
+        lambda figures: {"audit.md": audit_page(audit, figures), "audit.json": as_json(audit)},
         form,
     )
