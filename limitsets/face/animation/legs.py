@@ -147,10 +147,10 @@ def rest_leg(
         seconds,
         lambda share: np.tile(lying, (share.size, 1)),
         lambda share: np.zeros(share.size),
-        lambda share: _on_lane(x, side, share),
-        caption,
-        note,
-        stage,
+        lane=lambda share: _on_lane(x, side, share),
+        caption=caption,
+        note=note,
+        stage=stage,
     )
 
 
@@ -189,6 +189,7 @@ def legs_of(
     lying, unit_of = _lying(scene, throw.x, throw.side), scene.unit
     at_rest = f"{throw.word}, x = {throw.after:.2f} {unit_of} on side {throw.side_after}"
     broken = "; another corner would land first, which the model leaves out" if throw.other_first else ""
+    kind_of_throw = f"a {throw.word}" if throw.code >= 0 else throw.word
     flown = moves.turning
     jumps = throw.turned
 
@@ -209,32 +210,32 @@ def legs_of(
             LOWERS,
             lambda share: riding(lying, lowered(swing, share)),
             lambda share: lowered(swing, share),
-            lambda share: _on_lane(throw.x, throw.side, share),
-            f"{name}: the arm goes down",
-            note,
-            stage,
+            lane=lambda share: _on_lane(throw.x, throw.side, share),
+            caption=f"{name}: the arm goes down",
+            note=note,
+            stage=stage,
             begins=True,
         ),
         Leg(
             2.0 * swing * unit,
             lambda share: riding(lying, raised(swing, share)),
             lambda share: raised(swing, share),
-            lambda share: _on_lane(throw.x, throw.side, share),
-            f"{name}: the arm swings up and stops",
-            note,
-            stage,
+            lane=lambda share: _on_lane(throw.x, throw.side, share),
+            caption=f"{name}: the arm swings up and stops",
+            note=note,
+            stage=stage,
             marks=((1.0, "thrown", throw.x, float(lying[1])),),
         ),
         Leg(
             throw.phi * unit,
             moves.flight,
             level,
-            lambda share: np.stack(
+            lane=lambda share: np.stack(
                 [moves.flight(share)[:, 0], np.full(share.size, float(throw.side))], axis=-1
             ),
-            f"{name}: in flight",
-            note,
-            stage,
+            caption=f"{name}: in flight",
+            note=note,
+            stage=stage,
             trail=True,
             marks=((1.0, "impact", *impact),),
         ),
@@ -242,10 +243,10 @@ def legs_of(
             flown.time * unit,
             flown.pose,
             level,
-            turning_lane,
-            f"{name}: impact, and a {throw.word}" if throw.code >= 0 else f"{name}: impact, and {throw.word}",
-            note,
-            stage,
+            lane=turning_lane,
+            caption=f"{name}: impact, and {kind_of_throw}",
+            note=note,
+            stage=stage,
             trail=True,
             marks=(*rolled, (1.0, "rest", throw.after, float(lying[1]))),
             rest=rest,

@@ -290,7 +290,13 @@ class Picture:
             return None
         rolls = any(mark.word == "roll" for mark in film.marks)
         return LanePicture(
-            film.lanes, film.unit, self.scale, self.origin[0], self.bottom, self.size[0], rolls
+            film.lanes,
+            film.unit,
+            self.scale,
+            joint=self.origin[0],
+            top=self.bottom,
+            wide=self.size[0],
+            rolls=rolls,
         )
 
     # ---------------------------------------------------------------- what does not move

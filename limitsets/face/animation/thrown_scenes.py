@@ -167,7 +167,13 @@ def film_of_policy(synthesis: Synthesis, asked: Asked) -> Film:
     question = synthesis.question
     legs = [
         rest_leg(
-            scene, x, side, 1.5, f"Start: x = {x:.2f} {scene.unit} on side {side}", texts[0], steps[0].state
+            scene,
+            x,
+            side,
+            seconds=1.5,
+            caption=f"Start: x = {x:.2f} {scene.unit} on side {side}",
+            note=texts[0],
+            stage=steps[0].state,
         )
     ]
     made = [(each, each.throw) for each in steps if each.throw is not None][: asked.throws]

@@ -82,15 +82,7 @@ def _announce(plan: Plan) -> None:
 
 
 def _text(analysis: Analysis, page: Path) -> None:
-    from limitsets.face.report.pages import (
-        after_undecided,
-        count,
-        intervals,
-        next_command,
-        percent,
-        verdict_of,
-        void_of,
-    )
+    from limitsets.face.report.pages import after_undecided, next_command, percent, verdict_of, void_of
     from limitsets.feeder.scene.checking import doubts
     from limitsets.parameters.analysis import in_limit_sets
 
@@ -99,24 +91,7 @@ def _text(analysis: Analysis, page: Path) -> None:
         typer.echo(analysis.choice.notice)
     for doubt in doubts(analysis.scene):
         typer.echo(str(doubt))
-    if not analysis.attractors:
-        undecided = analysis.basins.undecided_between
-        left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"
-        typer.echo(left if undecided else "no start was found to stay on the arm")
-        if analysis.basins.exits.get("outside-model", 0.0) > MOST:
-            kappa = f"{analysis.scene.kappa:.6g} {unit}"
-            typer.echo(
-                "outside the model: a throw after which the part has not landed within a full turn. "
-                f"Almost all starts are; kappa is {kappa}: has the speed the right unit?"
-            )
-    for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
-        whose = "" if analysis.scene.effects.spread is None else ", of throws without scatter"
-        typer.echo(f"limit set {k}{whose}: from {percent(analysis.basins.attractors[k])} of all starts")
-        rows = [
-            [side, intervals(parts), count(*attractor.jogs_per_visit.get(side, (0, 0)))]
-            for side, parts in extents.items()
-        ]
-        table(["side", f"x [{unit}]", "jogs per visit"], rows)
+    _print_limit_sets(analysis)
     exits = ", ".join(f"{name} {percent(share)}" for name, share in analysis.basins.exits.items() if share)
     if exits:
         typer.echo(f"of all starts leave: {exits}")
@@ -148,6 +123,31 @@ def _text(analysis: Analysis, page: Path) -> None:
     if accuracy is not None and not accuracy.met:
         typer.echo(f"the error of {accuracy.plan.error_wanted:g} {unit} was not met: {accuracy.advice}")
     typer.echo(f"report: {page}")
+
+
+def _print_limit_sets(analysis: Analysis) -> None:
+    """Print the table of each limit set, or where the starts go if there is none."""
+    from limitsets.face.report.pages import count, intervals, percent
+
+    unit = analysis.scene.unit
+    if not analysis.attractors:
+        undecided = analysis.basins.undecided_between
+        left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"
+        typer.echo(left if undecided else "no start was found to stay on the arm")
+        if analysis.basins.exits.get("outside-model", 0.0) > MOST:
+            kappa = f"{analysis.scene.kappa:.6g} {unit}"
+            typer.echo(
+                "outside the model: a throw after which the part has not landed within a full turn. "
+                f"Almost all starts are; kappa is {kappa}: has the speed the right unit?"
+            )
+    for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
+        whose = "" if analysis.scene.effects.spread is None else ", of throws without scatter"
+        typer.echo(f"limit set {k}{whose}: from {percent(analysis.basins.attractors[k])} of all starts")
+        rows = [
+            [side, intervals(parts), count(*attractor.jogs_per_visit.get(side, (0, 0)))]
+            for side, parts in extents.items()
+        ]
+        table(["side", f"x [{unit}]", "jogs per visit"], rows)
 
 
 # ----------------------------------------------------------------

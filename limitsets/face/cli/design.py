@@ -192,7 +192,17 @@ def design(
     names = [name.strip() for words in vary or [] for name in words.split(",")]
     if goal:
         raise typer.Exit(
-            run_goal(scene, names, bounds, begins, evaluations or 600, out, form, csv, json=json)
+            run_goal(
+                scene,
+                names,
+                bounds,
+                laid=begins,
+                evaluations=evaluations or 600,
+                out=out,
+                form=form,
+                csv=csv,
+                json=json,
+            )
         )
     if critical_points is None:
         from limitsets.face.cli.design_robust import run_robust
@@ -202,12 +212,12 @@ def design(
                 scene,
                 names,
                 bounds,
-                begins,
-                evaluations or 1200,
-                seconds,
-                out,
-                form,
-                csv,
+                laid=begins,
+                evaluations=evaluations or 1200,
+                seconds=seconds,
+                out=out,
+                form=form,
+                csv=csv,
                 json=json,
                 recheck=not no_recheck,
             )

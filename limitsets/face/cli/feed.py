@@ -151,31 +151,11 @@ def _unused(feeding: Feeding) -> str:
 
 def _text(feeding: Feeding, files: list[Path], written: dict[str, Any] | None) -> None:
     from limitsets.face.report.pages import in_time
-    from limitsets.face.report.robust_pages import law_words
 
-    end, unit = feeding.end, feeding.end.scene.unit
-    laws = (law_words(name, getattr(feeding.scatter, name), unit) for name in feeding.scatter.given())
-    note = "".join(f"; {said}" for said in [_unused(feeding), *laws] if said)
-    if feeding.vacuous:
-        computed = feeding.shares.shares
-        ways = ", ".join(
-            f"{100 * computed[name]:.4g} % {how}" for name, how in UNFED.items() if computed[name]
-        )
-        typer.echo(
-            f"{end.scene.name}: nothing is fed, none of {feeding.trials.fate.size} parts thrown, and of all starts "
-            f"{ways}"
-        )
-    typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted{note}")
-    if end.laid:
-        from limitsets.feeder.goals import laid_words
-
-        typer.echo(
-            f"all starts, proved and random, are where parts are laid down: {laid_words(end.laid, unit)}"
-        )
-    parts = ", ".join(f"{lo:.4g} to {hi:.4g} {unit}" for lo, hi in end.clear) or "nowhere"
-    typer.echo(f"clear of the wall beyond the end: {parts}")
+    end = feeding.end
+    _print_arm_end(feeding)
     if feeding.safe is not None and feeding.fed is not None:
-        for line in (*feeding.safe.lines(end.side, laid=bool(end.laid)), *feeding.fed.lines(unit)):
+        for line in (*feeding.safe.lines(end.side, laid=bool(end.laid)), *feeding.fed.lines(end.scene.unit)):
             typer.echo(line)
     show(feeding.table())
     if edge := feeding.shares.shares["edge"]:
@@ -218,6 +198,33 @@ def _text(feeding: Feeding, files: list[Path], written: dict[str, Any] | None) -
         typer.echo(said_of(written, "nothing is proved, or of a map with effects, which nothing rechecks"))
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")
+
+
+def _print_arm_end(feeding: Feeding) -> None:
+    """Print where the arm ends, which side is wanted there, where parts start, and at which x they clear the wall."""
+    from limitsets.face.report.robust_pages import law_words
+
+    end, unit = feeding.end, feeding.end.scene.unit
+    laws = (law_words(name, getattr(feeding.scatter, name), unit) for name in feeding.scatter.given())
+    note = "".join(f"; {said}" for said in [_unused(feeding), *laws] if said)
+    if feeding.vacuous:
+        computed = feeding.shares.shares
+        ways = ", ".join(
+            f"{100 * computed[name]:.4g} % {how}" for name, how in UNFED.items() if computed[name]
+        )
+        typer.echo(
+            f"{end.scene.name}: nothing is fed, none of {feeding.trials.fate.size} parts thrown, and of all starts "
+            f"{ways}"
+        )
+    typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted{note}")
+    if end.laid:
+        from limitsets.feeder.goals import laid_words
+
+        typer.echo(
+            f"all starts, proved and random, are where parts are laid down: {laid_words(end.laid, unit)}"
+        )
+    parts = ", ".join(f"{lo:.4g} to {hi:.4g} {unit}" for lo, hi in end.clear) or "nowhere"
+    typer.echo(f"clear of the wall beyond the end: {parts}")
 
 
 def _proved(brackets: AbsorptionBrackets) -> list[str]:

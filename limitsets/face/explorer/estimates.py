@@ -348,12 +348,12 @@ def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
         tuple(domain.lo[:, 0].tolist()),
         tuple(domain.hi[:, 0].tolist()),
         sets,
-        tuple(bands for _, bands in sharpened),
-        topology is not None,
-        tuple(each.flip_order for each in limit_sets),
-        tuple(zip(labels.tolist(), weight.tolist(), strict=True)),
-        tuple(_runs(split)),
-        tuple(
+        bands=tuple(bands for _, bands in sharpened),
+        sharp=topology is not None,
+        orders=tuple(each.flip_order for each in limit_sets),
+        shares=tuple(zip(labels.tolist(), weight.tolist(), strict=True)),
+        basins=tuple(_runs(split)),
+        critical=tuple(
             (side, number, point.x)
             for side, points in critical_points(params, domain, samples=SAMPLES).items()
             for number, point in enumerate(points)

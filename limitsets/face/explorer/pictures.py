@@ -207,6 +207,7 @@ MARGINS = (52, 12, 24, 38)
 PIXELS, FEW = 500, 40
 """Points of a plane map at so few places, in a picture so wide, are a cycle: they are drawn so that they are seen."""
 
+BARS = ("left", "right", "bottom", "top", "face", "hatch")
 WRITTEN = ("x", "y", "words", "align")
 
 
@@ -214,9 +215,8 @@ class LanesPicture:
     """A lane for each side: basins as strips, limit sets as bars in them, critical points, the goal, the start."""
 
     def __init__(self, touched: Callable[[Hand], None] | None = None) -> None:
-        bars = "left", "right", "bottom", "top", "face", "hatch"
-        self._basins = Layer("bars", "basins", columns=bars, line="#777777")
-        self._sets = Layer("bars", "limit sets", columns=bars, line=style.INK)
+        self._basins = Layer("bars", "basins", columns=BARS, line="#777777")
+        self._sets = Layer("bars", "limit sets", columns=BARS, line=style.INK)
         stroke = "x", "y0", "y1"
         self._critical = Layer("strokes", "critical points", columns=stroke, line=style.INK, width=3)
         self._goal = Layer("path", "goal", line=style.GOAL, width=2.5, dash=[2, 4])
@@ -253,13 +253,13 @@ class LanesPicture:
         rows = [
             (lo, hi, -side - 0.3, -side + 0.3, *look_of(label)[:2]) for side, lo, hi, label in estimate.basins
         ]
-        self._basins.data = _columns(rows, "left", "right", "bottom", "top", "face", "hatch")
+        self._basins.data = _columns(rows, *BARS)
         rows = []
         for k, extents in enumerate(estimate.sets):
             face, hatch = style.SETS[k % len(style.SETS)]
             for side, parts in extents.items():
                 rows += [(lo, hi, -side - 0.14, -side + 0.14, face, pattern(hatch)) for lo, hi in parts]
-        self._sets.data = _columns(rows, "left", "right", "bottom", "top", "face", "hatch")
+        self._sets.data = _columns(rows, *BARS)
         marks = [(x, -side - 0.3, -side + 0.3) for side, _, x in estimate.critical]
         self._critical.data = _columns(marks, "x", "y0", "y1")
         names = [

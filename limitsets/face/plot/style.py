@@ -89,17 +89,35 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
     """
     if isinstance(source, Scene):
         branches, flags = kind_of(source.map).branches, other_vertex_first(source)
-        ends = (source.sides.a, source.arm_length)
         return Subject(
-            source.name, source.unit, source.map, source.domain, *ends, source.goal, branches, flags, True
-        )  # fmt: skip
+            source.name,
+            source.unit,
+            source.map,
+            domain=source.domain,
+            least=source.sides.a,
+            most=source.arm_length,
+            goal=source.goal,
+            branches=branches,
+            flags=flags,
+            thrown=True,
+        )
     domain = source.grid.domain
     if source.grid.dimension > 1:
         remedy = "draw its basins, or a section of it"
         raise AnswerError("the dimension of the map", source.grid.dimension, "1", remedy)
     kind = kind_of(source.map)
-    ends = (domain.lo[:, 0], float(domain.hi.max()))
-    return Subject(type(source.map).__name__, "", source.map, domain, *ends, None, kind.branches, {}, False)
+    return Subject(
+        type(source.map).__name__,
+        "",
+        source.map,
+        domain=domain,
+        least=domain.lo[:, 0],
+        most=float(domain.hi.max()),
+        goal=None,
+        branches=kind.branches,
+        flags={},
+        thrown=False,
+    )
 
 
 # ----------------------------------------------------------------

@@ -412,12 +412,12 @@ def throws_of(scene: Scene, path: Trace, kappa: float | None = None) -> list[Thr
             float(path.x[k]),
             int(path.side[k]),
             float(path.x[k + 1]),
-            int(path.side[k + 1]),
-            int(path.code[k]),
-            int(path.turned[k]),
-            float(path.phi[k]),
-            scene.kappa if kappa is None else kappa,
-            bool(path.other_vertex_first[k]),
+            side_after=int(path.side[k + 1]),
+            code=int(path.code[k]),
+            turned=int(path.turned[k]),
+            phi=float(path.phi[k]),
+            kappa=scene.kappa if kappa is None else kappa,
+            other_first=bool(path.other_vertex_first[k]),
         )
         if scene.effects.spread is not None:
             throw = throw._replace(kappa=kappa_of(scene, throw), scatters=True)
