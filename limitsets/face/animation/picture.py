@@ -1,8 +1,8 @@
 """What a frame looks like, in pixels from the upper left: the arm with parts and cavity, below a lane for each side.
 
-Both have one axis of x, so that a part stands over its place in the lanes.  What does not move is drawn once
-(`Picture.still`); what does is asked for frame by frame (`Picture.moving`), or drawn by the script of a page from the
-same numbers (`page.py`).  Colours and sizes are those of `limitsets.face.plot.style`; nothing is in colour alone.
+Both have one axis of x, so that a part stands over its place in the lanes.  Fixed shapes are drawn once
+(`Picture.still`); moving shapes are computed frame by frame (`Picture.moving`), or drawn by the script of a page from
+the same numbers (`writers.py`).  Colours and sizes are those of `plot.style`; nothing is in colour alone.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TEXT = {"fill": style.INK, "size": 14.0}
 
 
 class Shape(NamedTuple):
-    """Something to draw.
+    """A shape to draw.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ def text_of(words: str, x: float, y: float, **look: Any) -> Shape:
 
 
 LEFT = 62.0
-"""Left of the joint's side of all pictures there is so much room for names [pixels]."""
+"""Room for names, left of the joint in all pictures [pixels]."""
 
 LANE, GAP, AXIS, LINE = 34.0, 22.0, 22.0, 12.0
 KNOWN: dict[str, Any] = {"fill": "#F2C14E", "stroke": "#8A6D00", "width": 0.8, "opacity": 0.75}
@@ -78,18 +78,18 @@ def pointer(x: float, y: float) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True, eq=False)
 class LanePicture:
-    """Lanes laid out.
+    """The lanes in pixels.
 
     Attributes
     ----------
     lanes : Lanes
-        What is in them.
+        Contents of the lanes.
     unit : str
         Of x.
     scale, joint : float
-        Pixels for a unit of length, and where x is 0.
+        Pixels for a unit of length, and place of x = 0 [pixels].
     top, wide : float
-        Where they begin, and how wide the picture is [pixels].
+        Upper end of the lanes, and width of the picture [pixels].
     rolls : bool
         Whether a part rolls on in the film.
     """
@@ -112,11 +112,11 @@ class LanePicture:
         return self.joint + self.scale * x
 
     def height(self, side: float) -> float:
-        """Height of a lane, also between two [pixels]."""
+        """Height of a lane, or of a place between two lanes [pixels]."""
         return self.top + GAP + LINE * len(self.lanes.lines) + LANE * (side + 0.35)
 
     def still(self) -> list[Shape]:
-        """Draw everything in the lanes that stays where it is."""
+        """Draw the fixed shapes of the lanes."""
         lanes = self.lanes
         top, foot = self.height(-0.45), self.height(len(lanes.begin) - 0.5)
         shapes = []
@@ -219,14 +219,14 @@ class LanePicture:
 
 
 # ----------------------------------------------------------------
-# What a frame looks like, in pixels from the upper left: above the arm with the parts, below a lane for each side.
+# A frame in pixels from the upper left: the arm with the parts above, a lane for each side below.
 
 
-# The widest and the narrowest picture, its borders, and the most for what is above the lanes.
+# The widest and the narrowest picture, its borders, and the largest height of the part above the lanes.
 WIDEST, NARROWEST = 900.0, 640.0
 RIGHT, TOP, FOOT = 22.0, 62.0, 62.0
 TALLEST = 500.0
-# The line from a part to its place in the lanes is left out where they are farther apart than this.
+# The line from a part to its place in the lanes is left out if it leans by more than this [pixels].
 LEANS = 16.0
 THICK = 0.45
 """Of the arm [length, for one 28 long]."""
@@ -238,7 +238,7 @@ GROUND, ARM = "#dedede", "#c4c4c4"
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A film laid out.
+    """A film in pixels.
 
     Attributes
     ----------
@@ -262,7 +262,7 @@ class Picture:
 
     @classmethod
     def of(cls, film: Film) -> Picture:
-        """Lay a film out: everything that moves is in sight all the time."""
+        """Choose the scale of a film, such that the moving parts stay in sight."""
         lo, hi = _bounds(film)
         across, up = (hi - lo).tolist()
         scale = min((WIDEST - LEFT - RIGHT) / across, TALLEST / up)
@@ -272,7 +272,7 @@ class Picture:
         lanes = 0.0 if film.lanes is None else LanePicture.room(film.lanes)
         tall = 2 * math.ceil(
             0.5 * (bottom + lanes + FOOT)
-        )  # even, as codecs of video ask of who converts a GIF
+        )  # even, as video codecs require when a GIF is converted
         return cls(
             film, scale, (left - scale * float(lo[0]), TOP + scale * float(hi[1])), bottom, (wide, tall)
         )
@@ -284,7 +284,7 @@ class Picture:
 
     @property
     def rows(self) -> LanePicture | None:
-        """The lanes, where there are any."""
+        """The lanes, or None if the film has none."""
         film = self.film
         if film.lanes is None:
             return None
@@ -302,7 +302,7 @@ class Picture:
     # ---------------------------------------------------------------- what does not move
 
     def still(self) -> list[Shape]:
-        """Everything that stays where it is."""
+        """Draw the fixed shapes."""
         film = self.film
         shapes = [] if film.arm.any() else self._ground(0)
         if self.rows is not None:
@@ -319,14 +319,14 @@ class Picture:
         return shapes + [shape_of("line", [*each, each[0]], stroke="#9a9a9a", width=1.0) for each in pieces]
 
     def _in_sight(self, polygon: Array) -> Array:
-        """Clip a polygon to the upper part: ground is as thick as parts are long."""
+        """Clip a polygon to the upper part of the picture: ground is as thick as parts are long."""
         pixels = self.at(polygon)
         return np.clip(pixels, (2.0, TOP - 20.0), (self.size[0] - 2.0, self.bottom))
 
     # ---------------------------------------------------------------- what moves
 
     def moving(self, k: int) -> list[Shape]:
-        """Everything else, in a frame."""
+        """Draw the moving shapes of a frame."""
         film = self.film
         shapes = self._known(k)
         shapes += self._ground(k) if film.arm.any() else []
@@ -419,7 +419,7 @@ class Picture:
 
 
 def _bounds(film: Film) -> tuple[Array, Array]:
-    """Find the least and the largest x and y of what is shown."""
+    """Find the least and the largest x and y in the film."""
     reach = max(float(np.hypot(*outline.T).max()) for outline in film.outlines)
     lo, hi = np.array([np.inf, np.inf]), np.array([-np.inf, -np.inf])
     for part, outline in enumerate(film.outlines):
@@ -456,7 +456,7 @@ def _wrapped(words: str, most: int) -> Sequence[str]:
 
 
 # ----------------------------------------------------------------
-# The cavity in a film: a sheet as thick as the arm, that is part of the arm and turns with it.
+# The cavity in a film: a sheet as thick as the arm, fixed to the arm, which turns with it.
 
 
 def cavity_pieces(scene: Scene, wall: float) -> tuple[Array, ...]:
@@ -467,7 +467,7 @@ def cavity_pieces(scene: Scene, wall: float) -> tuple[Array, ...]:
     scene : Scene
         The scene; without a cavity there are no pieces.
     wall : float
-        How high the far wall stands over the arm's surface [length].
+        Height of the far wall over the arm's surface [length].
     """
     cavity, top = scene.cavity, scene.surface_height
     if cavity is None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 USUAL = 8
-"""Throws that are shown unless others are asked for."""
+"""Default number of throws that are shown."""
 
 
 def film_of_scene(scene: Scene, asked: Asked) -> Film:
@@ -49,7 +49,7 @@ def film_of_analysis(analysis: Analysis, asked: Asked) -> Film:
 def film_of_throws(
     scene: Scene, start: tuple[float, int], count: int, pace: Pace, lanes: Lanes | None = None
 ) -> Film:
-    """Show so many throws of a scene from a start; without lanes nothing is analysed."""
+    """Show `count` throws of a scene from a start; without lanes nothing is analysed."""
     from limitsets.feeder.thrower import trace
 
     x, side = start
@@ -72,7 +72,7 @@ def film_of_throws(
 
 
 def film_of_margin(margin: Margin, asked: Asked) -> Film:
-    """Show the last throws of the orbit that refutes."""
+    """Show the last throws of the orbit that refutes the goal."""
     if asked.start is not None:
         raise AnswerError("the start", asked.start, "none: the orbit of a margin has its own", "leave it out")
     states = margin.counterexample
@@ -116,7 +116,7 @@ def film_of_margin(margin: Margin, asked: Asked) -> Film:
 
 
 def _thrown(scene: Scene, here: Any) -> Throw:
-    """Throw a state as the proof does, with its own kappa; what it lands farther is the noise of the landing."""
+    """Throw a state as the proof does: with its own kappa, and with the noise of its landing added."""
     from limitsets.feeder.thrower import trace
     from limitsets.feeder.thrower.motion import FullThrow
 
@@ -205,7 +205,7 @@ def _words(synthesis: Synthesis, step: _Step) -> str:
 
 
 def _run(synthesis: Synthesis, policy: Policy, x: float, side: int) -> list[_Step]:
-    """Follow the table, each throw without noise, each answer without error."""
+    """Follow the policy's table: each throw is without noise, each answer of the sensor without error."""
     from limitsets.feeder.thrower import trace
 
     steps: list[_Step] = []

@@ -84,7 +84,7 @@ def deviations(option: str, words: list[str] | None) -> dict[str, str]:
 def laid_ranges(words: list[str] | None) -> dict[int, list[tuple[float | str, float | str]]] | None:
     """Read the words of --laid, SIDE=LO:HI each; bare numbers are in the scene's unit.
 
-    A unit behind one end is that of both.
+    A unit behind one end holds for both.
     """
     ranges: dict[int, list[tuple[float | str, float | str]]] = {}
     for word in words or []:
@@ -119,7 +119,7 @@ def _ends_of(words: list[str] | None) -> dict[str, _Ends]:
 
 
 def bounds_of(scene: Scene, words: list[str] | None) -> dict[str, tuple[float | None, float | None]]:
-    """Read --bounds in the units of a scene; a bare number is in the unit in which people read the quantity."""
+    """Read --bounds in the units of a scene; a bare number is in the unit in which the quantity is displayed."""
     from limitsets.feeder.scene.quantities import in_units, unit_read
 
     def read(name: str, end: float | str | None) -> float | None:
@@ -143,7 +143,7 @@ def bounds_of(scene: Scene, words: list[str] | None) -> dict[str, tuple[float | 
 
 
 def own_file(scene: Scene) -> Path:
-    """Name a certificate after the scene's file; a certificate of another scene that has this name stays."""
+    """Name a certificate after the scene's file; refuse to overwrite the certificate of another scene."""
     file, name = Path(f"{stem_of(scene)}.proof.zip"), scene.name
     with suppress(OSError, BadZipFile, ValueError, TypeError, LookupError), ZipFile(file) as other:
         name = loads(other.read("header.json"))["boxes"][0]["scene"]["name"]
@@ -156,14 +156,14 @@ def own_file(scene: Scene) -> Path:
 
 
 def with_ending(file: Path) -> Path:
-    """Give a certificate its ending where its name has none; what is there, a folder or a device, keeps its name."""
+    """Add the ending of certificates to a name without one; an existing folder or device keeps its name."""
     return file if file.suffix or file.exists() else file.with_name(f"{file.name}.proof.zip")
 
 
 def certified(
     answer: Any, file: Path, claim: str, *, proved: bool, recheck: bool
 ) -> tuple[Any, dict[str, Any]]:
-    """Write the certificate; what is left of the answer where the checker denies it, and what is said of the file."""
+    """Write the certificate; return the answer without claims that the checker denies, and a record of the file."""
     from limitsets.proofs.prover.certificate import DeniedError
 
     if not proved:
@@ -180,7 +180,7 @@ def certified(
 
 
 def said_of(written: dict[str, Any], missing: str) -> str:
-    """Say it to people; `missing` is why there is no file."""
+    """Say in a line what became of the certificate; `missing` is the reason for having none."""
     file, seconds = written["file"], written["recheck"]
     if file is None:
         return f"no certificate is written: {missing}"

@@ -69,7 +69,7 @@ def atlas(
     with progress() as tell:
         from limitsets.parameters.atlas import atlas as run
 
-        if task is not None:  # a file of the present folder is found, as `python -m` would find it
+        if task is not None:  # a file in the current folder can be imported, as with `python -m`
             sys.path.insert(0, str(Path.cwd()))
         chosen, _ = opened(scene, None)
         store = out or Path(f"{stem_of(chosen)}-atlas.zarr")
@@ -102,7 +102,7 @@ def atlas(
 
 
 def _certified(answers: Atlas, file: Path, workers: int | None, tell: Progress) -> dict[str, float]:
-    """Prove the cells on processes, and write the certificate; shares of the window by what is proved."""
+    """Prove the cells in several processes, write the certificate, and return the share of the window by verdict."""
     with processes(workers) as pool:
         regions = answers.certify(executor=pool, progress=tell)
     tell("certificate", 0, 1)
@@ -111,7 +111,7 @@ def _certified(answers: Atlas, file: Path, workers: int | None, tell: Progress) 
 
 
 def _draw(answers: Atlas, file: Path) -> bool:
-    """Draw the classes, if the answers say them; whether they do."""
+    """Draw the classes, if the answers have any; return whether they have."""
     from limitsets.face.plot.atlas_maps import atlas as figure
     from limitsets.face.report.writing import DPI
     from limitsets.parameters.atlas.classes import is_classified
@@ -125,7 +125,7 @@ def _draw(answers: Atlas, file: Path) -> bool:
 
 
 def _text(answers: Atlas, csv: Path | None, picture: Path | None) -> None:
-    """Print the classes, what the answers range over, and where they are."""
+    """Print the classes, the ranges of the answers, and the store."""
     from limitsets.parameters.atlas.classes import is_classified, legend
 
     for each in legend(answers.dataset) if is_classified(answers.dataset) else ():

@@ -53,7 +53,7 @@ def run_goal(
     *,
     json: bool,
 ) -> int:
-    """Search, prove, write and print; the exit code."""
+    """Search, prove, write and print; return the exit code."""
     with progress() as tell:
         from limitsets.parameters.design.for_goal import design_for_goal
 
@@ -253,7 +253,7 @@ def _points(words: str) -> list[float | str | None]:
 def _written(
     solution: Design, out: Path, form: str, about: About, tell: Callable[[str, int, int], None]
 ) -> list[Path]:
-    """Write the scene, or a folder with the scene, the answer as JSON and the figure of the way there."""
+    """Write the scene, or a folder with the scene, the answer as JSON and a figure of the design's path."""
     from limitsets.feeder.scene import dump
 
     if out.suffix == ".toml":
@@ -271,7 +271,7 @@ def _written(
 
 
 def _text(solution: Design, files: list[Path], about: About) -> None:
-    """Print what changed, how well it is reached, and the scene."""
+    """Print the changed quantities, how well the critical points are reached, and the scene."""
     show(solution.table())
     typer.echo(solution.message[:1].upper() + solution.message[1:] + ".")
     condition = "not known" if solution.condition is None else f"{solution.condition:.4g}"

@@ -36,7 +36,7 @@ def run_robust(
     json: bool,
     recheck: bool,
 ) -> int:
-    """Search, prove, write and print; the exit code."""
+    """Search, prove, write and print; return the exit code."""
     with progress() as tell:
         from limitsets.parameters.design import robust_design
         from limitsets.parameters.design.for_margin import NoDesignError
@@ -71,7 +71,7 @@ def run_robust(
 
 
 def _kept(best: Scene, file: Path) -> None:
-    """Write the best design so far: a search that is ended has it."""
+    """Write the best design so far, for the case that the search is interrupted."""
     file.parent.mkdir(parents=True, exist_ok=True)
     save_scene(best, file)
 
@@ -86,7 +86,7 @@ def _missed(
     *,
     json: bool,
 ) -> int:
-    """Write and print the nearest miss, and what ruled designs out."""
+    """Write and print the nearest miss, and the reasons for which designs were ruled out."""
     from limitsets.base.tables import Column, Table
     from limitsets.feeder.scene.scene import in_unit_of, unit_of
 
@@ -119,7 +119,7 @@ def _missed(
 
 
 def _written(design: RobustDesign, out: Path, form: str, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:
-    """Write the scene, or a folder: scene, answer, certificates, figure; the design without what the checker denies."""
+    """Write the scene, or a folder with all files; return the design without the claims that the checker denies."""
     if out.suffix == ".toml":
         return design, save_scene(design.scene, out)
     from limitsets.face import plot
@@ -139,7 +139,7 @@ def _written(design: RobustDesign, out: Path, form: str, *, recheck: bool) -> tu
 
 
 def _text(design: RobustDesign, files: list[Path], about: About) -> None:
-    """Print what changed, both margins, the throws, the lead weight, and the scene."""
+    """Print the changed quantities, both margins, the throws, the lead weight, and the scene."""
     from limitsets.face.report.pages import in_time
     from limitsets.parameters.design.design_result import both
 

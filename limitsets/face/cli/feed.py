@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from limitsets.proofs.chances.absorption import AbsorptionBrackets
 
 
-# What becomes of parts where none is fed.
+# Fates of parts if none is fed.
 UNFED = {"left": "leave the arm otherwise", "never": "stay on it"}
 
-# What ends the throws of a part that is not fed.
+# Reasons why the throws of a part end without it being fed.
 ENDED = {"left": "leaves the arm", "edge": "comes to lie where its throw acts beyond the end"}
 
-# Shares below this are what rounding leaves of nothing.
+# Smaller shares are rounding errors of 0.
 NOTHING = 1e-9
 
 HELP_SCATTER = (
@@ -142,7 +142,7 @@ def feed(
 
 
 def _unused(feeding: Feeding) -> str:
-    """Say that the scene's scatter is not used, and what uses it."""
+    """Say that the scene's scatter is not used, and which option would use it."""
     scene = feeding.end.scene
     if scene.world.scatter is None or scene.effects.spread is not None or feeding.scatter.given():
         return ""

@@ -104,7 +104,7 @@ def _goal_at(scene: Any, text: str) -> Any:
 def _write(
     given: tuple[Margin, ...], out: Path, form: str, about: About, *, recheck: bool
 ) -> tuple[tuple[Margin, ...], list[dict[str, Any]]]:
-    """Write the files; the margins and their JSON without what the checker denies."""
+    """Write the files; return the margins and their JSON, without the claims that the checker denies."""
     from limitsets.base.errors import AnswerError
     from limitsets.face.plot.margins import tolerance_box, tornado
     from limitsets.face.plot.parts import part

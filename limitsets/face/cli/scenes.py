@@ -79,7 +79,7 @@ def new(
 
 
 # ----------------------------------------------------------------
-# `limitsets check`: all that is wrong with a scene, at once.
+# `limitsets check`: all errors of a scene at once.
 
 
 WORDS = ("key", "thing", "value", "allowed", "remedy")
@@ -112,7 +112,7 @@ def check(scene: Scene, out: Out = None, csv: Csv = None, json: Json = False) ->
 
 
 def _beside_kappa(scene: SceneOf) -> str:
-    """Say of a gravity that changes no throw what it is for; empty where it changes them, or is not given."""
+    """Explain a gravity that changes no throw; empty if it changes throws, or is not given."""
     if scene.gravity is None or "kappa" not in scene.text["throw"]:
         return ""
     speed = math.degrees(scene.value("throw.speed"))
@@ -125,10 +125,10 @@ def _count(number: int, word: str) -> str:
 
 
 # ----------------------------------------------------------------
-# `limitsets doctor`: what is installed, and where the compiled code lies.
+# `limitsets doctor`: the installed packages, and the folder of the compiled code.
 
 
-# Extras that only whoever works on the package itself needs.
+# Extras that are needed only to develop the package itself.
 INNER = ("bench", "dev")
 
 _REQUIREMENT = re.compile(r"""([A-Za-z0-9._-]+)[^;]*(?:;.*\bextra\s*==\s*["']([^"']+)["'])?""")
@@ -170,7 +170,7 @@ def doctor(
 
 
 def _packages() -> list[dict[str, str | None]]:
-    """List what the package asks for, each with the version that is there, and the extra that needs it."""
+    """List the required packages, each with its installed version and the extra that requires it."""
     try:
         lines = requires("limitsets") or []
     except PackageNotFoundError:  # a folder on the path, not installed

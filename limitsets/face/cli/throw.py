@@ -162,7 +162,7 @@ def plot(
 
 
 def _part(scene: str) -> tuple[str, Figure, LimitsetsError | None]:
-    """Draw what needs no analysis; of a part that is refused what can be read of it, and the error."""
+    """Draw the part, which needs no analysis; if it is refused, draw its readable corners and return the error."""
     from limitsets.face.plot.parts import part, refused_part
     from limitsets.feeder.scene import load
     from limitsets.feeder.scene.reading import sketch

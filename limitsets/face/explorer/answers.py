@@ -1,4 +1,4 @@
-"""What the page says, as HTML in which nothing from outside is markup, and how other scenes are typed or drawn."""
+"""The texts of the page as HTML, with text from outside escaped, and the ways to type or draw another scene."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ KEY = (
 )
 
 LISTED = 12
-"""Points of a cycle that are told one by one."""
+"""Largest number of points of a cycle that are listed one by one."""
 
 VERDICTS = {
     "proved": "&#10003; <b>proved</b>",
@@ -38,7 +38,7 @@ VERDICTS = {
 
 
 def error_line(error: object) -> str:
-    """Say what is wrong, in one line that a screen reader speaks at once."""
+    """Give the error in one line that a screen reader speaks at once."""
     return f'<p role="alert" class="wrong">{escape(str(error))}</p>' if error else '<p role="alert"></p>'
 
 
@@ -61,7 +61,7 @@ def careful_line(estimate: Estimate, scene: Scene) -> str:
 
 
 def estimate_words(estimate: Estimate, goal: Goal | None, unit: str, of: str = "") -> str:
-    """Say what is estimated; `of` says of which model."""
+    """Put the estimate into words; `of` names its model."""
     rows = []
     for k, (extents, bands, order) in enumerate(
         zip(estimate.sets, estimate.bands, estimate.orders, strict=True)
@@ -117,7 +117,7 @@ def _goal_words(estimate: Estimate, goal: Goal, unit: str) -> str:
 
 
 def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state: str, of: str = "") -> str:
-    """Say what is proved; `of` says of which model."""
+    """Put the proofs into words; `of` names their model."""
     names = {knob.name: knob.words for knob in knobs}
     rows = []
     for line in lines:
@@ -153,21 +153,21 @@ def _table(title: str, rows: Sequence[tuple[str, str]], foot: str) -> str:
 # Other scenes: drawn by clicking corners, typed, or sent as a file.
 
 
-# Corners that are drawn are kept to so many digits: a click is no more exact.
+# Digits of drawn corners: a click is not more exact.
 DIGITS = 3
 
 
 class Opening:
-    """What opens another scene.
+    """The controls that open another scene.
 
     Parameters
     ----------
     opened : callable
-        Told the scene.
+        Called with the scene.
     drawn : callable
-        Told the corners so far, and whether more are awaited.
+        Called with the corners so far, and whether more are expected.
     say : callable
-        Told what is wrong.
+        Called with the error.
     """
 
     def __init__(
@@ -208,7 +208,7 @@ class Opening:
         self._text.value = dump(scene)
 
     def corner(self, x: float, y: float) -> None:
-        """Add a corner where the part's picture was clicked, if one is being drawn."""
+        """Add a corner at the place of a click on the part's picture, while a part is being drawn."""
         if self._draw.value:
             self._corners.value = f"{self._corners.value} {x:.{DIGITS}g},{y:.{DIGITS}g}".strip()
 

@@ -45,11 +45,11 @@ if TYPE_CHECKING:
 
 
 def title_of(answers: Atlas) -> str:
-    """Name what is varied."""
+    """Give the title: the names of the varied quantities."""
     return str(answers.dataset.attrs.get("title", "")).removeprefix("atlas of ")
 
 
-# Hatch of points at which no part gets to the X of the goal: another than those of the classes in `atlas_maps`.
+# Hatch of points at which no part gets to the X of the goal; it differs from the hatches of classes.
 UNREACHED = "oo"
 
 
@@ -112,7 +112,7 @@ def hatched(
 
 
 def goal_line(axes: Axes, answers: Atlas) -> list[Any]:
-    """Draw where the scene's goal begins or ceases to hold, ticks where it fails; the entry of a legend."""
+    """Draw the line at which the goal begins or ceases to hold, ticks where it fails; return the legend's entry."""
     data = answers.dataset
     if "threshold" not in data:
         return []
@@ -134,7 +134,7 @@ def goal_line(axes: Axes, answers: Atlas) -> list[Any]:
         line = axes.contour(
             xs, ys, np.ma.masked_invalid(over), [0.0], colors=style.GOAL, linewidths=1.6, zorder=4
         )
-        # a contour has the higher values on its left
+        # higher values are on the left of a contour
         line.set(path_effects=[*looks, withTickedStroke(angle=90, **ticks)], gid="goal")
     else:
         x = data[names[0]].values
@@ -151,7 +151,7 @@ def goal_line(axes: Axes, answers: Atlas) -> list[Any]:
 
 
 def _goal_of(answers: Atlas) -> Any:
-    """Read the goal of an atlas that says thresholds: only these two kinds have one."""
+    """Read the goal of an atlas with thresholds: only these two kinds of goal have one."""
     from limitsets.feeder.goals import OrientedBeyond, Reaches
     from limitsets.feeder.scene import load
 
@@ -161,7 +161,7 @@ def _goal_of(answers: Atlas) -> Any:
 
 
 def unreached(axes: Axes, answers: Atlas) -> list[Any]:
-    """Hatch where no part gets to the goal's X: a goal that asks of parts beyond X holds there of none.
+    """Hatch points at which no part gets to the goal's X: there a goal about parts beyond X holds of no part.
 
     Returns the entry of a legend.
     """
@@ -183,7 +183,7 @@ def unreached(axes: Axes, answers: Atlas) -> list[Any]:
 
 
 def mark(axes: Axes, answers: Atlas) -> list[Any]:
-    """Mark the scene or map itself, if it lies in the window; the entry of a legend."""
+    """Mark the scene or map itself, if it lies in the window; return the legend's entry."""
     values = []
     for name in answers.axes:
         value, given = _value_of(answers, name), answers.dataset[name].values
@@ -205,7 +205,7 @@ def mark(axes: Axes, answers: Atlas) -> list[Any]:
 
 
 def _value_of(answers: Atlas, name: str) -> float | None:
-    """Return the value of a quantity in the scene or map that is varied, in the unit of its axis."""
+    """Return the value of a quantity in the unvaried scene or map, in the unit of its axis."""
     data, plan = answers.dataset, answers.dataset.attrs["plan"]
     if "scene" not in plan:
         value = plan.get("parameters", {}).get(name)
@@ -223,19 +223,19 @@ def _value_of(answers: Atlas, name: str) -> float | None:
 # Maps of an atlas: the classes of its points, with a legend in words.
 
 
-# Paul Tol's light scheme, made for areas and colour-blind readers, without its orange; a cycle's face.
+# Faces of cycles: Paul Tol's light scheme, made for areas and colour-blind readers, without its orange.
 FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#99DDFF", "#BBCC33", "#AAAA00")
-# Bands that no cycle is are darker by this share of ink; without an attractor these, by what every start does.
+# Attractors other than cycles are darker by this share of ink; classes without an attractor have the faces below.
 DARKER = 0.16
-# Shares of white of classes with the same face: other bands by side, another order, seven bands more.
+# Shares of white that separate classes with the same face: other bands by side, another order, seven more bands.
 LIGHTER = (0.0, 0.32, 0.58)
 ALL_LEAVE, ALL_COLLAPSE, NEITHER_ALL = "#EE9A62", "#6A4C93", "#F6D9C4"
 DOUBT, DOUBT_HATCH = "#B4B4B4", "xxxx"
 LEAVE_HATCH, COLLAPSE_HATCH = "////", "...."
 MOST_LINES = 12
-# What a line of the legend, and the room below an entry, take [inches].
+# Height of a line of the legend, and of the room below an entry [inches].
 LINE, GAP = 0.145, 0.13
-# Beyond so many edges between pixels lines would hide what they part.
+# With more edges between pixels than this, lines would hide the pixels that they separate.
 MOST_EDGES = 12_000
 # Least room around a number, as a share of the points along the shorter axis.
 ROOM = 0.025
@@ -268,7 +268,7 @@ def look_of(number: int, name: str) -> dict[str, Any]:
 
 
 def _spread(kind: AttractorKind) -> int:
-    """Give a small number that tells attractors of as many bands apart: by sides, and by the order of these."""
+    """Give a small number that differs for attractors with equally many bands, by their sides and the sides' order."""
     order = kind.flip_order
     turned = 2 if order is None else int(order != tuple(sorted(order)))
     return turned + sum(side * bands for side, bands in enumerate(kind.bands))
@@ -291,7 +291,7 @@ def atlas(found: Atlas) -> Figure:
     Raises
     ------
     AnswerError
-        It says nothing of classes.
+        The atlas has no classes.
 
     Examples
     --------
@@ -385,7 +385,7 @@ def _paint(
 
 
 def _label(axes: Axes, answers: Atlas, where: npt.NDArray[np.bool_], words: str) -> None:
-    """Write the number of a class into its largest region, as far from the region's edge as can be."""
+    """Write the number of a class into its largest region, at the point farthest from the region's edge."""
     if len(answers.axes) == 1:
         where = np.repeat(where, max(where.size // 4, 3), axis=0)
     regions, count = label(where)

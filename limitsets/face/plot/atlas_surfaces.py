@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-# Even to the eye, in grey and for colour-blind readers.
+# A map of colours that looks even, also in grey and to colour-blind readers.
 COLOURS = "cividis"
-# Percentiles between which colours are spread: a few values far off do not take them all.
+# Percentiles between which colours are spread, so that a few extreme values do not use up the colours.
 SPREAD = (1.0, 99.0)
 NOTHING, NOTHING_HATCH = "#DDDDDD", "////"
 WORDS = {
@@ -95,7 +95,7 @@ def atlas_surface(found: Atlas, variable: str, side: int | None = None) -> Figur
 
 
 def _values(answers: Atlas, variable: str, side: int | None) -> Array:
-    """Read the variable at every point; nan where there is none."""
+    """Read the variable at every point; nan at points without a value."""
     data = answers.dataset
     if variable not in data or "flag_values" in data[variable].attrs:
         known = [str(name) for name in data if "flag_values" not in data[name].attrs]
@@ -139,7 +139,7 @@ def _level(answers: Atlas, variable: str) -> tuple[float, str] | None:
 def _painted(
     figure: Figure, axes: Axes, answers: Atlas, values: Array, words: str, level: tuple[float, str] | None
 ) -> list[object]:
-    """Paint a surface of two quantities, with its scale; the entries of a legend."""
+    """Paint a surface over two quantities, with its scale; return the legend's entries."""
     x, y = pixels(answers)
     there = np.isfinite(values)
     axes.set_facecolor(NOTHING)
@@ -258,7 +258,7 @@ def bifurcation(found: Continuation, by: str | None = None) -> Figure:
 
 
 def _scale(continuation: Continuation, name: str) -> tuple[float, str]:
-    """Factor and label of the axis: angles of a scene in degrees."""
+    """Give factor and label of the axis: angles of a scene are in degrees."""
     if continuation.unit is None or name == "t":
         return 1.0, name
     pattern = "".join("[i]" if part.isdigit() else part for part in name.replace("[", "]").split("]"))
@@ -270,7 +270,7 @@ def _scale(continuation: Continuation, name: str) -> tuple[float, str]:
 
 
 def _bands(axes: Axes, continuation: Continuation, side: int, along: NDArray[np.float64]) -> None:
-    """Draw the bands of one side between steps that have as many of them."""
+    """Draw the bands of one side between neighbouring steps with the same number of bands."""
     for number in continuation.numbers:
         areas: list[Any] = []
         lines: list[Any] = []
@@ -299,7 +299,7 @@ def _critical(axes: Axes, continuation: Continuation, side: int, along: NDArray[
         if len(here[side]) == len(there[side])
         for c, d in zip(here[side], there[side], strict=True)
     ]
-    # Joined where they belong together, so that the dashes do not begin anew at every step.
+    # Points of one curve are joined, so that the dashes do not begin anew at every step.
     ways: list[list[tuple[float, float]]] = []
     for first, last in lines:
         way = next((each for each in ways if each[-1] == first), None)
@@ -315,7 +315,7 @@ def _critical(axes: Axes, continuation: Continuation, side: int, along: NDArray[
 def _events(
     panels: list[Axes], continuation: Continuation, sides: list[int], name: str, factor: float
 ) -> set[str]:
-    """Mark the events; the kinds that there are."""
+    """Mark the events; return the kinds that occur."""
     for event in continuation.events:
         ends = event.t if name == "t" else (event.values[0][name], event.values[1][name])
         at, look = factor * 0.5 * (ends[0] + ends[1]), EVENTS[event.kind]

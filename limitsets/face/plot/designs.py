@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from limitsets.parameters.design import Design, RobustDesign
 
 
-HALF = 0.3  # half the height of a bar; lanes are 1 apart
-MOST = 12  # scenes that are drawn: start, design, and of those between evenly many
-GAP = 0.9  # between the lanes of one scene and the next, beside the 1
+HALF = 0.3  # half the height of a bar; the distance of lanes is 1
+MOST = 12  # scenes that are drawn at most: start, design, and evenly spaced steps between them
+GAP = 0.9  # between the lanes of one scene and the next, in addition to 1
 # A second attractor of the same scene.
 ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
 
@@ -36,14 +36,14 @@ ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": "
 def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Figure:
     """Draw the limit sets of the scenes on a design's path, one group of bars per scene, one bar row per side.
 
-    Of more than twelve scenes start, design and evenly many of the steps between are drawn.
+    Of more than twelve scenes, the start, the design and evenly spaced steps between them are drawn.
 
     Parameters
     ----------
     found : Design
         From `limitsets.design`; with `stages` its path moves the critical points evenly.
     sets : sequence, optional
-        What `limitsets.inverse.limit_sets_along` gave; computed otherwise.
+        The answer of `limitsets.inverse.limit_sets_along`; computed if it is left out.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def _lanes(axes: Axes, scene: Scene, top: float) -> None:
 
 
 def _marks(axes: Axes, scene: Scene, top: float) -> None:
-    """Mark every critical point; the first of a side is the one that is designed."""
+    """Mark every critical point; the design moves the first one of each side."""
     for side, points in critical_points(scene.bare_map, scene.domain).items():
         for number, point in enumerate(points):
             look: dict[str, Any] = {"lw": 2.2, "gid": "critical point"}
@@ -106,7 +106,7 @@ def _marks(axes: Axes, scene: Scene, top: float) -> None:
 
 
 def _words(axes: Axes, solution: Design, scene: Scene, step: int, middle: float) -> None:
-    """Say beside each scene what its quantities are."""
+    """Write the values of its quantities beside each scene."""
     head = "start" if step == 0 else "design" if step == len(solution.path) - 1 else f"step {step}"
     values = []
     for name in solution.jacobian.names[:4]:
@@ -143,13 +143,13 @@ def _legend(solution: Design, count: int, several: bool) -> list[Any]:
 
 
 # ----------------------------------------------------------------
-# A robust design: margin against throws to feed, and the share of each quantity of the tolerance.
+# A robust design: margin against throws to feed, and the share of the tolerance that each quantity takes.
 
 
 BEFORE, AFTER = "#6E6E6E", style.JOG
-# Bars of the scene before, apart from the design's also in grey.
+# Bars of the scene before, which differ from those of the design also in grey.
 PALE = "#D6D6D6"
-# What is drawn of the quantities' names: the last word says which it is.
+# Quantities that are drawn at most.
 MOST_ROWS = 12
 
 
@@ -162,9 +162,9 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
     found : RobustDesign
         From `limitsets.inverse.robust_design`.
     wanted : float, optional
-        A margin that was wanted, a factor on the tolerance, as a line.
+        The wanted margin, as a factor on the tolerance; drawn as a line.
     bound : float, optional
-        A margin that no design can have, a factor on the tolerance, as a line.
+        A margin that no design can have, as a factor on the tolerance; drawn as a line.
 
     Returns
     -------

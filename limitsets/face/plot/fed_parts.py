@@ -31,7 +31,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "edge": {"color": style.INK, "ls": (0, (5, 1.5, 1, 1.5))},
     "left": {"color": style.JOG, "ls": (0, (1, 1.5))},
 }
-# Shares below this are not drawn.
+# Smaller shares are not drawn.
 LEAST = 1e-6
 WORDS_OF_FATES = {
     "right": "side wanted, clear",
@@ -75,7 +75,7 @@ def feeding(found: Feeding) -> Figure:
 
 
 def _corners(answer: Feeding, beyond: float, tipped: float) -> NDArray[np.float64]:
-    """Vertices of a part on the side wanted, tipped over the end of the arm, from the end [length]."""
+    """Vertices of a part on the wanted side, tipped over the end of the arm, relative to this end [length]."""
     scene, side = answer.end.scene, answer.end.side
     corners = [(float(x), float(y)) for x, y in scene.vertices]
     left, right = side_ends(len(corners), side)
@@ -92,7 +92,7 @@ def _corners(answer: Feeding, beyond: float, tipped: float) -> NDArray[np.float6
 def _cavity(axes: Axes, answer: Feeding) -> None:
     scene = answer.end.scene
     cavity = scene.cavity
-    assert cavity is not None  # `feed` refuses a scene without one
+    assert cavity is not None  # `feed` refuses a scene without a cavity
     ramp = cavity.depth / math.tan(cavity.angle)
     outline = [
         (-8.0, 0.0),
@@ -148,7 +148,7 @@ def _throws_until_fed(axes: Axes, answer: Feeding) -> None:
     axes.set_ylabel("share of random starts", fontsize=style.SMALL)
     axes.set_ylim(0.0, 1.4 * axes.get_ylim()[1])  # room for the legend over the steps
     axes.set_yticks([tick for tick in axes.get_yticks() if tick <= 1.0])
-    if axes.get_legend_handles_labels()[0]:  # none where all parts stay
+    if axes.get_legend_handles_labels()[0]:  # no throw if all parts stay
         axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
     style.open_frame(axes)
 
@@ -260,7 +260,7 @@ def _case(axes: Axes, answer: Assembly, name: str) -> None:
     assert number is not None  # only outcomes with a case are drawn
     film = answer.film(number)
     last = len(film.times) - 1
-    if name == "assembled":  # the film goes on through the next throws
+    if name == "assembled":  # the film continues through the next throws
         rests = [time for time, _, word in film.marks if word == "thrown"]
         last = int(np.searchsorted(film.times, rests[1])) - 1 if len(set(rests)) > 1 else last
     for polygon in film.ground:

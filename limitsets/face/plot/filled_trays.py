@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from limitsets.feeder.engine.depression import Pose
 
 
-# After so many points a curve has no more marks.
+# A curve with more points than this has no marks.
 MARKS = 9
 
 
@@ -63,7 +63,7 @@ def _short(state: str) -> str:
 
 
 def _placed(filling: TrayFill, pose: Pose, share: float = 1.0) -> NDArray[np.float64]:
-    """Where the vertices are, or points on the way to them."""
+    """Places of the vertices, or of points between the centre of mass and the vertices."""
     corners = turned(share * about_centre(filling.scene), pose.angle)
     corners += pose.x, pose.y
     return corners
@@ -129,7 +129,7 @@ def _curve(axes: Axes, filling: TrayFill) -> None:
 
 
 def _crowds(axes: Axes, filling: TrayFill, places: NDArray[np.intp]) -> None:
-    """Draw many parts at once beside the chain of single ones, where they were asked for."""
+    """Draw trays with many parts at once beside the chain of single parts, if they were asked for."""
     chain = filling.crowd_chain
     if chain is not None and not np.array_equal(chain.right, filling.filled.right):
         words = (

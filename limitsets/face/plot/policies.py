@@ -1,4 +1,4 @@
-"""Figure of a policy: in every state where the part may lie, what is thrown, and where each answer leads."""
+"""Figure of a policy: for every state the places at which the part may lie, the throw, and the next state by answer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from limitsets.proofs.policies import Synthesis
 
 
-# Rows that can be named, and the most height of a row and of all [inches].
+# Largest number of rows with names; largest height of a row, and of all rows [inches].
 MOST, ROW, TALL = 60, 0.26, 16.0
 COLOURS = (style.JOG, style.FLIP, style.ROLL, style.INK)
 HATCHES = ("", "////", "....", "xxxx")
@@ -91,7 +91,7 @@ def _row(axes: Axes, k: int, parts: Any, throw: int) -> None:
 
 
 def _label(table: Any, k: int) -> str:
-    """State, throw, and the next states by the answer."""
+    """Name a row: its state, its throw, and the next states by the answer."""
     throw = "stop" if table.throw[k] < 0 else table.throws[int(table.throw[k])]
     after = ", ".join(
         f"{word} {at}".strip()

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 HEADS = ("quantity", "value", "deviates", "proved safe up to", "shown to fail from", "in % of the value")
 READINGS = {"fixed": "fixed, but unknown", "per-throw": "at every throw", "tolerance": "together"}
 
-# States of an orbit that are written: the last of them.
+# Number of states of an orbit that are written: the last ones.
 LAST = 8
 
-# What the numbers of the noise are called, and whether they are shares, throws, or a rate per throw.
+# Names of the numbers of the noise, and whether they are shares, throws, or a rate per throw.
 NUMBERS = {
     "time beyond": ("rests beyond X, of all", "share"),
     "wrong beyond": ("of these on a wrong side", "share"),
@@ -43,10 +43,10 @@ NUMBERS = {
     "escape": ("chance to leave the limit set, per throw", "rate"),
 }
 
-# Numbers whose change with the noise is shown.
+# Numbers whose changes with the noise are shown.
 MOVING = ("wrong beyond", "mean throws", "95 % throws", "escape")
 
-# Less than this is what rounding leaves.
+# Smaller numbers are rounding errors.
 NOTHING = 1e-9
 
 Table = tuple[Sequence[str], list[list[str]]]
@@ -99,7 +99,7 @@ def robustness_page(sheet: Robustness, figures: Mapping[str, str]) -> str:
 
 
 def answer(sheet: Robustness) -> str:
-    """Say in a few sentences what was asked, whether it holds, and what has the least room."""
+    """Say in a few sentences which goals were asked, whether they hold, and which quantity has the least room."""
     return words("robust_answer", **_told(sheet))
 
 
@@ -116,9 +116,9 @@ def _told(sheet: Robustness) -> dict[str, Any]:
 
 
 def tightest(sheet: Robustness) -> Entry | None:
-    """Return the margin that is smallest: against its tolerance where there are several, else against its value.
+    """Return the smallest margin: in units of its tolerance if two or more quantities have one, else of its value.
 
-    A landing place has no value: it is compared with the shortest side.
+    A landing place has no value: its margin is compared with the shortest side.
     """
     if _by_tolerance(sheet):
         return min(sheet.singles, key=lambda entry: _room(entry, sheet))
@@ -126,13 +126,13 @@ def tightest(sheet: Robustness) -> Entry | None:
 
 
 def _by_tolerance(sheet: Robustness) -> bool:
-    """Whether margins are compared by their tolerances: where two or more have one."""
+    """Whether margins are compared by their tolerances: if two or more quantities have one."""
     return sum(_room(entry, sheet)[0] == 0 for entry in sheet.singles) > 1
 
 
 def _room(entry: Entry, sheet: Robustness) -> tuple[int, float]:
     text = sheet.tolerance.get(entry.quantity)
-    # the landing place is noise in a tolerance, all else fixed but unknown
+    # in a tolerance the landing place is noise, all other quantities are fixed but unknown
     if text is None or (entry.reading == "per-throw") != (entry.quantity == "landing.x"):
         return 1, math.inf
     given = parsed_deviation(text, entry.quantity)
@@ -168,7 +168,7 @@ def lines_of(sheet: Robustness) -> list[list[str]]:
 
 
 def none_holds(sheet: Robustness) -> str:
-    """Say of margins that are all nothing what a table of zeros would."""
+    """Say in a sentence that all margins are 0, instead of a table of zeros."""
     count = len({entry.quantity for entry in sheet.singles})
     whose = "1 quantity has" if count == 1 else f"{count} quantities have"
     why = "the goal fails already" if sheet.decided == "refuted" else "the goal is not proved of it"
@@ -177,14 +177,14 @@ def none_holds(sheet: Robustness) -> str:
 
 
 def shown(sheet: Robustness) -> Entry | None:
-    """Return the margin whose orbit is shown: the tightest that has one."""
+    """Return the margin whose orbit is shown: the tightest one, or the first with an orbit."""
     first = tightest(sheet)
     candidates = [] if first is None else [first]
     return next((entry for entry in [*candidates, *sheet.entries] if entry.counterexample), None)
 
 
 def deviation_of(entry: Entry) -> str:
-    """Say by how much a quantity is off at the upper end of its margin, for use within a sentence."""
+    """Give the deviation of a quantity at the upper end of its margin, for use within a sentence."""
     if entry.quantity == "joint":
         return f"every quantity {bound(entry.refuted, up=True)} times its tolerance off at most"
     at = bound(entry.refuted, entry.unit, up=True)
@@ -194,7 +194,7 @@ def deviation_of(entry: Entry) -> str:
 
 
 def _value_at(entry: Entry) -> str:
-    """Give the value itself at which the orbit violates the goal: it says to which side."""
+    """Give the value at which the orbit violates the goal, which shows the direction of the deviation."""
     thrown = (entry.counterexample[0]["parameters"] if entry.counterexample else None) or {}
     for name, told in ((entry.quantity, "at"), ("throw.kappa", "kappa =")):
         given = thrown.get(name)
@@ -256,7 +256,7 @@ def _value(value: float | None, kind: str) -> str:
 
 
 def _error(value: float | None, kind: str) -> str:
-    """Write an error with the two digits that it has."""
+    """Write an error with two digits."""
     if value is None or not math.isfinite(value) or value < NOTHING:
         return _value(value, "share")
     return f"{value:.2g}" if kind != "share" else f"{100.0 * value:.2g} %"
@@ -273,7 +273,7 @@ def _change(value: float, kind: str) -> str:
 
 
 def law_words(name: str, law: Law, unit: str) -> str:
-    """Say a law as people give it.
+    """Describe a law of noise.
 
     Examples
     --------
@@ -314,7 +314,7 @@ def _numbers(noise: NoiseStatistics, sides: int, rate: float | None) -> Table:
 
 
 def _changes(noise: NoiseStatistics) -> Table:
-    """Say what 10 % more noise of each quantity changes."""
+    """Give the changes of the numbers with 10 % more noise of each quantity."""
     rows = []
     for quantity, slopes in noise.sensitivity.items():
         changes = [0.1 * slopes[name].slope if name in slopes else math.nan for name in MOVING]
@@ -334,7 +334,7 @@ def violated_of(entry: Entry, goals: Sequence[Goal]) -> Goal | None:
 
 
 def _drawn(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
-    """Draw what there is to draw."""
+    """Draw all figures of the sheet."""
     yield "part", plot.part(sheet.scene)
     single = [each for each in sheet.margins() if each.quantity != "joint"]
     if sheet.decided == "proved" and single:
@@ -354,7 +354,7 @@ def _drawn(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
 
 
 def _noise(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
-    """Draw the noise: where nothing stays there is no density, and where nothing is fed no throws until then."""
+    """Draw the noise: there is no density if no part stays, and no number of throws if no part is fed."""
     if sheet.noise is None or sheet.levels is None:
         return
     if sheet.noise.classes:
