@@ -30,10 +30,10 @@ KINDS = {
     "Assembly": "fed:film_of_assembly",
     "TrayFill": "fed:film_of_tray",
 }
-"""What can be shown, by the name of its class, and which function makes a film of it."""
+"""The function that makes a film of an object, by the name of the object's class."""
 
 SUFFIXES = {".gif": "writers:write_gif", ".html": "writers:write_page"}
-"""Which function writes a film, by how the file's name ends."""
+"""The function that writes a film, by the ending of the file's name."""
 
 
 def _found(where: str) -> Any:
@@ -42,7 +42,7 @@ def _found(where: str) -> Any:
 
 
 def require_file(path: Path) -> Any:
-    """Return what writes such a file.
+    """Return the function that writes a file with this ending.
 
     Raises
     ------
@@ -115,13 +115,13 @@ def animate(
     start : (float, int), optional
         x [length] and side of the start; default a good one, on the limit set.
     throws : int, optional
-        How many throws at most; default 8, and of feeding, feedback and recordings all there are.
+        Number of throws at most; default 8, for feeding, feedback and recordings all of them.
     fps : float
         Frames per second.
     slow : float
         How many times slower than the machine.  Where the scene gives no gravity 1/w counts as 0.4 s.
     progress : callable, optional
-        Told (stage, done, all).
+        Called with (stage, done, all).
 
     Returns
     -------
@@ -131,7 +131,7 @@ def animate(
     Raises
     ------
     AnswerError
-        Another kind of file or answer, a start from which nothing is thrown, or more frames than anybody would look at.
+        Another kind of file or answer, a start from which no throw lands, or too many frames.
 
     Examples
     --------

@@ -49,20 +49,20 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Starts tried per side for a good one, and angles between which the first contact is searched.
+# Starts tried per side in the search for a good one; angles of the grid on which the first contact is searched.
 TRIED, ANGLES = 40, 400
-# Throws shown at most, and of a start that is chosen.
+# Throws shown at most: from a given start, and from a start that is chosen here.
 MOST_THROWS, USUAL = 60, 8
 WORDS = ("fed rightly", "fed on a wrong side", "not clear of the wall")
 AT_EDGE = "the next throw acts beyond the end of the arm, which is not simulated: assumed not fed"
 BEYOND = "the struck corner is beyond the end of the arm: the map throws as if the arm went on"
-# A place of rest nearer to the end than this share of the arm looks as if it were beyond.
+# A place of rest this close to the end of the arm (as a share of its length) looks as if it were beyond the end.
 NEAR = 0.005
 
 
-def film_of_feeding(found: Feeding, asked: Asked) -> Film:
+def film_of_feeding(feeding: Feeding, asked: Asked) -> Film:
     """Show a part until it is fed."""
-    return film_of_end(found.end, asked)
+    return film_of_end(feeding.end, asked)
 
 
 def film_of_end(end: ArmEnd, asked: Asked) -> Film:
@@ -73,8 +73,8 @@ def film_of_end(end: ArmEnd, asked: Asked) -> Film:
         allowed = f"below {end.x:g} {end.scene.unit}, where the arm ends, and where throws act beyond the end"
         raise AnswerError("x of the start", start[0], allowed, "start on the arm")
     goes_on = f"where the arm ends: side {end.side} is wanted"
-    found, lanes = known_of(end.scene, asked.progress, lines=((end.x, goes_on),))
-    scene, pace = found.scene, asked.pace(found.scene)
+    analysis, lanes = known_of(end.scene, asked.progress, lines=((end.x, goes_on),))
+    scene, pace = analysis.scene, asked.pace(analysis.scene)
     most = MOST_THROWS if throws is None else throws
     x, side = _longest(end, most if throws else USUAL) if start is None else require_start(scene, start)
     made = _until_fed(end, scene, x, side, most)
@@ -113,7 +113,7 @@ def _until_fed(end: ArmEnd, scene: Scene, x: float, side: int, throws: int) -> l
 
 
 def _longest(end: ArmEnd, throws: int) -> tuple[float, int]:
-    """Choose the start that is fed rightly after the most throws shown; a wrong one where none is."""
+    """Choose the start whose part is fed rightly after the most throws; a part that is fed wrongly if there is none."""
     best, chosen = (-1, -1), (float(end.starts[0]), 0)
     for side, begin in enumerate(end.starts.tolist()):
         for x in np.linspace(begin, end.x, TRIED + 2)[1:-1].tolist():
@@ -128,7 +128,7 @@ def _longest(end: ArmEnd, throws: int) -> tuple[float, int]:
 
 
 def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> list[Leg]:
-    """Tip, slide, and stay."""
+    """Give the legs of the fall: the part tips, slides and stays."""
     cavity, side = end.scene.cavity, throw.side_after
     assert cavity is not None  # an ArmEnd has one
     gravity = scene.kappa if scene.gravity is None else scene.gravity
@@ -197,8 +197,8 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
 
 def _corners(about_end: Array, tipped: float) -> Array:
     cos, sin = math.cos(tipped), math.sin(tipped)
-    found: Array = about_end @ np.array([[cos, -sin], [sin, cos]])
-    return found
+    corners: Array = about_end @ np.array([[cos, -sin], [sin, cos]])
+    return corners
 
 
 def _first_contact(cavity: Cavity, about_end: Array) -> float:
@@ -232,19 +232,19 @@ def _tipping(
         return float(state[0]) - most
 
     down.terminal = True  # type: ignore[attr-defined]  # scipy reads it there
-    # an inverted pendulum: from e off the top it takes ln(d/e) of its times, and a few more
+    # an inverted pendulum at e from the top needs ln(d/e) of its time constants, and a few more
     patience = (40.0 + max(0.0, math.log(height / max(beyond, 1e-300)))) * math.sqrt(
         inertia / (gravity * height)
     )
-    found = solve_ivp(
+    fall = solve_ivp(
         rates, (0.0, patience), [0.0, rate], "DOP853", dense_output=True, events=down, rtol=1e-10, atol=1e-14
     )
-    end, solution = float(found.t[-1]), found.sol
+    end, solution = float(fall.t[-1]), fall.sol
     return end, lambda at: np.minimum(solution(at)[0], most)
 
 
 def _slide(cavity: Cavity, about_end: Array) -> float:
-    """How far it slides down the ramp until a corner meets the wall or the floor [length]."""
+    """Distance that the part slides down the ramp until a corner meets the wall or the floor [length]."""
     corners = _corners(about_end, cavity.angle)
     wall = (cavity.width - corners[:, 0]) / math.cos(cavity.angle)
     floor = (cavity.depth + corners[:, 1]) / math.sin(cavity.angle)
@@ -254,20 +254,20 @@ def _slide(cavity: Cavity, about_end: Array) -> float:
 # ----------------------------------------------------------------
 # Films of what the engine recorded: several parts, the ground, and what happened to whom.
 #
-# Where the scenes of the parts are known their sides are named, times are theirs, and the swing of the arm before each
-# throw is drawn, with the parts that it throws lying on it.
+# If the scenes of the parts are known, the film names the sides, uses the scenes' unit of time, and draws the swing of
+# the arm before each throw, with the parts lying on the arm.
 
 
-# More parts than this are counted, not named.
+# Above this number, parts are counted and not named.
 NAMED = 4
-# Frames for which an impact is shown: there are many.
+# Frames for which an impact is shown: few, because there are many impacts.
 BRIEFLY = 8
 # Throws of a pair, and passes of a tray, that are shown unless others are asked for.
 LAST, PASSES = 4, 12
 
 
 class _Frame(NamedTuple):
-    """What one frame shows: when, of the recording, the angle of the arm, and what is said."""
+    """One frame: its time in the recording, the angle of the arm, and its caption."""
 
     time: float
     arm: float
@@ -282,7 +282,7 @@ def film_of_recording(
     *,
     carried: bool = True,
 ) -> Film:
-    """Show a recording from its beginning, up to so many throws; of a cavity that stands without the arm's swing."""
+    """Show the first throws of a recording; a cavity that stands still is shown without the arm's swing."""
     if asked.start is not None:
         raise AnswerError("the start", asked.start, "none: a recording has its own", "leave it out")
     if not recording.times.size:
@@ -308,51 +308,51 @@ def film_of_recording(
         title,
         scenes[0].unit if scenes else "",
         pace.clock if scenes else "",
-        pace.fps,
-        f"{pace.words}; {about}",
-        np.arange(count) / (pace.unit * pace.fps),
-        poses,
-        tuple(recording.outlines),
-        tuple(labels_of(each) for each in scenes) or tuple(() for _ in recording.outlines),
-        np.array([each.arm for each in shown]),
-        surface,
-        ground,
-        captions,
-        notes,
-        np.array([captions.index(caption) for caption, _ in texts]),
-        np.array([notes.index(note) for _, note in texts]),
-        np.zeros((count, 2), dtype=np.int64),
-        _marks(recording, at, thrown),
-        (),
-        None,
-        np.full((count, 2), np.nan),
-        np.full(count, -1, dtype=np.int64),
-        () if scenes else _view(ground, poses),
+        fps=pace.fps,
+        about=f"{pace.words}; {about}",
+        times=np.arange(count) / (pace.unit * pace.fps),
+        poses=poses,
+        outlines=tuple(recording.outlines),
+        labels=tuple(labels_of(each) for each in scenes) or tuple(() for _ in recording.outlines),
+        arm=np.array([each.arm for each in shown]),
+        surface=surface,
+        ground=ground,
+        captions=captions,
+        notes=notes,
+        caption=np.array([captions.index(caption) for caption, _ in texts]),
+        note=np.array([notes.index(note) for _, note in texts]),
+        trail=np.zeros((count, 2), dtype=np.int64),
+        marks=_marks(recording, at, thrown),
+        rests=(),
+        lanes=None,
+        position=np.full((count, 2), np.nan),
+        stage=np.full(count, -1, dtype=np.int64),
+        view=() if scenes else _view(ground, poses),
     )
 
 
-def film_of_assembly(found: Assembly, asked: Asked) -> Film:
-    """Show the first pair that was assembled, or else the first pair: its last throws."""
-    example = found.example("assembled")
+def film_of_assembly(assembly: Assembly, asked: Asked) -> Film:
+    """Show the last throws of the first pair that was assembled, or of the first pair if none was."""
+    example = assembly.example("assembled")
     number = 0 if example is None else example
-    scenes, last = found.pair.scenes, LAST if asked.throws is None else asked.throws
-    title = f"{scenes[0].name} and {scenes[1].name}, trial {number}: {found.rows[number]['outcome']}"
-    recording, carried = found.film(number, last), found.series.carried
+    scenes, last = assembly.pair.scenes, LAST if asked.throws is None else asked.throws
+    title = f"{scenes[0].name} and {scenes[1].name}, trial {number}: {assembly.rows[number]['outcome']}"
+    recording, carried = assembly.film(number, last), assembly.series.carried
     return film_of_recording(recording, asked._replace(throws=None), scenes, title, carried=carried)
 
 
-def film_of_tray(found: TrayFill, asked: Asked) -> Film:
-    """Show a tray pass by pass: one depression, or many parts at once that push each other, if they were asked for."""
+def film_of_tray(filling: TrayFill, asked: Asked) -> Film:
+    """Show a tray pass by pass: one depression, or, if asked for, many parts at once that push each other."""
     from limitsets.cell.trays import Pouring, filmed
 
-    scene, passes = found.scene, PASSES if asked.throws is None else asked.throws
-    if found.crowds:
-        parts, depressions = found.crowds[0].parts, found.crowds[0].depressions
-        pouring = Pouring(found.passes, parts, depressions, passes, found.seed)
+    scene, passes = filling.scene, PASSES if asked.throws is None else asked.throws
+    if filling.crowds:
+        parts, depressions = filling.crowds[0].parts, filling.crowds[0].depressions
+        pouring = Pouring(filling.passes, parts, depressions, passes, filling.seed)
         recording = pouring.film(0, last=passes)
         title = f"{scene.name}, {parts} parts a pass over {depressions} depressions"
     else:
-        recording = filmed(scene, passes, seed=found.seed)
+        recording = filmed(scene, passes, seed=filling.seed)
         title = f"{scene.name}, one depression of a tray"
     film = film_of_recording(recording, asked._replace(throws=None), title=title)
     pace = asked.pace(scene)
@@ -372,7 +372,7 @@ def film_of_tray(found: TrayFill, asked: Asked) -> Film:
 def _frames(
     recording: Recording, throws: int | None, pace: Pace, swing: tuple[float, float]
 ) -> tuple[list[_Frame], list[float]]:
-    """Choose the moments that are shown, each throw's swing (angle, seconds) first, and say when parts are thrown."""
+    """Choose the times of the frames, each throw's swing (angle, seconds) before it, and give those of the throws."""
     first, end = float(recording.times[0]), float(recording.times[-1])
     thrown = sorted({time for time, _, word in recording.marks if word == "thrown"})
     if throws is not None and len(thrown) > throws:
@@ -406,8 +406,8 @@ def _swung(recording: Recording, kept: NDArray[np.int64], shown: list[_Frame], t
 
 
 def _marks(recording: Recording, at: Array, thrown: list[float]) -> tuple[Mark, ...]:
-    """Say where things happen: at the lowest corner of the part."""
-    found = []
+    """Place the mark of each event at the lowest corner of the part."""
+    marks = []
     for time, part, word in sorted(recording.marks):
         if time <= at[-1]:
             frame = int(np.searchsorted(at, time))
@@ -417,8 +417,8 @@ def _marks(recording: Recording, at: Array, thrown: list[float]) -> tuple[Mark, 
             corners = recording.corners(number, part)
             x, y = corners[int(np.argmin(corners[:, 1]))].tolist()
             if math.isfinite(x):
-                found.append(Mark(frame, until, part, word, x, y))
-    return tuple(found)
+                marks.append(Mark(frame, until, part, word, x, y))
+    return tuple(marks)
 
 
 def _words(recording: Recording, thrown: list[float], frame: _Frame) -> tuple[str, str]:
@@ -432,7 +432,7 @@ def _words(recording: Recording, thrown: list[float], frame: _Frame) -> tuple[st
 
 
 def _view(ground: tuple[Array, ...], poses: Array) -> tuple[tuple[float, float], ...]:
-    """Keep the surfaces in sight on which parts come to lie."""
+    """Give points that keep the surfaces in sight on which parts come to lie."""
     least, most = float(np.nanmin(poses[:, :, 0])), float(np.nanmax(poses[:, :, 0]))
     tops = [(float(each[:, 0].max()), float(each[:, 1].max())) for each in ground]
     highest = float(np.nanmax(poses[:, :, 1]))

@@ -1,4 +1,4 @@
-"""A film as data: where everything is in every frame, cut from legs, and its captions.  Writers only draw it."""
+"""A film as data: the poses in every frame, cut from legs, and the captions.  Writers only draw it."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Label(NamedTuple):
 
 
 class Mark(NamedTuple):
-    """Something that happens: in which frame, to which part, where; shown up to another frame [length].
+    """An event of a part: its frame, the frame up to which it is shown, its word and its place [length].
 
-    The words are those of `limitsets.feeder.engine.member.Recording`.
+    The words are those of events in `limitsets.feeder.engine.member.Recording`.
     """
 
     frame: int
@@ -44,7 +44,7 @@ class Mark(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """A part has come to rest: the frame in which its throw begins, and that of the rest; where [length]; in words."""
+    """The rest of a part: the frame in which its throw begins, that of the rest, the place [length], a sentence."""
 
     begin: int
     frame: int
@@ -55,14 +55,14 @@ class Rest(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Lanes:
-    """What is known of the places of rest, a lane for each side.
+    """Facts about the places of rest, in one lane per side.
 
     Attributes
     ----------
     begin : tuple of float
-        By side the least x at which the part can rest [length].
+        Least x at which the part can rest, by side [length].
     end : float
-        The largest [length].
+        Largest x at which it can rest [length].
     sets : tuple of dict
         Limit sets, or attractors: intervals by side.
     critical : dict of int to tuple of float
@@ -70,9 +70,9 @@ class Lanes:
     goal : tuple of (float, int) or None
         The goal's x and side.
     lines : tuple of (float, str)
-        Other places, such as a sensor's, and what they are.
+        Other places, such as the place of a sensor, each with its words.
     known : tuple of dict
-        Where a controller knows the part to be, one for each state it comes to.
+        Places at which a controller knows the part to be, for each state of the controller.
     """
 
     begin: tuple[float, ...]
@@ -97,7 +97,7 @@ class Film:
     fps : float
         Frames per second when it is shown.
     about : str
-        How fast it runs, and what of it is drawn rather than computed.
+        Speed of the film, and its motions that are drawn rather than computed.
     times : ndarray, shape (frames,)
         Since the beginning, in `clock`.
     poses : ndarray, shape (frames, parts, 3)
@@ -111,25 +111,25 @@ class Film:
     surface : tuple of (float, float) or None
         Height of the arm's surface over the joint, and where the arm ends [length]; None where the arm is ground.
     ground : tuple of ndarray, shape (m, 2)
-        What turns with the arm, as it is with the arm level: the cavity; what stands, where the arm is ground [length].
+        The cavity, which turns with the arm, in its place when the arm is level; fixed ground if the arm is ground.
     captions, notes : tuple of str
         Texts: the first line, and the second.
     caption, note : ndarray of int, shape (frames,)
-        Which of them belong to a frame.
+        Numbers of the texts of each frame.
     trail : ndarray of int, shape (frames, 2)
         The frames between which the path of the first part's centre of mass is shown.
     marks : tuple of Mark
-        What happens.
+        Events.
     rests : tuple of Rest
-        Where the first part came to rest.
+        Places at which the first part came to rest.
     lanes : Lanes or None
-        What is drawn beside it.
+        Lanes drawn beside the film.
     position : ndarray, shape (frames, 2)
         Where the first part is in the lanes: x [length], and the side, between two sides while it turns.
     stage : ndarray of int, shape (frames,)
         Number in ``lanes.known``, -1 for none.
     view : tuple of (float, float)
-        Places that have to be in sight, besides what moves [length].
+        Places that have to be in sight, besides those of the moving parts [length].
     """
 
     title: str
@@ -158,7 +158,7 @@ class Film:
 
     @property
     def frames(self) -> int:
-        """How many."""
+        """Number of frames."""
         return int(self.times.size)
 
     def polygon(self, frame: int, part: int = 0) -> Array:
@@ -184,37 +184,37 @@ class Film:
 
 
 MOST_FRAMES = 6000
-"""More frames than this are refused: four minutes."""
+"""Largest number of frames of a film: four minutes."""
 
 UNKNOWN = 0.4
 """Seconds that stand for 1/w where no gravity is given: a throw of the paper's feeder."""
 
 
 class Leg(NamedTuple):
-    """Something that goes on for a while.
+    """One stretch of motion in a film.
 
     Attributes
     ----------
     seconds : float
-        How long it is shown, at rate 1 of the film [s].
+        Duration, at rate 1 of the film [s].
     pose : callable
-        From shares of it, shape (n,), to poses in the room, shape (n, 3).
+        From shares of the duration, shape (n,), to poses in the room, shape (n, 3).
     arm : callable
         To angles of the arm, shape (n,).
     lane : callable
         To x and side in the lanes, shape (n, 2).
     caption, note : str
-        What is written meanwhile.
+        First and second line of text.
     stage : int
-        Number of what a controller knows.
+        State of the controller, as a number.
     trail : bool
-        Whether the path is drawn: it begins with the first such leg after one without.
+        Whether the path is drawn, from the first of such legs in a row.
     marks : tuple of (float, str, float, float)
         Share of the leg, word, and place.
     rest : tuple of (float, int, str) or None
         x, side and sentence where the part comes to rest at its end.
     begins : bool
-        Whether a throw begins: what was drawn of the last one is taken away.
+        Whether a throw begins: the drawn path of the throw before is removed.
     """
 
     seconds: float
@@ -249,7 +249,7 @@ class Pace:
     clock: str = "s"
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be."""
+        """Refuse impossible speeds."""
         if not (1.0 <= self.fps <= 100.0):
             raise AnswerError("the frames per second", self.fps, "1 to 100", "25 look smooth")
         if not (0.01 <= self.slow <= 1000.0):
@@ -266,7 +266,7 @@ class Pace:
 
     @property
     def words(self) -> str:
-        """How fast it runs, a clause."""
+        """Speed of the film, as a clause."""
         if self.clock == "s":
             return (
                 "as fast as the machine"
@@ -277,7 +277,7 @@ class Pace:
 
 
 class Asked(NamedTuple):
-    """What is asked of a film, as in `limitsets.animate`; without a start or throws each film has its own."""
+    """The options of a film, as in `limitsets.animate`; each kind of film has its own start and number of throws."""
 
     start: tuple[float, int] | None
     throws: int | None
@@ -286,29 +286,29 @@ class Asked(NamedTuple):
     progress: Any = None
 
     def pace(self, scene: Scene) -> Pace:
-        """Know the seconds where the scene has gravity."""
+        """Give the pace; it is in seconds if the scene has gravity."""
         return Pace(self.fps, self.slow, "1/w" if scene.gravity is None else "s")
 
 
 def require_length(frames: int) -> None:
-    """Refuse a film that nobody would look at, before anything is drawn."""
+    """Refuse a film that is too long, before anything is drawn."""
     if frames > MOST_FRAMES:
         remedy = "show fewer throws, fewer frames per second, or less slow motion"
         raise AnswerError("the frames of the film", frames, f"up to {MOST_FRAMES}", remedy)
 
 
 def labels_of(scene: Scene) -> tuple[Label, ...]:
-    """Name each side of a part, inside it next to the middle of the side."""
+    """Put the number of each side inside the part, next to the middle of the side."""
     corners = about_centre(scene)
-    n, found = len(corners), []
+    n, labels = len(corners), []
     size = float(np.abs(corners).max())
     for side in range(n):
         left, right = corners[-side % n], corners[(1 - side) % n]
         middle, along = 0.5 * (left + right), right - left
         inward = np.array([-along[1], along[0]]) / float(np.hypot(*along))
         x, y = (middle + 0.1 * size * inward).tolist()
-        found.append(Label(str(side), x, y))
-    return tuple(found)
+        labels.append(Label(str(side), x, y))
+    return tuple(labels)
 
 
 def cut(
@@ -323,7 +323,7 @@ def cut(
     end: float | None = None,
     view: Sequence[tuple[float, float]] = (),
 ) -> Film:
-    """Cut legs of one part's motion into frames: each ends in a frame, and the first begins in one."""
+    """Cut legs of one part's motion into frames: each leg ends at a frame, and the first begins at one."""
     counts = [max(1, round(leg.seconds * pace.fps)) for leg in legs]
     require_length(sum(counts) + 1)
     columns: dict[str, list[Any]] = {word: [] for word in ("times", "poses", "arm", "position", "trail")}
@@ -364,24 +364,24 @@ def cut(
         title,
         scene.unit,
         pace.clock,
-        pace.fps,
-        "; ".join(words for words in (pace.words, about) if words),
-        np.concatenate(columns["times"]),
-        np.concatenate(columns["poses"])[:, None, :],
-        (about_centre(scene),),
-        (labels_of(scene),),
-        np.concatenate(columns["arm"]),
-        (scene.surface_height, scene.arm_length if end is None else end),
-        tuple(ground),
-        tuple(captions),
-        tuple(notes),
-        np.array(texts["caption"]),
-        np.array(texts["note"]),
-        np.array(columns["trail"]),
-        tuple(shown),
-        tuple(rests),
-        lanes,
-        np.concatenate(columns["position"]),
-        np.array(texts["stage"]),
-        tuple(view),
+        fps=pace.fps,
+        about="; ".join(words for words in (pace.words, about) if words),
+        times=np.concatenate(columns["times"]),
+        poses=np.concatenate(columns["poses"])[:, None, :],
+        outlines=(about_centre(scene),),
+        labels=(labels_of(scene),),
+        arm=np.concatenate(columns["arm"]),
+        surface=(scene.surface_height, scene.arm_length if end is None else end),
+        ground=tuple(ground),
+        captions=tuple(captions),
+        notes=tuple(notes),
+        caption=np.array(texts["caption"]),
+        note=np.array(texts["note"]),
+        trail=np.array(columns["trail"]),
+        marks=tuple(shown),
+        rests=tuple(rests),
+        lanes=lanes,
+        position=np.concatenate(columns["position"]),
+        stage=np.array(texts["stage"]),
+        view=tuple(view),
     )

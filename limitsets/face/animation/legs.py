@@ -1,7 +1,7 @@
 """The legs of one throw, from the arm's way down to rest, and the lanes that stand beside a film.
 
-Where the scene simulates no stroke the swing is drawn: from `SWING` below to level, with constant acceleration, so that
-the arm stops with the speed of the throw.
+If the scene simulates no stroke, the swing is drawn: it goes from `SWING` below level up to level with constant
+acceleration, so that the arm reaches the speed of the throw when it stops.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------
-# What stands beside the film: limit sets, critical points and the goal, from an analysis; and a good start.
+# The lanes beside the film: limit sets, critical points and the goal, from an analysis; and a good start.
 
 
 Progress = Any
@@ -34,37 +34,37 @@ CELLS = 1024
 
 
 def known_of(scene: Scene, progress: Progress = None, **more: Any) -> tuple[Analysis, Lanes]:
-    """Analyse a scene, and keep what the lanes show of it; its effects by `auto` are then chosen."""
+    """Analyse a scene, which chooses its effects if they are `auto`, and give the lanes of the analysis."""
     from limitsets.parameters.analysis import analyse
 
-    found = analyse(scene, CELLS, progress=progress)
-    return found, lanes_of(found.scene, found, **more)
+    analysis = analyse(scene, CELLS, progress=progress)
+    return analysis, lanes_of(analysis.scene, analysis, **more)
 
 
-def lanes_of(scene: Scene, found: Analysis | None = None, goal: Goal | None = None, **more: Any) -> Lanes:
-    """Lay the lanes out; without an analysis they show no sets.  The goal is the scene's, or another."""
+def lanes_of(scene: Scene, analysis: Analysis | None = None, goal: Goal | None = None, **more: Any) -> Lanes:
+    """Fill in the lanes; without an analysis they show no sets.  The goal is the scene's unless another is given."""
     goal = scene.goal if goal is None else goal
     return Lanes(
         tuple(scene.sides.a.tolist()),
         scene.arm_length,
         ()
-        if found is None
-        else tuple({side: list(parts) for side, parts in each.items()} for each in found.extents),
+        if analysis is None
+        else tuple({side: list(parts) for side, parts in each.items()} for each in analysis.extents),
         {}
-        if found is None
-        else {s: tuple(p.x for p in points) for s, points in found.critical_points.items()},
+        if analysis is None
+        else {s: tuple(p.x for p in points) for s, points in analysis.critical_points.items()},
         (goal.x, goal.side) if isinstance(goal, OrientedBeyond | Reaches) else None,
         **more,
     )
 
 
-def good_start(found: Analysis, throws: int) -> tuple[float, int]:
-    """Choose a start on the limit set: where whole rounds of the sides begin; else the middle of the longest side."""
-    for extents in found.extents[:1]:
-        path = stretch(found.scene, extents, throws)
+def good_start(analysis: Analysis, throws: int) -> tuple[float, int]:
+    """Choose a start on the limit set, at the beginning of a whole round of sides; else the middle of side 0."""
+    for extents in analysis.extents[:1]:
+        path = stretch(analysis.scene, extents, throws)
         if path is not None:
             return float(path.x[0]), int(path.side[0])
-    return 0.5 * (float(found.scene.sides.a[0]) + found.scene.arm_length), 0
+    return 0.5 * (float(analysis.scene.sides.a[0]) + analysis.scene.arm_length), 0
 
 
 def require_start(scene: Scene, start: tuple[float, int]) -> tuple[float, int]:
@@ -87,14 +87,14 @@ def require_start(scene: Scene, start: tuple[float, int]) -> tuple[float, int]:
 Array = NDArray[np.float64]
 
 SWING = math.radians(12.0)
-"""By how much the arm swings up where the scene has no stroke; with a cavity at its end half as much is drawn."""
+"""Angle of the arm's swing if the scene has no stroke; half of it if there is a cavity at the end."""
 
 RESTS, LOWERS, STAYS = 0.5, 0.5, 1.5
-"""Seconds for which the part is shown at rest, the arm goes down, and the last picture stays."""
+"""Seconds for the part at rest, for the arm's way down, and for the last picture."""
 
 
 def drawn_of(scene: Scene) -> str:
-    """Say what is drawn rather than computed."""
+    """Name the motions that are drawn rather than computed."""
     said = []
     if not stroke_of(scene):
         said.append("the swing of the arm and the pauses are drawn, the throw is impulsive")
@@ -113,14 +113,14 @@ def _lying(scene: Scene, x: float, side: int) -> Array:
 
 
 def riding(poses: Array, angle: Array | float) -> Array:
-    """Poses of parts that lie on the arm, once that is turned about the joint; shapes (3,) or (n, 3), () or (n,)."""
+    """Poses of parts lying on the arm, after a turn of the arm about the joint; shapes (3,) or (n, 3), () or (n,)."""
     cos, sin = np.cos(angle), np.sin(angle)
     x, y = cos * poses[..., 0] - sin * poses[..., 1], sin * poses[..., 0] + cos * poses[..., 1]
     return np.stack([x, y, poses[..., 2] + angle], axis=-1)
 
 
 def swing_of(scene: Scene) -> float:
-    """By how much the arm swings up [rad]."""
+    """Angle of the arm's swing [rad]."""
     return SWING if scene.cavity is None else 0.5 * SWING
 
 
@@ -141,16 +141,16 @@ def _on_lane(x: float, side: float, share: Array) -> Array:
 def rest_leg(
     scene: Scene, x: float, side: int, seconds: float, caption: str, note: str = "", stage: int = -1
 ) -> Leg:
-    """Let a part lie on the level arm."""
+    """Give the leg of a part that lies on the level arm."""
     lying = _lying(scene, x, side)
     return Leg(
         seconds,
         lambda share: np.tile(lying, (share.size, 1)),
         lambda share: np.zeros(share.size),
-        lambda share: _on_lane(x, side, share),
-        caption,
-        note,
-        stage,
+        lane=lambda share: _on_lane(x, side, share),
+        caption=caption,
+        note=note,
+        stage=stage,
     )
 
 
@@ -174,21 +174,22 @@ def legs_of(
     throw : Throw
         The throw.
     pace : Pace
-        How fast it runs.
+        The pace of the film.
     name : str
-        What the throw is called, for its captions.
+        Name of the throw in its captions.
     note, stage : str, int
-        What is written besides, and known.
+        Second line of text, and state of the controller.
     stays : float
-        Seconds at rest.
+        Seconds for which the part is shown at rest.
     after : tuple of (str, int), optional
-        Note and stage once it rests.
+        Note and stage after the part has come to rest.
     """
     moves, swing = motion(scene, throw), stroke_of(scene) or swing_of(scene)
     unit = pace.unit / pace.rate(scene, throw.kappa)
     lying, unit_of = _lying(scene, throw.x, throw.side), scene.unit
     at_rest = f"{throw.word}, x = {throw.after:.2f} {unit_of} on side {throw.side_after}"
     broken = "; another corner would land first, which the model leaves out" if throw.other_first else ""
+    kind_of_throw = f"a {throw.word}" if throw.code >= 0 else throw.word
     flown = moves.turning
     jumps = throw.turned
 
@@ -209,32 +210,32 @@ def legs_of(
             LOWERS,
             lambda share: riding(lying, lowered(swing, share)),
             lambda share: lowered(swing, share),
-            lambda share: _on_lane(throw.x, throw.side, share),
-            f"{name}: the arm goes down",
-            note,
-            stage,
+            lane=lambda share: _on_lane(throw.x, throw.side, share),
+            caption=f"{name}: the arm goes down",
+            note=note,
+            stage=stage,
             begins=True,
         ),
         Leg(
             2.0 * swing * unit,
             lambda share: riding(lying, raised(swing, share)),
             lambda share: raised(swing, share),
-            lambda share: _on_lane(throw.x, throw.side, share),
-            f"{name}: the arm swings up and stops",
-            note,
-            stage,
+            lane=lambda share: _on_lane(throw.x, throw.side, share),
+            caption=f"{name}: the arm swings up and stops",
+            note=note,
+            stage=stage,
             marks=((1.0, "thrown", throw.x, float(lying[1])),),
         ),
         Leg(
             throw.phi * unit,
             moves.flight,
             level,
-            lambda share: np.stack(
+            lane=lambda share: np.stack(
                 [moves.flight(share)[:, 0], np.full(share.size, float(throw.side))], axis=-1
             ),
-            f"{name}: in flight",
-            note,
-            stage,
+            caption=f"{name}: in flight",
+            note=note,
+            stage=stage,
             trail=True,
             marks=((1.0, "impact", *impact),),
         ),
@@ -242,10 +243,10 @@ def legs_of(
             flown.time * unit,
             flown.pose,
             level,
-            turning_lane,
-            f"{name}: impact, and a {throw.word}" if throw.code >= 0 else f"{name}: impact, and {throw.word}",
-            note,
-            stage,
+            lane=turning_lane,
+            caption=f"{name}: impact, and {kind_of_throw}",
+            note=note,
+            stage=stage,
             trail=True,
             marks=(*rolled, (1.0, "rest", throw.after, float(lying[1]))),
             rest=rest,

@@ -1,8 +1,8 @@
 """What a frame looks like, in pixels from the upper left: the arm with parts and cavity, below a lane for each side.
 
-Both have one axis of x, so that a part stands over its place in the lanes.  What does not move is drawn once
-(`Picture.still`); what does is asked for frame by frame (`Picture.moving`), or drawn by the script of a page from the
-same numbers (`page.py`).  Colours and sizes are those of `limitsets.face.plot.style`; nothing is in colour alone.
+Both have one axis of x, so that a part stands over its place in the lanes.  Fixed shapes are drawn once
+(`Picture.still`); moving shapes are computed frame by frame (`Picture.moving`), or drawn by the script of a page from
+the same numbers (`writers.py`).  Colours and sizes are those of `plot.style`; nothing is in colour alone.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TEXT = {"fill": style.INK, "size": 14.0}
 
 
 class Shape(NamedTuple):
-    """Something to draw.
+    """A shape to draw.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ def text_of(words: str, x: float, y: float, **look: Any) -> Shape:
 
 
 LEFT = 62.0
-"""Left of the joint's side of all pictures there is so much room for names [pixels]."""
+"""Room for names, left of the joint in all pictures [pixels]."""
 
 LANE, GAP, AXIS, LINE = 34.0, 22.0, 22.0, 12.0
 KNOWN: dict[str, Any] = {"fill": "#F2C14E", "stroke": "#8A6D00", "width": 0.8, "opacity": 0.75}
@@ -78,18 +78,18 @@ def pointer(x: float, y: float) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True, eq=False)
 class LanePicture:
-    """Lanes laid out.
+    """The lanes in pixels.
 
     Attributes
     ----------
     lanes : Lanes
-        What is in them.
+        Contents of the lanes.
     unit : str
         Of x.
     scale, joint : float
-        Pixels for a unit of length, and where x is 0.
+        Pixels for a unit of length, and place of x = 0 [pixels].
     top, wide : float
-        Where they begin, and how wide the picture is [pixels].
+        Upper end of the lanes, and width of the picture [pixels].
     rolls : bool
         Whether a part rolls on in the film.
     """
@@ -112,36 +112,36 @@ class LanePicture:
         return self.joint + self.scale * x
 
     def height(self, side: float) -> float:
-        """Height of a lane, also between two [pixels]."""
+        """Height of a lane, or of a place between two lanes [pixels]."""
         return self.top + GAP + LINE * len(self.lanes.lines) + LANE * (side + 0.35)
 
     def still(self) -> list[Shape]:
-        """Draw everything in the lanes that stays where it is."""
+        """Draw the fixed shapes of the lanes."""
         lanes = self.lanes
         top, foot = self.height(-0.45), self.height(len(lanes.begin) - 0.5)
-        found = []
+        shapes = []
         for side, begin in enumerate(lanes.begin):
             y, ends = self.height(side), (self.place(begin), self.place(lanes.end))
-            found.append(text_of(f"side {side}", 8.0, y + 4.5, size=13.0))
-            found.append(shape_of("line", [(ends[0], y), (ends[1], y)], stroke="#b9b9b9", width=1.0))
+            shapes.append(text_of(f"side {side}", 8.0, y + 4.5, size=13.0))
+            shapes.append(shape_of("line", [(ends[0], y), (ends[1], y)], stroke="#b9b9b9", width=1.0))
         for number, extents in enumerate(lanes.sets):
             face, _ = style.SETS[number % len(style.SETS)]
-            found += self.bars(extents, 6.0, fill=face, stroke=style.INK, width=0.8, what="limit set")
+            shapes += self.bars(extents, 6.0, fill=face, stroke=style.INK, width=0.8, what="limit set")
         for side, points in lanes.critical.items():
             for x in points:
                 px, y = self.place(x), self.height(side)
-                found.append(
+                shapes.append(
                     shape_of(
                         "line", [(px, y - 10), (px, y + 10)], stroke=style.INK, width=2.2, what="critical"
                     )
                 )
         for number, (x, words) in enumerate(lanes.lines):
-            found += self._upright(x, top - 12.0 * (number + 1), foot, style.INK, (6.0, 3.0), words)
+            shapes += self._upright(x, top - 12.0 * (number + 1), foot, style.INK, (6.0, 3.0), words)
         if lanes.goal is not None:
             x, side = lanes.goal
             words = f"goal: side {side} from {x:g} {self.unit} on"
-            found += self._upright(x, top, foot, style.GOAL, (2.0, 2.5), words)
-        return [*found, *self._axis(foot), *self._key(foot + AXIS + 16.0)]
+            shapes += self._upright(x, top, foot, style.GOAL, (2.0, 2.5), words)
+        return [*shapes, *self._axis(foot), *self._key(foot + AXIS + 16.0)]
 
     def _axis(self, y: float) -> list[Shape]:
         """Draw ticks of x under the lanes."""
@@ -155,44 +155,44 @@ class LanePicture:
             ),
             end,
         )
-        found = []
+        shapes = []
         for k in range(int(end / step) + 1):
             px = self.place(k * step)
             words = f"{k * step:g} {unit}" if k == int(end / step) else f"{k * step:g}"
-            found.append(shape_of("line", [(px, y), (px, y + 4.0)], stroke="#8c8c8c", width=1.0))
-            found.append(text_of(words, px, y + 15.0, anchor="middle", size=11.0, fill="#5a5a5a"))
-        return found
+            shapes.append(shape_of("line", [(px, y), (px, y + 4.0)], stroke="#8c8c8c", width=1.0))
+            shapes.append(text_of(words, px, y + 15.0, anchor="middle", size=11.0, fill="#5a5a5a"))
+        return shapes
 
     def _key(self, y: float) -> list[Shape]:
         """Say what the signs in the lanes mean."""
-        lanes, x, found = self.lanes, LEFT, []
+        lanes, x, shapes = self.lanes, LEFT, []
         small: dict[str, Any] = {"size": 11.0, "fill": "#3d3d3d"}
         if lanes.sets:
             bar = [(x, y - 7), (x + 18, y - 7), (x + 18, y + 1), (x, y + 1)]
-            found.append(shape_of("polygon", bar, fill=style.SETS[0][0], stroke=style.INK, width=0.8))
-            found.append(text_of("limit set", x + 23, y, **small))
+            shapes.append(shape_of("polygon", bar, fill=style.SETS[0][0], stroke=style.INK, width=0.8))
+            shapes.append(text_of("limit set", x + 23, y, **small))
             x += 88
         if any(lanes.critical.values()):
-            found.append(shape_of("line", [(x + 3, y - 10), (x + 3, y + 3)], stroke=style.INK, width=2.2))
-            found.append(text_of("critical point", x + 10, y, **small))
+            shapes.append(shape_of("line", [(x + 3, y - 10), (x + 3, y + 3)], stroke=style.INK, width=2.2))
+            shapes.append(text_of("critical point", x + 10, y, **small))
             x += 100
         if lanes.known:
             bar = [(x, y - 8), (x + 18, y - 8), (x + 18, y + 2), (x, y + 2)]
-            found.append(shape_of("polygon", bar, fill=KNOWN["fill"], stroke=KNOWN["stroke"], width=0.8))
-            found.append(text_of("known to be here", x + 23, y, **small))
+            shapes.append(shape_of("polygon", bar, fill=KNOWN["fill"], stroke=KNOWN["stroke"], width=0.8))
+            shapes.append(text_of("known to be here", x + 23, y, **small))
             x += 132
-        found.append(
+        shapes.append(
             shape_of("circle", (x + 5, y - 4), radius=5.5, fill=style.FLIP, stroke="#ffffff", width=1.2)
         )
-        found.append(text_of("the part", x + 14, y, **small))
-        found.append(shape_of("circle", (x + 80, y - 4), radius=3.0, fill=style.INK, opacity=0.55))
-        found.append(text_of("earlier rests", x + 88, y, **small))
-        found.append(shape_of("polygon", pointer(x + 178.0, y - 10.0), fill=style.FLIP))
-        found.append(text_of("impact", x + 188, y, **small))
+        shapes.append(text_of("the part", x + 14, y, **small))
+        shapes.append(shape_of("circle", (x + 80, y - 4), radius=3.0, fill=style.INK, opacity=0.55))
+        shapes.append(text_of("earlier rests", x + 88, y, **small))
+        shapes.append(shape_of("polygon", pointer(x + 178.0, y - 10.0), fill=style.FLIP))
+        shapes.append(text_of("impact", x + 188, y, **small))
         if self.rolls:
-            found.append(shape_of("polygon", pointer(x + 244.0, y - 10.0), fill=style.ROLL))
-            found.append(text_of("rolls on", x + 254, y, **small))
-        return found
+            shapes.append(shape_of("polygon", pointer(x + 244.0, y - 10.0), fill=style.ROLL))
+            shapes.append(text_of("rolls on", x + 254, y, **small))
+        return shapes
 
     def _upright(
         self, x: float, top: float, foot: float, colour: str, dash: tuple[float, ...], words: str
@@ -207,26 +207,26 @@ class LanePicture:
 
     def bars(self, extents: Extents, half: float, **look: Any) -> list[Shape]:
         """Draw intervals in the lanes."""
-        found = []
+        shapes = []
         for side, parts in extents.items():
             y = self.height(side)
             for lo, hi in parts:
                 left = self.place(lo)
                 right = max(self.place(hi), left + 1.0)
                 corners = [(left, y - half), (right, y - half), (right, y + half), (left, y + half)]
-                found.append(shape_of("polygon", corners, **look))
-        return found
+                shapes.append(shape_of("polygon", corners, **look))
+        return shapes
 
 
 # ----------------------------------------------------------------
-# What a frame looks like, in pixels from the upper left: above the arm with the parts, below a lane for each side.
+# A frame in pixels from the upper left: the arm with the parts above, a lane for each side below.
 
 
-# The widest and the narrowest picture, its borders, and the most for what is above the lanes.
+# The widest and the narrowest picture, its borders, and the largest height of the part above the lanes.
 WIDEST, NARROWEST = 900.0, 640.0
 RIGHT, TOP, FOOT = 22.0, 62.0, 62.0
 TALLEST = 500.0
-# The line from a part to its place in the lanes is left out where they are farther apart than this.
+# The line from a part to its place in the lanes is left out if it leans by more than this [pixels].
 LEANS = 16.0
 THICK = 0.45
 """Of the arm [length, for one 28 long]."""
@@ -238,7 +238,7 @@ GROUND, ARM = "#dedede", "#c4c4c4"
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """A film laid out.
+    """A film in pixels.
 
     Attributes
     ----------
@@ -262,7 +262,7 @@ class Picture:
 
     @classmethod
     def of(cls, film: Film) -> Picture:
-        """Lay a film out: everything that moves is in sight all the time."""
+        """Choose the scale of a film, such that the moving parts stay in sight."""
         lo, hi = _bounds(film)
         across, up = (hi - lo).tolist()
         scale = min((WIDEST - LEFT - RIGHT) / across, TALLEST / up)
@@ -272,80 +272,86 @@ class Picture:
         lanes = 0.0 if film.lanes is None else LanePicture.room(film.lanes)
         tall = 2 * math.ceil(
             0.5 * (bottom + lanes + FOOT)
-        )  # even, as codecs of video ask of who converts a GIF
+        )  # even, as video codecs require when a GIF is converted
         return cls(
             film, scale, (left - scale * float(lo[0]), TOP + scale * float(hi[1])), bottom, (wide, tall)
         )
 
     def at(self, points: Any) -> Array:
         """Turn lengths from the joint into pixels."""
-        found: Array = np.asarray(points) * np.array([self.scale, -self.scale]) + np.array(self.origin)
-        return found
+        pixels: Array = np.asarray(points) * np.array([self.scale, -self.scale]) + np.array(self.origin)
+        return pixels
 
     @property
     def rows(self) -> LanePicture | None:
-        """The lanes, where there are any."""
+        """The lanes, or None if the film has none."""
         film = self.film
         if film.lanes is None:
             return None
         rolls = any(mark.word == "roll" for mark in film.marks)
         return LanePicture(
-            film.lanes, film.unit, self.scale, self.origin[0], self.bottom, self.size[0], rolls
+            film.lanes,
+            film.unit,
+            self.scale,
+            joint=self.origin[0],
+            top=self.bottom,
+            wide=self.size[0],
+            rolls=rolls,
         )
 
     # ---------------------------------------------------------------- what does not move
 
     def still(self) -> list[Shape]:
-        """Everything that stays where it is."""
+        """Draw the fixed shapes."""
         film = self.film
-        found = [] if film.arm.any() else self._ground(0)
+        shapes = [] if film.arm.any() else self._ground(0)
         if self.rows is not None:
-            found += self.rows.still()
+            shapes += self.rows.still()
         words = f"{film.title}: {film.about}" if film.about else film.title
         for number, line in enumerate(_wrapped(words, int(self.size[0] / 6.6))):
             y = self.size[1] - 22.0 + 14.0 * number
-            found.append(text_of(line, 12.0, y, size=11.0, fill="#5a5a5a", what="about"))
-        return found
+            shapes.append(text_of(line, 12.0, y, size=11.0, fill="#5a5a5a", what="about"))
+        return shapes
 
     def _ground(self, k: int) -> list[Shape]:
         pieces = [self._in_sight(each) for each in self.film.ground_polygons(k)]
-        found = [shape_of("polygon", each, fill=GROUND, what="ground") for each in pieces]
-        return found + [shape_of("line", [*each, each[0]], stroke="#9a9a9a", width=1.0) for each in pieces]
+        shapes = [shape_of("polygon", each, fill=GROUND, what="ground") for each in pieces]
+        return shapes + [shape_of("line", [*each, each[0]], stroke="#9a9a9a", width=1.0) for each in pieces]
 
     def _in_sight(self, polygon: Array) -> Array:
-        """Clip a polygon to the upper part: ground is as thick as parts are long."""
-        found = self.at(polygon)
-        return np.clip(found, (2.0, TOP - 20.0), (self.size[0] - 2.0, self.bottom))
+        """Clip a polygon to the upper part of the picture: ground is as thick as parts are long."""
+        pixels = self.at(polygon)
+        return np.clip(pixels, (2.0, TOP - 20.0), (self.size[0] - 2.0, self.bottom))
 
     # ---------------------------------------------------------------- what moves
 
     def moving(self, k: int) -> list[Shape]:
-        """Everything else, in a frame."""
+        """Draw the moving shapes of a frame."""
         film = self.film
-        found = self._known(k)
-        found += self._ground(k) if film.arm.any() else []
-        found += self._arm(k)
+        shapes = self._known(k)
+        shapes += self._ground(k) if film.arm.any() else []
+        shapes += self._arm(k)
         first, last = (int(each) for each in film.trail[k])
         if last > first:
             path = self.at(film.poses[first : last + 1, 0, :2])
             ghost = self.at(film.polygon(first))
-            found.append(
+            shapes.append(
                 shape_of(
                     "line", [*ghost, ghost[0]], stroke="#a9a9a9", width=1.0, dash=(3.0, 3.0), what="left"
                 )
             )
-            found.append(shape_of("line", path, stroke=style.FLIP, width=1.6, dash=(5.0, 3.0), what="trail"))
+            shapes.append(shape_of("line", path, stroke=style.FLIP, width=1.6, dash=(5.0, 3.0), what="trail"))
         for part in range(len(film.outlines)):
-            found += self._part(k, part)
-        found += self._marks(k)
-        found += self._in_lanes(k)
+            shapes += self._part(k, part)
+        shapes += self._marks(k)
+        shapes += self._in_lanes(k)
         caption, note = film.captions[int(film.caption[k])], film.notes[int(film.note[k])]
         clock = f"{film.times[k]:.2f} {film.clock.removeprefix('1')}"
-        found.append(text_of(caption, 12.0, 26.0, size=18.0, weight="bold", what="caption"))
-        found.append(text_of(clock, self.size[0] - 12.0, 26.0, anchor="end", fill="#5a5a5a", what="clock"))
+        shapes.append(text_of(caption, 12.0, 26.0, size=18.0, weight="bold", what="caption"))
+        shapes.append(text_of(clock, self.size[0] - 12.0, 26.0, anchor="end", fill="#5a5a5a", what="clock"))
         if note:
-            found.append(text_of(note, 12.0, 48.0, fill="#3d3d3d", what="note"))
-        return found
+            shapes.append(text_of(note, 12.0, 48.0, fill="#3d3d3d", what="note"))
+        return shapes
 
     def _known(self, k: int) -> list[Shape]:
         rows, stage = self.rows, int(self.film.stage[k])
@@ -370,50 +376,50 @@ class Picture:
         if not math.isfinite(x):
             return []
         look = {"fill": PARTS[part % len(PARTS)], "stroke": EDGES[part % len(EDGES)], "width": 2.0}
-        found = [shape_of("polygon", self.at(film.polygon(k, part)), what="part", **look)]
+        shapes = [shape_of("polygon", self.at(film.polygon(k, part)), what="part", **look)]
         cos, sin = math.cos(angle), math.sin(angle)
         for label in film.labels[part]:
             px, py = self.at((x + cos * label.x - sin * label.y, y + sin * label.x + cos * label.y))
-            found.append(text_of(label.word, px, py + 4.5, anchor="middle", size=13.0, what="label"))
+            shapes.append(text_of(label.word, px, py + 4.5, anchor="middle", size=13.0, what="label"))
         if film.labels[part]:
-            found.append(
+            shapes.append(
                 shape_of("circle", self.at((x, y)), radius=3.2, fill="#ffffff", stroke=style.INK, width=1.4)
             )
-        return found
+        return shapes
 
     def _marks(self, k: int) -> list[Shape]:
-        found = []
+        shapes = []
         for mark in self.film.marks:
             if mark.word in ("impact", "roll") and mark.frame <= k < mark.until:
                 x, y = self.at((mark.x, mark.y)).tolist()
                 corners = pointer(x, y)
                 fill = style.FLIP if mark.word == "impact" else style.ROLL
-                found.append(shape_of("polygon", corners, fill=fill, what=mark.word))
-        return found
+                shapes.append(shape_of("polygon", corners, fill=fill, what=mark.word))
+        return shapes
 
     def _in_lanes(self, k: int) -> list[Shape]:
         film, rows = self.film, self.rows
         x, side = film.position[k].tolist()
         if rows is None or not math.isfinite(x):
             return []
-        found = []
+        shapes = []
         for rest in film.rests:
             if rest.frame <= k:
                 place = rows.place(rest.x), rows.height(rest.side)
-                found.append(
+                shapes.append(
                     shape_of("circle", place, radius=3.0, fill=style.INK, opacity=0.55, what="visited")
                 )
         px, y = rows.place(x), rows.height(side)
         centre = self.at(film.poses[k, 0, :2])
         if abs(float(centre[0]) - px) < LEANS:
             dots = {"stroke": "#7d7d7d", "width": 0.9, "dash": (1.5, 2.5)}
-            found.append(shape_of("line", [centre, (px, y)], what="plumb", **dots))
+            shapes.append(shape_of("line", [centre, (px, y)], what="plumb", **dots))
         look = {"fill": style.FLIP, "stroke": "#ffffff", "width": 1.4}
-        return [*found, shape_of("circle", (px, y), radius=6.5, what="here", **look)]
+        return [*shapes, shape_of("circle", (px, y), radius=6.5, what="here", **look)]
 
 
 def _bounds(film: Film) -> tuple[Array, Array]:
-    """Find the least and the largest x and y of what is shown."""
+    """Find the least and the largest x and y in the film."""
     reach = max(float(np.hypot(*outline.T).max()) for outline in film.outlines)
     lo, hi = np.array([np.inf, np.inf]), np.array([-np.inf, -np.inf])
     for part, outline in enumerate(film.outlines):
@@ -450,7 +456,7 @@ def _wrapped(words: str, most: int) -> Sequence[str]:
 
 
 # ----------------------------------------------------------------
-# The cavity in a film: a sheet as thick as the arm, that is part of the arm and turns with it.
+# The cavity in a film: a sheet as thick as the arm, fixed to the arm, which turns with it.
 
 
 def cavity_pieces(scene: Scene, wall: float) -> tuple[Array, ...]:
@@ -461,7 +467,7 @@ def cavity_pieces(scene: Scene, wall: float) -> tuple[Array, ...]:
     scene : Scene
         The scene; without a cavity there are no pieces.
     wall : float
-        How high the far wall stands over the arm's surface [length].
+        Height of the far wall over the arm's surface [length].
     """
     cavity, top = scene.cavity, scene.surface_height
     if cavity is None:

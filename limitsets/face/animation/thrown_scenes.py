@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 USUAL = 8
-"""Throws that are shown unless others are asked for."""
+"""Default number of throws that are shown."""
 
 
 def film_of_scene(scene: Scene, asked: Asked) -> Film:
@@ -35,21 +35,21 @@ def film_of_scene(scene: Scene, asked: Asked) -> Film:
     if asked.start is not None:
         require_start(scene, asked.start)
     require_length(asked.throws or USUAL)
-    found, _ = known_of(scene, asked.progress)
-    return film_of_analysis(found, asked)
+    analysis, _ = known_of(scene, asked.progress)
+    return film_of_analysis(analysis, asked)
 
 
-def film_of_analysis(found: Analysis, asked: Asked) -> Film:
+def film_of_analysis(analysis: Analysis, asked: Asked) -> Film:
     """Show throws of a scene that is analysed already."""
-    scene, count = found.scene, USUAL if asked.throws is None else asked.throws
-    start = good_start(found, count) if asked.start is None else require_start(scene, asked.start)
-    return film_of_throws(scene, start, count, asked.pace(scene), lanes_of(scene, found))
+    scene, count = analysis.scene, USUAL if asked.throws is None else asked.throws
+    start = good_start(analysis, count) if asked.start is None else require_start(scene, asked.start)
+    return film_of_throws(scene, start, count, asked.pace(scene), lanes_of(scene, analysis))
 
 
 def film_of_throws(
     scene: Scene, start: tuple[float, int], count: int, pace: Pace, lanes: Lanes | None = None
 ) -> Film:
-    """Show so many throws of a scene from a start; without lanes nothing is analysed."""
+    """Show `count` throws of a scene from a start; without lanes nothing is analysed."""
     from limitsets.feeder.thrower import trace
 
     x, side = start
@@ -72,7 +72,7 @@ def film_of_throws(
 
 
 def film_of_margin(margin: Margin, asked: Asked) -> Film:
-    """Show the last throws of the orbit that refutes."""
+    """Show the last throws of the orbit that refutes the goal."""
     if asked.start is not None:
         raise AnswerError("the start", asked.start, "none: the orbit of a margin has its own", "leave it out")
     states = margin.counterexample
@@ -116,7 +116,7 @@ def film_of_margin(margin: Margin, asked: Asked) -> Film:
 
 
 def _thrown(scene: Scene, here: Any) -> Throw:
-    """Throw a state as the proof does, with its own kappa; what it lands farther is the noise of the landing."""
+    """Throw a state as the proof does: with its own kappa, and with the noise of its landing added."""
     from limitsets.feeder.thrower import trace
     from limitsets.feeder.thrower.motion import FullThrow
 
@@ -145,29 +145,35 @@ class _Step(NamedTuple):
     throw: Throw | None
 
 
-def film_of_policy(found: Synthesis, asked: Asked) -> Film:
+def film_of_policy(synthesis: Synthesis, asked: Asked) -> Film:
     """Show what a policy does from a start, without noise."""
-    policy = found.found.policy
+    policy = synthesis.found.policy
     if policy is None:
         remedy = "more throws, other throws, another sensor or fewer starts may do it"
-        raise AnswerError("the policy", found.found.verdict, "one that was found", remedy)
-    scene, pace = found.scene, asked.pace(found.scene)
+        raise AnswerError("the policy", synthesis.found.verdict, "one that was found", remedy)
+    scene, pace = synthesis.scene, asked.pace(synthesis.scene)
     if asked.start is None:
-        x, side = _longest(found, policy)
+        x, side = _longest(synthesis, policy)
     else:
         x, side = require_start(scene, asked.start)
-        inside = found.starts.extents().get(side, [])
+        inside = synthesis.starts.extents().get(side, [])
         if not any(lo <= x <= hi for lo, hi in inside):
             raise AnswerError(
                 "the start", f"x = {x:g} on side {side}", "one of the policy's starts", "choose another"
             )
-    steps = _run(found, policy, x, side)
-    known = tuple(found.beliefs())
-    texts = [_words(found, each) for each in steps]
-    question = found.question
+    steps = _run(synthesis, policy, x, side)
+    known = tuple(synthesis.beliefs())
+    texts = [_words(synthesis, each) for each in steps]
+    question = synthesis.question
     legs = [
         rest_leg(
-            scene, x, side, 1.5, f"Start: x = {x:.2f} {scene.unit} on side {side}", texts[0], steps[0].state
+            scene,
+            x,
+            side,
+            seconds=1.5,
+            caption=f"Start: x = {x:.2f} {scene.unit} on side {side}",
+            note=texts[0],
+            stage=steps[0].state,
         )
     ]
     made = [(each, each.throw) for each in steps if each.throw is not None][: asked.throws]
@@ -186,26 +192,26 @@ def film_of_policy(found: Synthesis, asked: Asked) -> Film:
             stays=STAYS if last else 1.0,
             after=after,
         )
-    place = getattr(found.sensor, "x", None)
+    place = getattr(synthesis.sensor, "x", None)
     lines = () if place is None else ((float(place), f"sensor: {question}"),)
     lanes = lanes_of(scene, known=known, lines=lines)
     about = drawn_of(scene)
     return cut(scene, legs, pace, title=f"{scene.name}, one bit of feedback", about=about, lanes=lanes)
 
 
-def _words(found: Synthesis, step: _Step) -> str:
-    asked = f"{found.question} {step.heard}" if step.heard else "nothing is asked"
+def _words(synthesis: Synthesis, step: _Step) -> str:
+    asked = f"{synthesis.question} {step.heard}" if step.heard else "nothing is asked"
     return f"sensor: {asked} → {'stop' if step.throw is None else f'throw {step.name}'} (state {step.state})"
 
 
-def _run(found: Synthesis, policy: Policy, x: float, side: int) -> list[_Step]:
-    """Follow the table, each throw without noise, each answer without error."""
+def _run(synthesis: Synthesis, policy: Policy, x: float, side: int) -> list[_Step]:
+    """Follow the policy's table: each throw is without noise, each answer of the sensor without error."""
     from limitsets.feeder.thrower import trace
 
     steps: list[_Step] = []
     table = policy.first
     for _ in range(int(policy.left.max()) + 1):
-        heard = _heard(found, x, side)
+        heard = _heard(synthesis, x, side)
         state = int(table[policy.answers.index(heard)])
         if state < 0:
             break
@@ -213,33 +219,33 @@ def _run(found: Synthesis, policy: Policy, x: float, side: int) -> list[_Step]:
             steps.append(_Step(state, heard, "", None))
             break
         name = policy.throws[int(policy.throw[state])]
-        box = found.throws[name]
+        box = synthesis.throws[name]
         path = trace(box.at_kappa(box.middle_kappa), x, side, 1)
-        made = throws_of(found.scene, path, box.middle_kappa)
+        made = throws_of(synthesis.scene, path, box.middle_kappa)
         if not made:
             break
         throw = made[0]
         steps.append(_Step(state, heard, name, throw))
         x, side, table = throw.after, throw.side_after, policy.after[state]
-        if throw.code < 0 or (found.mode == "catch" and x >= found.goal[0]):
+        if throw.code < 0 or (synthesis.mode == "catch" and x >= synthesis.goal[0]):
             break
     return steps
 
 
-def _heard(found: Synthesis, x: float, side: int) -> str:
-    if found.sensor is None:
+def _heard(synthesis: Synthesis, x: float, side: int) -> str:
+    if synthesis.sensor is None:
         return ""
-    return "yes" if found.sensor.read(x, side, 0.0) else "no"
+    return "yes" if synthesis.sensor.read(x, side, 0.0) else "no"
 
 
-def _longest(found: Synthesis, policy: Policy) -> tuple[float, int]:
+def _longest(synthesis: Synthesis, policy: Policy) -> tuple[float, int]:
     """Choose the start from which the policy makes the most throws."""
     best, chosen = -1, (0.0, 0)
-    for side, parts in found.starts.extents().items():
+    for side, parts in synthesis.starts.extents().items():
         for lo, hi in parts:
             for k in range(1, TRIED + 1):
                 x = lo + (hi - lo) * k / (TRIED + 1)
-                count = len(_run(found, policy, x, side))
+                count = len(_run(synthesis, policy, x, side))
                 if count > best:
                     best, chosen = count, (x, side)
     return chosen

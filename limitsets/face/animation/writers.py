@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------
-# Frames as pixels, by matplotlib: what does not move is drawn once.
+# Frames as pixels, by matplotlib: fixed shapes are drawn once.
 
 
 Progress = Callable[[str, int, int], None] | None
@@ -56,7 +56,7 @@ def frames(picture: Picture, zoom: float = 1.0, progress: Progress = None) -> It
     width, height = picture.size
     wide, tall = 2 * round(0.5 * zoom * width), 2 * round(0.5 * zoom * height)
     figure = Figure(figsize=(wide / zoom / DPI, tall / zoom / DPI), dpi=DPI * zoom)
-    canvas: Any = FigureCanvasAgg(figure)  # matplotlib types none of its methods
+    canvas: Any = FigureCanvasAgg(figure)  # matplotlib has no types for its methods
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_xlim(0.0, width)
     axes.set_ylim(height, 0.0)
@@ -104,8 +104,8 @@ def _artist(shape: Shape) -> Any:
 
 
 # ----------------------------------------------------------------
-# A film as an animated GIF, by Pillow: one small palette for all frames, so that what stands still costs
-# nothing.
+# A film as an animated GIF, by Pillow: all frames share one small palette, so that fixed shapes take no
+# space.
 
 
 FPS = 20.0
@@ -117,7 +117,7 @@ SHADES, ASKED = (0.0, 0.35, 0.7), 25
 
 
 def write_gif(film: Film, file: Path, progress: Progress = None) -> None:
-    """Write a film; it begins again when it is over."""
+    """Write a film that plays in a loop."""
     from PIL import Image
 
     picture = Picture.of(film)
@@ -141,7 +141,7 @@ def write_gif(film: Film, file: Path, progress: Progress = None) -> None:
 
 
 def _colours(picture: Picture) -> bytes:
-    """Give white, and all that is drawn with, in some shades: a palette chosen by areas loses small signs."""
+    """Give white and shades of all colours in use: a palette chosen by area would lose small signs."""
     asked = range(0, picture.film.frames, max(1, picture.film.frames // ASKED))
     shapes = [*picture.still(), *(shape for k in asked for shape in picture.moving(k))]
     words = (shape.look.get(name) for shape in shapes for name in ("fill", "stroke"))
@@ -153,12 +153,12 @@ def _colours(picture: Picture) -> bytes:
 
 
 # ----------------------------------------------------------------
-# A film as a page that stands alone: what is still as SVG, what moves as numbers, and a script that draws it.
+# A film as a page that stands alone: fixed shapes as SVG, moving ones as numbers, and a script that draws them.
 
 
 # Digits of a length over all of the picture: a hundredth of a pixel is a tenth of the last one.
 DIGITS = 6
-# Texts that stand beside the picture in a page.
+# Texts beside the picture in a page.
 BESIDE = ("caption", "note", "clock", "about")
 
 

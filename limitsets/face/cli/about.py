@@ -1,4 +1,4 @@
-"""Of which model a command's answer is: the last line of text, and `model` in JSON."""
+"""The model of a command's answer: the last line of its text, and `model` in JSON."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class About:
-    """What an answer is about.
+    """The model and the scene of an answer.
 
     Attributes
     ----------
     model : Model
         The model of the answer.
     name : str
-        The scene, as another command takes it.
+        Name or file of the scene, as other commands take it.
     scene : Scene or None
-        The scene, where it is to be seen which assumptions of the model break; None where nobody looks.
+        The scene, if the answer is to say which assumptions of the model it breaks; else None.
     """
 
     model: Model
@@ -33,7 +33,7 @@ class About:
 
     @cached_property
     def audited(self) -> Model:
-        """The model with the assumptions that break on the limit set: looked for once, when somebody asks."""
+        """The model with the assumptions that break on the limit set, computed at the first use."""
         if self.scene is None or self.model.broken is not None:
             return self.model
         from limitsets.proofs.auditing import audited
@@ -41,12 +41,12 @@ class About:
         return audited(self.model, self.scene)
 
     def added(self, record: Any) -> Any:
-        """Give an answer as plain tables for JSON, with its model in each."""
+        """Give an answer as plain tables for JSON, each with the model."""
         plain = as_plain(record)
         for each in plain if isinstance(plain, list) else [plain]:
             each["model"] = self.audited.to_json()
         return plain
 
     def line(self) -> str:
-        """Say it to people."""
+        """Give the line of text that names the model."""
         return self.audited.line(self.name)

@@ -82,15 +82,7 @@ def _announce(plan: Plan) -> None:
 
 
 def _text(analysis: Analysis, page: Path) -> None:
-    from limitsets.face.report.pages import (
-        after_undecided,
-        count,
-        intervals,
-        next_command,
-        percent,
-        verdict_of,
-        void_of,
-    )
+    from limitsets.face.report.pages import after_undecided, next_command, percent, verdict_of, void_of
     from limitsets.feeder.scene.checking import doubts
     from limitsets.parameters.analysis import in_limit_sets
 
@@ -99,24 +91,7 @@ def _text(analysis: Analysis, page: Path) -> None:
         typer.echo(analysis.choice.notice)
     for doubt in doubts(analysis.scene):
         typer.echo(str(doubt))
-    if not analysis.attractors:
-        undecided = analysis.basins.undecided_between
-        left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"
-        typer.echo(left if undecided else "no start was found to stay on the arm")
-        if analysis.basins.exits.get("outside-model", 0.0) > MOST:
-            kappa = f"{analysis.scene.kappa:.6g} {unit}"
-            typer.echo(
-                "outside the model: a throw after which the part has not landed within a full turn. "
-                f"Almost all starts are; kappa is {kappa}: has the speed the right unit?"
-            )
-    for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
-        whose = "" if analysis.scene.effects.spread is None else ", of throws without scatter"
-        typer.echo(f"limit set {k}{whose}: from {percent(analysis.basins.attractors[k])} of all starts")
-        rows = [
-            [side, intervals(parts), count(*attractor.jogs_per_visit.get(side, (0, 0)))]
-            for side, parts in extents.items()
-        ]
-        table(["side", f"x [{unit}]", "jogs per visit"], rows)
+    _print_limit_sets(analysis)
     exits = ", ".join(f"{name} {percent(share)}" for name, share in analysis.basins.exits.items() if share)
     if exits:
         typer.echo(f"of all starts leave: {exits}")
@@ -142,12 +117,37 @@ def _text(analysis: Analysis, page: Path) -> None:
         if analysis.goal.holds is False and threshold is not None and math.isfinite(threshold):
             typer.echo(analysis.goal.goal.explained(threshold, unit))
         typer.echo(f"next: {next_command(analysis)}")
-    found = analysis.accuracy
-    if found is not None and found.reached is not None:
-        typer.echo(f"error of the ends: {found.reached:.2g} {unit} ({found.how})")
-    if found is not None and not found.met:
-        typer.echo(f"the error of {found.plan.error_wanted:g} {unit} was not met: {found.advice}")
+    accuracy = analysis.accuracy
+    if accuracy is not None and accuracy.reached is not None:
+        typer.echo(f"error of the ends: {accuracy.reached:.2g} {unit} ({accuracy.how})")
+    if accuracy is not None and not accuracy.met:
+        typer.echo(f"the error of {accuracy.plan.error_wanted:g} {unit} was not met: {accuracy.advice}")
     typer.echo(f"report: {page}")
+
+
+def _print_limit_sets(analysis: Analysis) -> None:
+    """Print the table of each limit set, or where the starts go if there is none."""
+    from limitsets.face.report.pages import count, intervals, percent
+
+    unit = analysis.scene.unit
+    if not analysis.attractors:
+        undecided = analysis.basins.undecided_between
+        left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"
+        typer.echo(left if undecided else "no start was found to stay on the arm")
+        if analysis.basins.exits.get("outside-model", 0.0) > MOST:
+            kappa = f"{analysis.scene.kappa:.6g} {unit}"
+            typer.echo(
+                "outside the model: a throw after which the part has not landed within a full turn. "
+                f"Almost all starts are; kappa is {kappa}: has the speed the right unit?"
+            )
+    for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
+        whose = "" if analysis.scene.effects.spread is None else ", of throws without scatter"
+        typer.echo(f"limit set {k}{whose}: from {percent(analysis.basins.attractors[k])} of all starts")
+        rows = [
+            [side, intervals(parts), count(*attractor.jogs_per_visit.get(side, (0, 0)))]
+            for side, parts in extents.items()
+        ]
+        table(["side", f"x [{unit}]", "jogs per visit"], rows)
 
 
 # ----------------------------------------------------------------
@@ -169,21 +169,21 @@ def audit(
         tell("assumptions", 0, 1 + (out is not None))
         from limitsets.proofs.auditing import audit as run
 
-        found = run(chosen)
+        findings = run(chosen)
         files = []
         if out is not None:
             from limitsets.face.report.writing import write_audit
 
             tell("files", 1, 2)
-            files = write_audit(found, out, form)
-    answer(found, json, lambda: _text_of_audit(found, files), csv=(csv, found.table))
+            files = write_audit(findings, out, form)
+    answer(findings, json, lambda: _text_of_audit(findings, files), csv=(csv, findings.table))
 
 
-def _text_of_audit(found: Audit, files: list[Path]) -> None:
+def _text_of_audit(findings: Audit, files: list[Path]) -> None:
     from limitsets.face.report.writing import HEADS, lines_of, summary
 
-    table(HEADS, lines_of(found))
-    for line in summary(found):
+    table(HEADS, lines_of(findings))
+    for line in summary(findings):
         typer.echo(line)
     if files:
         typer.echo(f"report: {files[0]}")
@@ -222,31 +222,31 @@ def fit(
         from limitsets.parameters.fitting import enough
         from limitsets.parameters.fitting import fit as run
 
-        found = run(chosen, file, error=None if error is None else number(error), progress=tell)
-        judged = None if no_margin or chosen.goal is None else enough(found, progress=tell)
-        record = found.to_json() | {"enough": None if judged is None else judged.to_json()}
-        files = _write(found, record, out, form) if out is not None else []
-    answer(record, json, lambda: _text_of_fit(found, judged, files), csv=(csv, found.table))
+        estimates = run(chosen, file, error=None if error is None else number(error), progress=tell)
+        judged = None if no_margin or chosen.goal is None else enough(estimates, progress=tell)
+        record = estimates.to_json() | {"enough": None if judged is None else judged.to_json()}
+        files = _write(estimates, record, out, form) if out is not None else []
+    answer(record, json, lambda: _text_of_fit(estimates, judged, files), csv=(csv, estimates.table))
     raise typer.Exit(0 if judged is None or judged.verdict == "enough" else 1)
 
 
-def _write(found: Fit, record: dict[str, Any], out: Path, form: str) -> list[Path]:
+def _write(estimates: Fit, record: dict[str, Any], out: Path, form: str) -> list[Path]:
     from limitsets.base.files import as_json
     from limitsets.face.plot.noise import fit_residuals
     from limitsets.face.plot.parts import part
     from limitsets.face.report.writing import laid
     from limitsets.feeder.scene import dump
 
-    texts = {"fitted.toml": dump(found.scene), "fit.json": as_json(record)}
-    drawn = [("part", part(found.scene)), ("residuals", fit_residuals(found))]
+    texts = {"fitted.toml": dump(estimates.scene), "fit.json": as_json(record)}
+    drawn = [("part", part(estimates.scene)), ("residuals", fit_residuals(estimates))]
     return laid(out, drawn, lambda _: texts, form)
 
 
-def _text_of_fit(found: Fit, judged: Enough | None, files: list[Path]) -> None:
+def _text_of_fit(estimates: Fit, judged: Enough | None, files: list[Path]) -> None:
     from limitsets.face.report.pages import lines_of
 
-    show(found.table())
-    for line in lines_of(found):
+    show(estimates.table())
+    for line in lines_of(estimates):
         typer.echo(line)
     for line in judged.sentences if judged is not None else ():
         typer.echo(line)

@@ -11,7 +11,7 @@ from limitsets.base.errors import LimitsetsError
 from limitsets.face.cli.arguments import place
 from limitsets.face.cli.output import Json, Scene, answer, option, progress, stem_of
 
-# Pairs that are thrown to find one that is assembled, and drops of a tray of which only the passes are shown.
+# Pairs thrown to find one that is assembled; drops counted for a tray, of which the film shows only the passes.
 PAIRS, FEW = 40, 20
 HELP_START = "x and side of the start: 15,2 or '38 cm,2'; default a good one, on the limit set."
 
@@ -115,7 +115,7 @@ def _shown(
     reading: str | None,
     parts: int | None,
 ) -> Any:
-    """Compute what is asked, as far as a film needs it."""
+    """Compute the answer that is to be shown, as far as a film needs it."""
     if feed:
         from limitsets.cell.feeding.falling import arm_end_of
 

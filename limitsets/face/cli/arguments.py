@@ -70,23 +70,23 @@ def position(scene: Scene, text: str) -> float:
 
 def deviations(option: str, words: list[str] | None) -> dict[str, str]:
     """Read the words of a repeatable option, QUANTITY=DEVIATION each."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for word in words or []:
         name, sign, text = word.partition("=")
         name = name.strip()
-        if not sign or name in found:
+        if not sign or name in texts:
             remedy = "name each quantity once" if sign else "put a sign of equality between them"
             raise LimitsetsError(option.lstrip("-"), word, "QUANTITY=DEVIATION", remedy, key=option)
-        found[name] = text.strip()
-    return found
+        texts[name] = text.strip()
+    return texts
 
 
 def laid_ranges(words: list[str] | None) -> dict[int, list[tuple[float | str, float | str]]] | None:
     """Read the words of --laid, SIDE=LO:HI each; bare numbers are in the scene's unit.
 
-    A unit behind one end is that of both.
+    A unit behind one end holds for both.
     """
-    found: dict[int, list[tuple[float | str, float | str]]] = {}
+    ranges: dict[int, list[tuple[float | str, float | str]]] = {}
     for word in words or []:
         side, sign, text = word.partition("=")
         ends = [number(end.strip("'\" ")) for end in text.split(":")]
@@ -96,17 +96,17 @@ def laid_ranges(words: list[str] | None) -> dict[int, list[tuple[float | str, fl
             raise LimitsetsError("where parts are laid down", word, "SIDE=LO:HI", remedy, key="--laid")
         if len(units) == 1:
             ends = [f"{end!r} {units[0]}" if isinstance(end, float) else end for end in ends]
-        found.setdefault(int(side), []).append((ends[0], ends[1]))
-    return found or None
+        ranges.setdefault(int(side), []).append((ends[0], ends[1]))
+    return ranges or None
 
 
 def _ends_of(words: list[str] | None) -> dict[str, _Ends]:
     """Read the words of --bounds, QUANTITY=LOWEST:HIGHEST each."""
-    found: dict[str, _Ends] = {}
+    bounds: dict[str, _Ends] = {}
     for word in words or []:
         name, sign, text = word.partition("=")
         lo, colon, hi = text.partition(":")
-        if not (sign and colon) or name.strip() in found:
+        if not (sign and colon) or name.strip() in bounds:
             remedy = (
                 "name each quantity once"
                 if sign and colon
@@ -114,12 +114,12 @@ def _ends_of(words: list[str] | None) -> dict[str, _Ends]:
             )
             raise LimitsetsError("the bounds", word, "QUANTITY=LOWEST:HIGHEST", remedy, key="--bounds")
         ends = [number(end.strip("'\" ")) if end.strip("'\" ") else None for end in (lo, hi)]
-        found[name.strip()] = (ends[0], ends[1])
-    return found
+        bounds[name.strip()] = (ends[0], ends[1])
+    return bounds
 
 
 def bounds_of(scene: Scene, words: list[str] | None) -> dict[str, tuple[float | None, float | None]]:
-    """Read --bounds in the units of a scene; a bare number is in the unit in which people read the quantity."""
+    """Read --bounds in the units of a scene; a bare number is in the unit in which the quantity is displayed."""
     from limitsets.feeder.scene.quantities import in_units, unit_read
 
     def read(name: str, end: float | str | None) -> float | None:
@@ -128,14 +128,14 @@ def bounds_of(scene: Scene, words: list[str] | None) -> dict[str, tuple[float | 
         text = end if isinstance(end, str) else f"{end!r} {unit_read(scene.text, scene.unit, name)}".strip()
         return in_units(scene.unit, name, text, key="--bounds")
 
-    found = {name: (read(name, lo), read(name, hi)) for name, (lo, hi) in _ends_of(words).items()}
-    for name, (lo, hi) in found.items():
+    bounds = {name: (read(name, lo), read(name, hi)) for name, (lo, hi) in _ends_of(words).items()}
+    for name, (lo, hi) in bounds.items():
         if lo is not None and hi is not None and not lo < hi:
             word = next(word for word in words or [] if word.split("=")[0].strip() == name)
             raise LimitsetsError(
                 "the bounds", word, "a lower and a higher one", "turn them round", key="--bounds"
             )
-    return found
+    return bounds
 
 
 # ----------------------------------------------------------------
@@ -143,7 +143,7 @@ def bounds_of(scene: Scene, words: list[str] | None) -> dict[str, tuple[float | 
 
 
 def own_file(scene: Scene) -> Path:
-    """Name a certificate after the scene's file; a certificate of another scene that has this name stays."""
+    """Name a certificate after the scene's file; refuse to overwrite the certificate of another scene."""
     file, name = Path(f"{stem_of(scene)}.proof.zip"), scene.name
     with suppress(OSError, BadZipFile, ValueError, TypeError, LookupError), ZipFile(file) as other:
         name = loads(other.read("header.json"))["boxes"][0]["scene"]["name"]
@@ -156,31 +156,31 @@ def own_file(scene: Scene) -> Path:
 
 
 def with_ending(file: Path) -> Path:
-    """Give a certificate its ending where its name has none; what is there, a folder or a device, keeps its name."""
+    """Add the ending of certificates to a name without one; an existing folder or device keeps its name."""
     return file if file.suffix or file.exists() else file.with_name(f"{file.name}.proof.zip")
 
 
 def certified(
-    found: Any, file: Path, claim: str, *, proved: bool, recheck: bool
+    answer: Any, file: Path, claim: str, *, proved: bool, recheck: bool
 ) -> tuple[Any, dict[str, Any]]:
-    """Write the certificate; what is left of the answer where the checker denies it, and what is said of the file."""
+    """Write the certificate; return the answer without claims that the checker denies, and a record of the file."""
     from limitsets.proofs.prover.certificate import DeniedError
 
     if not proved:
-        return found, {"file": None, "denied": False, "recheck": None}
+        return answer, {"file": None, "denied": False, "recheck": None}
     begin, file = time.perf_counter(), with_ending(file)
     with saved(file) as draft:
         try:
-            found.save(draft, recheck=recheck, workers=None)
+            answer.save(draft, recheck=recheck, workers=None)
         except DeniedError as error:
             kept = str(file.with_name(Path(error.file or "").name))
-            return found.denied(error.claims[claim]), {"file": kept, "denied": True, "recheck": None}
+            return answer.denied(error.claims[claim]), {"file": kept, "denied": True, "recheck": None}
     seconds = time.perf_counter() - begin if recheck else None
-    return found, {"file": str(file), "denied": False, "recheck": seconds}
+    return answer, {"file": str(file), "denied": False, "recheck": seconds}
 
 
 def said_of(written: dict[str, Any], missing: str) -> str:
-    """Say it to people; `missing` is why there is no file."""
+    """Say in a line what became of the certificate; `missing` is the reason for having none."""
     file, seconds = written["file"], written["recheck"]
     if file is None:
         return f"no certificate is written: {missing}"

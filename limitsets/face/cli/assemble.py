@@ -67,7 +67,7 @@ def assemble(
         from limitsets.parameters.sheet.summary import scattering_from
 
         random = deviations("--scatter", scatter)
-        found = run(
+        assembly = run(
             chosen,
             scene2,
             scattering_from(chosen, random, law) if random else None,
@@ -87,30 +87,32 @@ def assemble(
             from limitsets.face.report.writing import laid
 
             tell("figure", 0, 1)
-            figures = [("assembly", plot.assembly(found))]
-            files = laid(out, figures, lambda _: {"assembly.json": as_json(found)}, form)
-    answer(found.to_json(), json, lambda: _text(found, files), csv=(csv, found.table))
+            figures = [("assembly", plot.assembly(assembly))]
+            files = laid(out, figures, lambda _: {"assembly.json": as_json(assembly)}, form)
+    answer(assembly.to_json(), json, lambda: _text(assembly, files), csv=(csv, assembly.table))
 
 
-def _text(found: Assembly, files: list[Path]) -> None:
-    one, two = found.pair.scenes
-    how = "the cavity is thrown too" if found.series.carried else "the cavity stands"
+def _text(assembly: Assembly, files: list[Path]) -> None:
+    one, two = assembly.pair.scenes
+    how = "the cavity is thrown too" if assembly.series.carried else "the cavity stands"
     meet = (
-        "pass through each other" if found.contact == "none" else f"push each other, {found.contact}, {how}"
+        "pass through each other"
+        if assembly.contact == "none"
+        else f"push each other, {assembly.contact}, {how}"
     )
-    typer.echo(f"{one.name} below, {two.name} on top: {len(found.rows)} trials, the parts {meet}")
-    if found.misfit is not None:
+    typer.echo(f"{one.name} below, {two.name} on top: {len(assembly.rows)} trials, the parts {meet}")
+    if assembly.misfit is not None:
         typer.echo(
-            f"THEY DO NOT FIT: {found.misfit}; 'assembled' says only that both were fed rightly, one after the other"
+            f"THEY DO NOT FIT: {assembly.misfit}; 'assembled' says only that both were fed rightly, one after the other"
         )
-    overlaps, joint = found.overlaps, found.joint
+    overlaps, joint = assembly.overlaps, assembly.joint
     if overlaps is not None:
         low, high = overlaps.ever.interval
         typer.echo(
             f"the outlines overlap in {100 * overlaps.ever.share:.1f} % of the trials ({100 * low:.1f} to "
             f"{100 * high:.1f} %), in flight in {100 * overlaps.in_flight.share:.1f} %: of these the rates say nothing"
         )
-    show(found.table())
+    show(assembly.table())
     if joint is not None:
         first, second = joint.rates
         typer.echo(f"fed rightly: {first.share:.4f} and {second.share:.4f}; both {joint.both.share:.4f}")
@@ -120,12 +122,12 @@ def _text(found: Assembly, files: list[Path]) -> None:
         )
         low, high = joint.serial
         typer.echo(f"one part after the other, or two arms: the product, {low:.4f} to {high:.4f}")
-    for name, rate in found.survived.items():
+    for name, rate in assembly.survived.items():
         low, high = rate.interval
         what = "the cavity standing" if name == "standing" else "the cavity thrown too"
         whole = f"{rate.count} of {rate.of} ({low:.3f} to {high:.3f})"
         typer.echo(f"whole after the next throw, {what}: {whole}")
-    first = found.first_series
+    first = assembly.first_series
     typer.echo(f"{first.count} assembled in the first {first.of} trials")
     if files:
         typer.echo(f"written: {', '.join(map(str, files))}")
@@ -171,7 +173,7 @@ def tray(
         chosen, _ = opened(scene, out)
         from limitsets.cell.trays import tray as run
 
-        found = run(
+        filling = run(
             chosen,
             passes=passes,
             drops=drops,
@@ -186,28 +188,28 @@ def tray(
             workers=workers,
             progress=tell,
         )
-        record = found.to_json()
-        files = [] if out is None else _written(found, record, out, form)
-    answer(record, json, lambda: _text_of_tray(found, files), csv=(csv, found.table))
+        record = filling.to_json()
+        files = [] if out is None else _written(filling, record, out, form)
+    answer(record, json, lambda: _text_of_tray(filling, files), csv=(csv, filling.table))
 
 
-def _written(found: TrayFill, record: dict[str, Any], out: Path, form: str) -> list[Path]:
+def _written(filling: TrayFill, record: dict[str, Any], out: Path, form: str) -> list[Path]:
     from limitsets.base.files import as_json
     from limitsets.face import plot
     from limitsets.face.report.writing import laid
 
-    return laid(out, [("tray", plot.tray(found))], lambda _: {"tray.json": as_json(record)}, form)
+    return laid(out, [("tray", plot.tray(filling))], lambda _: {"tray.json": as_json(record)}, form)
 
 
-def _text_of_tray(found: TrayFill, files: list[Path]) -> None:
-    filled, counts, unit = found.filled, found.counts, found.scene.unit
-    sizes, plate = found.passes.tray, found.passes.plate
+def _text_of_tray(filling: TrayFill, files: list[Path]) -> None:
+    filled, counts, unit = filling.filled, filling.counts, filling.scene.unit
+    sizes, plate = filling.passes.tray, filling.passes.plate
     typer.echo(
-        f"{found.scene.name}: depressions {sizes.depression_width:g} {unit} wide and {sizes.depression_depth:g} "
-        f"{unit} deep, side {found.passes.side} is right; unilateral contact, friction {plate.friction:g}, "
+        f"{filling.scene.name}: depressions {sizes.depression_width:g} {unit} wide and {sizes.depression_depth:g} "
+        f"{unit} deep, side {filling.passes.side} is right; unilateral contact, friction {plate.friction:g}, "
         f"restitution {plate.restitution:g}"
     )
-    show(found.tables()[0])
+    show(filling.tables()[0])
     for n in sorted({1, 10, len(filled.right) - 1} & set(range(len(filled.right)))):
         low, high = filled.interval[n].tolist()
         typer.echo(
@@ -218,17 +220,17 @@ def _text_of_tray(found: TrayFill, files: list[Path]) -> None:
         f"the rest after endless passes: {rest['empty']:.4f} empty, {rest['wrong']:.4f} with a wrong part; "
         f"without wrong parts p_release/(p_capture + p_release) = {filled.rest:.4f}"
     )
-    for each in found.histories:
+    for each in filling.histories:
         words = "parts that return" if each.returning else "new parts"
         low, high = each.interval(each.filled.size - 1)
         typer.echo(
             f"{len(each.after_pass)} histories with {words}: {each.filled[-1]:.4f} ({low:.4f} to {high:.4f})"
         )
-    for at_once in found.tables()[2:]:
+    for at_once in filling.tables()[2:]:
         typer.echo(at_once.caption)
         show(at_once)
-    if found.crowd_chain is not None:
-        right, (low, high) = found.crowd_chain.right[-1], found.crowd_chain.interval[-1].tolist()
+    if filling.crowd_chain is not None:
+        right, (low, high) = filling.crowd_chain.right[-1], filling.crowd_chain.interval[-1].tolist()
         typer.echo(f"by the chain, of as many parts one by one: right {right:.4f} ({low:.4f} to {high:.4f})")
     if counts.unfinished:
         typer.echo(f"{counts.unfinished} parts did not come to rest; they are left out")

@@ -69,12 +69,12 @@ def atlas(
     with progress() as tell:
         from limitsets.parameters.atlas import atlas as run
 
-        if task is not None:  # a file of the present folder is found, as `python -m` would find it
+        if task is not None:  # a file in the current folder can be imported, as with `python -m`
             sys.path.insert(0, str(Path.cwd()))
         chosen, _ = opened(scene, None)
         store = out or Path(f"{stem_of(chosen)}-atlas.zarr")
         wanted = [name.strip() for words in variables or [] for name in words.split(",")]
-        found = run(
+        answers = run(
             chosen,
             x,
             y,
@@ -89,51 +89,53 @@ def atlas(
             progress=tell,
         )
         picture = store.with_name(f"{store.name.removesuffix('.zarr')}.{form}")
-        drawn = _draw(found, picture)
+        drawn = _draw(answers, picture)
         proof = Path(f"{stem_of(chosen)}-regions.proof.zip") if certify else None
-        shares = _certified(found, proof, workers, tell) if proof is not None else {}
+        shares = _certified(answers, proof, workers, tell) if proof is not None else {}
     place = picture if drawn else None
-    answer(found if json else None, json, lambda: _text(found, csv, place), csv=(csv, found.table))
-    if found.model is not None and not json:
-        typer.echo(About(found.model, scene).line())
+    answer(answers if json else None, json, lambda: _text(answers, csv, place), csv=(csv, answers.table))
+    if answers.model is not None and not json:
+        typer.echo(About(answers.model, scene).line())
     if proof is not None and not json:
         said = ", ".join(f"{100 * share:.2f} % {word}" for word, share in shares.items())
         typer.echo(f"regions: {said}: {proof}")
 
 
-def _certified(found: Atlas, file: Path, workers: int | None, tell: Progress) -> dict[str, float]:
-    """Prove the cells on processes, and write the certificate; shares of the window by what is proved."""
+def _certified(answers: Atlas, file: Path, workers: int | None, tell: Progress) -> dict[str, float]:
+    """Prove the cells in several processes, write the certificate, and return the share of the window by verdict."""
     with processes(workers) as pool:
-        regions = found.certify(executor=pool, progress=tell)
+        regions = answers.certify(executor=pool, progress=tell)
     tell("certificate", 0, 1)
     regions.save(file, workers=workers)
     return regions.shares()
 
 
-def _draw(found: Atlas, file: Path) -> bool:
-    """Draw the classes, if the answers say them; whether they do."""
+def _draw(answers: Atlas, file: Path) -> bool:
+    """Draw the classes, if the answers have any; return whether they have."""
     from limitsets.face.plot.atlas_maps import atlas as figure
     from limitsets.face.report.writing import DPI
     from limitsets.parameters.atlas.classes import is_classified
 
-    if not is_classified(found.dataset):
+    if not is_classified(answers.dataset):
         return False
-    drawn = figure(found)
+    drawn = figure(answers)
     with saved(file) as draft:
         drawn.savefig(draft, dpi=DPI)
     return True
 
 
-def _text(found: Atlas, csv: Path | None, picture: Path | None) -> None:
-    """Print the classes, what the answers range over, and where they are."""
+def _text(answers: Atlas, csv: Path | None, picture: Path | None) -> None:
+    """Print the classes, the ranges of the answers, and the store."""
     from limitsets.parameters.atlas.classes import is_classified, legend
 
-    for each in legend(found.dataset) if is_classified(found.dataset) else ():
+    for each in legend(answers.dataset) if is_classified(answers.dataset) else ():
         typer.echo(f"{100 * each.share:6.2f} %  {each.words}")
-    show(found.tables()[0])
-    points = found.dataset["status"].size
-    again = f", {found.kept} of its {found.kept + found.new} chunks by earlier runs" if found.kept else ""
-    typer.echo(f"{points} points{again}: {found.store}")
+    show(answers.tables()[0])
+    points = answers.dataset["status"].size
+    again = (
+        f", {answers.kept} of its {answers.kept + answers.new} chunks by earlier runs" if answers.kept else ""
+    )
+    typer.echo(f"{points} points{again}: {answers.store}")
     if csv is not None:
         typer.echo(f"table: {csv}")
     if picture is not None:

@@ -94,7 +94,7 @@ def certify(
 def _text(proof: Proof, file: Path | None, kept: str, seconds: float | None) -> None:
     from limitsets.face.report.pages import after_unproved
 
-    cells = sum(found.cover.grid.n_cells for found in proof.attractions)
+    cells = sum(attraction.cover.grid.n_cells for attraction in proof.attractions)
     typer.echo(f"{proof.scene.name}: {cells} cells, {proof.seconds:.2g} s")
     for name, (lo, hi) in proof.spans.items():
         typer.echo(f"for every {name} from {_short(lo)} to {_short(hi)}, the same at every throw")
@@ -138,7 +138,7 @@ def _short(text: str) -> str:
 
 
 def _words(proof: Proof, claim: Claim) -> list[str]:
-    """Say a claim in words for people."""
+    """Put a claim into sentences."""
     if not claim.written:
         of = REFUTED.get(claim.starts or "") if claim.verdict == "refuted" else None
         return [*([of] if of else []), *([_sentence(claim.reason)] if claim.reason else [])]
@@ -174,7 +174,7 @@ def _words(proof: Proof, claim: Claim) -> list[str]:
 
 
 def _goal(proof: Proof, claim: Claim) -> list[str]:
-    """Say a goal that is proved, for which starts, and what becomes of the others."""
+    """State a goal that is proved, the starts for which it holds, and what becomes of the other starts."""
     from limitsets.parameters.margins.margin_result import bound
     from limitsets.proofs.prover.goals import sentence
 
@@ -229,7 +229,7 @@ def _attraction(proof: Proof, claim: Claim) -> list[str]:
 
 
 def _two_basins(proof: Proof, points: dict[str, list[float]]) -> list[str]:
-    """Say what becomes of parts near the joint where the arm's surface is above it."""
+    """Say what becomes of parts near the joint if the arm's surface is above the joint."""
     unit = proof.scene.unit
     lines = [
         f"side {side}: R* between x = {_down(lo, 10)} and {_up(hi, 10)} {unit}"
@@ -245,12 +245,12 @@ def _two_basins(proof: Proof, points: dict[str, list[float]]) -> list[str]:
 
 
 def _down(value: float, digits: int) -> str:
-    """Write a number that is not above a proved one."""
+    """Write a proved number, rounded down."""
     return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
 
 
 def _up(value: float, digits: int) -> str:
-    """Write a number that is not below a proved one."""
+    """Write a proved number, rounded up."""
     return f"{math.ceil(value * 10**digits) / 10**digits:.{digits}f}"
 
 
@@ -280,7 +280,7 @@ def _orbit(proof: Proof, claim: Claim) -> None:
 
 
 def _heads(proof: Proof) -> list[str]:
-    """Name what differs from throw to throw."""
+    """Name the quantities that differ from throw to throw."""
     unit = proof.scene.unit
     both = "throw.speed" in proof.noise and "gravity.tilt" in proof.noise
     words = {
@@ -294,7 +294,7 @@ def _heads(proof: Proof) -> list[str]:
 
 
 def _thrown(proof: Proof, state: State) -> list[str]:
-    """Say what a throw was like, one word for each of `_heads`."""
+    """Give the values of a throw, one for each of `_heads`."""
     said, noise, row = proof.thrown(state), proof.noise, []
     if "throw.speed" in noise and "gravity.tilt" in noise:
         row.append(f"{state.kappa:.6f}")
@@ -306,7 +306,7 @@ def _thrown(proof: Proof, state: State) -> list[str]:
 
 
 # ----------------------------------------------------------------
-# `limitsets recheck`: a certificate, checked anew.
+# `limitsets recheck`: check a certificate again.
 
 
 def recheck(
@@ -330,6 +330,6 @@ def recheck(
 
     from limitsets.checker import EXITS, show
 
-    found = Table(("claim", "verdict", "reason"), report.claims, str(file))
-    answer(report, json, lambda: show(report, str(file)), out, (csv, lambda: found))
+    claims = Table(("claim", "verdict", "reason"), report.claims, str(file))
+    answer(report, json, lambda: show(report, str(file)), out, (csv, lambda: claims))
     raise typer.Exit(EXITS[report.verdict])

@@ -53,71 +53,75 @@ def run_goal(
     *,
     json: bool,
 ) -> int:
-    """Search, prove, write and print; the exit code."""
+    """Search, prove, write and print; return the exit code."""
     with progress() as tell:
         from limitsets.parameters.design.for_goal import design_for_goal
 
         scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
         given = bounds_of(scene, bounds)
-        found = design_for_goal(
+        solution = design_for_goal(
             scene, vary=vary, bounds=given, laid=laid, evaluations=evaluations, progress=tell
         )
-        about = About(found.model, scene_file(found.scene, out), found.scene)
-        files = [] if out is None else _written_of_goal(found, out, form, about)
+        about = About(solution.model, scene_file(solution.scene, out), solution.scene)
+        files = [] if out is None else _written_of_goal(solution, out, form, about)
     answer(
-        about.added(found) if json else found,
+        about.added(solution) if json else solution,
         json,
-        lambda: _text_of_goal(found, files, about, evaluations),
-        csv=(csv, found.table),
+        lambda: _text_of_goal(solution, files, about, evaluations),
+        csv=(csv, solution.table),
     )
-    return 0 if found.verdict == "proved" else 1
+    return 0 if solution.verdict == "proved" else 1
 
 
-def _written_of_goal(found: GoalDesign, out: Path, form: str, about: About) -> list[Path]:
+def _written_of_goal(solution: GoalDesign, out: Path, form: str, about: About) -> list[Path]:
     """Write the scene, or a folder with the scene, the answer as JSON and the part."""
     if out.suffix == ".toml":
-        return save_scene(found.scene, out)
+        return save_scene(solution.scene, out)
     from limitsets.base.files import as_json
     from limitsets.face import plot
     from limitsets.face.report.writing import laid
     from limitsets.feeder.scene import dump
 
-    texts = {f"{found.scene.name}.toml": dump(found.scene), "design.json": as_json(about.added(found))}
-    return laid(out, [("part", plot.part(found.scene))], lambda _: texts, form)
+    texts = {
+        f"{solution.scene.name}.toml": dump(solution.scene),
+        "design.json": as_json(about.added(solution)),
+    }
+    return laid(out, [("part", plot.part(solution.scene))], lambda _: texts, form)
 
 
-def _text_of_goal(found: GoalDesign, files: list[Path], about: About, asked: int) -> None:
+def _text_of_goal(solution: GoalDesign, files: list[Path], about: About, asked: int) -> None:
     from limitsets.parameters.design.for_goal import POPULATION
 
-    show(found.table())
-    typer.echo(found.message[:1].upper() + found.message[1:] + ".")
-    typer.echo(found.itself)
-    if found.room > 0.0 and not any(name.startswith("part.") for name in found.varied):
+    show(solution.table())
+    typer.echo(solution.message[:1].upper() + solution.message[1:] + ".")
+    typer.echo(solution.itself)
+    if solution.room > 0.0 and not any(name.startswith("part.") for name in solution.varied):
         typer.echo("arm and throw are enough: the part stays as it is")
-    elif found.evaluations < asked:
-        whole = asked - found.evaluations < POPULATION
+    elif solution.evaluations < asked:
+        whole = asked - solution.evaluations < POPULATION
         why = f"only whole generations of {POPULATION} are" if whole else "all designs came to rate alike"
-        typer.echo(f"{found.evaluations} of {asked} designs were looked at: {why}")
-    met = found.room > 0.0
-    if met and found.ruled_out:
+        typer.echo(f"{solution.evaluations} of {asked} designs were looked at: {why}")
+    met = solution.room > 0.0
+    if met and solution.ruled_out:
         from limitsets.parameters.design.search import said
 
         typer.echo(
-            f"{sum(found.ruled_out.values())} of {found.evaluations} designs were ruled out: {said(found.ruled_out)}"
+            f"{sum(solution.ruled_out.values())} of {solution.evaluations} designs were ruled out: "
+            f"{said(solution.ruled_out)}"
         )
-    if met and found.leaving is not None:
+    if met and solution.leaving is not None:
         from limitsets.face.report.pages import percent
 
         typer.echo(
-            f"careful: from {percent(found.leaving)} of all starts (sampled) parts leave the arm; no design was found"
-            " that meets the goal and that no part leaves, and margins of this one may be 0 by that"
+            f"careful: from {percent(solution.leaving)} of all starts (sampled) parts leave the arm; no design was"
+            " found that meets the goal and that no part leaves, and margins of this one may be 0 by that"
         )
-    if met and found.verdict != "proved":
+    if met and solution.verdict != "proved":
         file = next((str(path) for path in files if path.suffix == ".toml"), None)
         save = "" if file else "add -o design.toml to this command, then "
         command = proposed("certify", file or "design.toml")
         typer.echo(f"next: {save}{command} (what keeps the design from a proof)")
-    show_scene(found.scene, files, about if met else None)
+    show_scene(solution.scene, files, about if met else None)
 
 
 # ----------------------------------------------------------------
@@ -188,7 +192,17 @@ def design(
     names = [name.strip() for words in vary or [] for name in words.split(",")]
     if goal:
         raise typer.Exit(
-            run_goal(scene, names, bounds, begins, evaluations or 600, out, form, csv, json=json)
+            run_goal(
+                scene,
+                names,
+                bounds,
+                laid=begins,
+                evaluations=evaluations or 600,
+                out=out,
+                form=form,
+                csv=csv,
+                json=json,
+            )
         )
     if critical_points is None:
         from limitsets.face.cli.design_robust import run_robust
@@ -198,12 +212,12 @@ def design(
                 scene,
                 names,
                 bounds,
-                begins,
-                evaluations or 1200,
-                seconds,
-                out,
-                form,
-                csv,
+                laid=begins,
+                evaluations=evaluations or 1200,
+                seconds=seconds,
+                out=out,
+                form=form,
+                csv=csv,
                 json=json,
                 recheck=not no_recheck,
             )
@@ -212,7 +226,7 @@ def design(
         from limitsets.parameters.design import design as run
 
         chosen, _ = opened(scene, None if out and out.suffix == ".toml" else out)
-        found = run(
+        solution = run(
             chosen,
             critical_points=_points(critical_points),
             vary=names,
@@ -221,15 +235,15 @@ def design(
             stages=stages,
             progress=tell,
         )
-        about = About(found.model, scene_file(found.scene, out), found.scene)
-        files = [] if out is None else _written(found, out, form, about, tell)
+        about = About(solution.model, scene_file(solution.scene, out), solution.scene)
+        files = [] if out is None else _written(solution, out, form, about, tell)
     answer(
-        about.added(found) if json else found,
+        about.added(solution) if json else solution,
         json,
-        lambda: _text(found, files, about),
-        csv=(csv, found.table),
+        lambda: _text(solution, files, about),
+        csv=(csv, solution.table),
     )
-    raise typer.Exit(0 if found.reached else 1)
+    raise typer.Exit(0 if solution.reached else 1)
 
 
 def _points(words: str) -> list[float | str | None]:
@@ -237,31 +251,34 @@ def _points(words: str) -> list[float | str | None]:
 
 
 def _written(
-    found: Design, out: Path, form: str, about: About, tell: Callable[[str, int, int], None]
+    solution: Design, out: Path, form: str, about: About, tell: Callable[[str, int, int], None]
 ) -> list[Path]:
-    """Write the scene, or a folder with the scene, the answer as JSON and the figure of the way there."""
+    """Write the scene, or a folder with the scene, the answer as JSON and a figure of the design's path."""
     from limitsets.feeder.scene import dump
 
     if out.suffix == ".toml":
-        return save_scene(found.scene, out)
+        return save_scene(solution.scene, out)
     from limitsets.face import plot
     from limitsets.face.report.writing import laid
     from limitsets.parameters.design import limit_sets_along
 
-    drawn = plot.design(found, limit_sets_along(found, tell))
-    texts = {f"{found.scene.name}.toml": dump(found.scene), "design.json": as_json(about.added(found))}
-    return laid(out, [("part", plot.part(found.scene)), ("design", drawn)], lambda _: texts, form)
+    drawn = plot.design(solution, limit_sets_along(solution, tell))
+    texts = {
+        f"{solution.scene.name}.toml": dump(solution.scene),
+        "design.json": as_json(about.added(solution)),
+    }
+    return laid(out, [("part", plot.part(solution.scene)), ("design", drawn)], lambda _: texts, form)
 
 
-def _text(found: Design, files: list[Path], about: About) -> None:
-    """Print what changed, how well it is reached, and the scene."""
-    show(found.table())
-    typer.echo(found.message[:1].upper() + found.message[1:] + ".")
-    condition = "not known" if found.condition is None else f"{found.condition:.4g}"
+def _text(solution: Design, files: list[Path], about: About) -> None:
+    """Print the changed quantities, how well the critical points are reached, and the scene."""
+    show(solution.table())
+    typer.echo(solution.message[:1].upper() + solution.message[1:] + ".")
+    condition = "not known" if solution.condition is None else f"{solution.condition:.4g}"
     typer.echo(
-        f"{found.evaluations} evaluations, {found.how}; condition number of the derivatives: {condition}"
+        f"{solution.evaluations} evaluations, {solution.how}; condition number of the derivatives: {condition}"
     )
-    for side, reason in enumerate(found.jacobian.reasons):
+    for side, reason in enumerate(solution.jacobian.reasons):
         if reason is not None:
             typer.echo(f"no derivative on side {side}: {reason}")
-    show_scene(found.scene, files, about if found.reached else None)
+    show_scene(solution.scene, files, about if solution.reached else None)

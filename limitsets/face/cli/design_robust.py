@@ -36,7 +36,7 @@ def run_robust(
     json: bool,
     recheck: bool,
 ) -> int:
-    """Search, prove, write and print; the exit code."""
+    """Search, prove, write and print; return the exit code."""
     with progress() as tell:
         from limitsets.parameters.design import robust_design
         from limitsets.parameters.design.for_margin import NoDesignError
@@ -44,7 +44,7 @@ def run_robust(
         scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
         so_far = None if out is None else out if out.suffix == ".toml" else out / f"{scene.name}-so-far.toml"
         try:
-            found = robust_design(
+            design = robust_design(
                 scene,
                 vary=(dict.fromkeys(vary, (None, None)) | bounds_of(scene, bounds)) or None,
                 laid=laid,
@@ -57,21 +57,21 @@ def run_robust(
             if none.miss is None:
                 raise
             return _missed(none, scene, none.miss, out, form, csv, json=json)
-        found, files = (found, []) if out is None else _written(found, out, form, recheck=recheck)
+        design, files = (design, []) if out is None else _written(design, out, form, recheck=recheck)
         if so_far is not None and so_far != out:
             so_far.unlink(missing_ok=True)
-    about = About(found.model, scene_file(found.scene, out), found.scene)
+    about = About(design.model, scene_file(design.scene, out), design.scene)
     answer(
-        about.added(found) if json else found,
+        about.added(design) if json else design,
         json,
-        lambda: _text(found, files, about),
-        csv=(csv, found.table),
+        lambda: _text(design, files, about),
+        csv=(csv, design.table),
     )
-    return 0 if seconds == 0.0 or all(one.proved > 0.0 for one in found.margins) else 1
+    return 0 if seconds == 0.0 or all(one.proved > 0.0 for one in design.margins) else 1
 
 
 def _kept(best: Scene, file: Path) -> None:
-    """Write the best design so far: a search that is ended has it."""
+    """Write the best design so far, for the case that the search is interrupted."""
     file.parent.mkdir(parents=True, exist_ok=True)
     save_scene(best, file)
 
@@ -86,7 +86,7 @@ def _missed(
     *,
     json: bool,
 ) -> int:
-    """Write and print the nearest miss, and what ruled designs out."""
+    """Write and print the nearest miss, and the reasons for which designs were ruled out."""
     from limitsets.base.tables import Column, Table
     from limitsets.feeder.scene.scene import in_unit_of, unit_of
 
@@ -118,36 +118,36 @@ def _missed(
     return 1
 
 
-def _written(found: RobustDesign, out: Path, form: str, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:
-    """Write the scene, or a folder: scene, answer, certificates, figure; the design without what the checker denies."""
+def _written(design: RobustDesign, out: Path, form: str, *, recheck: bool) -> tuple[RobustDesign, list[Path]]:
+    """Write the scene, or a folder with all files; return the design without the claims that the checker denies."""
     if out.suffix == ".toml":
-        return found, save_scene(found.scene, out)
+        return design, save_scene(design.scene, out)
     from limitsets.face import plot
     from limitsets.face.report.writing import DPI, filled
     from limitsets.parameters.design.design_result import save
 
     with filled(out) as folder:
-        found, paths = save(found, folder, recheck=recheck)
-        record = About(found.model, str(out / paths[0].name), found.scene).added(found)
+        design, paths = save(design, folder, recheck=recheck)
+        record = About(design.model, str(out / paths[0].name), design.scene).added(design)
         (folder / "design.json").write_text(as_json(record), encoding="utf-8", newline="\n")
         names = [path.name for path in paths] + [f"part.{form}"]
-        plot.part(found.scene).savefig(folder / names[-1], dpi=DPI)
-        if found.front:
+        plot.part(design.scene).savefig(folder / names[-1], dpi=DPI)
+        if design.front:
             names.append(f"front.{form}")
-            plot.robust_design(found).savefig(folder / names[-1], dpi=DPI)
-    return found, [out / name for name in names]
+            plot.robust_design(design).savefig(folder / names[-1], dpi=DPI)
+    return design, [out / name for name in names]
 
 
-def _text(found: RobustDesign, files: list[Path], about: About) -> None:
-    """Print what changed, both margins, the throws, the lead weight, and the scene."""
+def _text(design: RobustDesign, files: list[Path], about: About) -> None:
+    """Print the changed quantities, both margins, the throws, the lead weight, and the scene."""
     from limitsets.face.report.pages import in_time
     from limitsets.parameters.design.design_result import both
 
-    unit, rate = found.scene.unit, found.scene.world.throw_rate
-    show(found.table())
+    unit, rate = design.scene.unit, design.scene.world.throw_rate
+    show(design.table())
     for label, margins, sampled, feeding in (
-        ("before", found.before_margins, found.before_sampled, found.before_feeding),
-        ("design", found.margins, found.sampled, found.feeding),
+        ("before", design.before_margins, design.before_sampled, design.before_feeding),
+        ("design", design.margins, design.sampled, design.feeding),
     ):
         if sampled is None or not isfinite(sampled.x):
             typer.echo(f"{label}: fed at no X in spite of any deviation")
@@ -162,20 +162,20 @@ def _text(found: RobustDesign, files: list[Path], about: About) -> None:
                 f"  throws to feed (sampled): mean {feeding.mean:.3g}{in_time(feeding.mean, rate, parts=True)},"
                 f" 95 % after {feeding.quantile_95:.3g}{in_time(feeding.quantile_95, rate)}"
             )
-    asked = getattr(found.before.goal, "x", None)
-    if asked is not None and asked != found.x:
-        typer.echo(f"the goal's X has moved from {asked:g} to {found.x:g} {unit} (design --goal keeps it)")
-    (fell, _), (least, _) = both(found.before_margins), both(found.margins)
+    asked = getattr(design.before.goal, "x", None)
+    if asked is not None and asked != design.x:
+        typer.echo(f"the goal's X has moved from {asked:g} to {design.x:g} {unit} (design --goal keeps it)")
+    (fell, _), (least, _) = both(design.before_margins), both(design.margins)
     if fell is not None and least is not None and least < fell:
         typer.echo(
             f"careful: what is proved fell, from {fell:.4g} to {least:.4g} times the tolerance: the design is better"
             " by floats alone"
         )
-    moved = any(name.startswith("part.") for name in found.varied)
-    if moved and "center" in found.scene.text["part"]["mass"]:  # else the file has the masses, or they stay
-        lead = found.lead
+    moved = any(name.startswith("part.") for name in design.varied)
+    if moved and "center" in design.scene.text["part"]["mass"]:  # else the file has the masses, or they stay
+        lead = design.lead
         typer.echo(
             f"lead weight: {100 * lead.share:.1f} % of the mass at x = {lead.x:.4g}, y = {lead.y:.4g} {unit}"
             " in the frame of the vertices"
         )
-    show_scene(found.scene, files, about)
+    show_scene(design.scene, files, about)

@@ -37,13 +37,13 @@ if TYPE_CHECKING:
     from limitsets.proofs.chances.absorption import AbsorptionBrackets
 
 
-# What becomes of parts where none is fed.
+# Fates of parts if none is fed.
 UNFED = {"left": "leave the arm otherwise", "never": "stay on it"}
 
-# What ends the throws of a part that is not fed.
+# Reasons why the throws of a part end without it being fed.
 ENDED = {"left": "leaves the arm", "edge": "comes to lie where its throw acts beyond the end"}
 
-# Shares below this are what rounding leaves of nothing.
+# Smaller shares are rounding errors of 0.
 NOTHING = 1e-9
 
 HELP_SCATTER = (
@@ -104,7 +104,7 @@ def feed(
         from limitsets.parameters.sheet.summary import scattering_from
 
         random = deviations("--scatter", scatter)
-        found = run(
+        feeding = run(
             chosen,
             scattering_from(chosen, random, law) if random else None,
             side=side,
@@ -124,88 +124,69 @@ def feed(
         if certificate is not None:
             tell("recheck", 0, 1)
             again = not no_recheck
-            found, written = certified(found, certificate, "feeds", proved=found.written, recheck=again)
-        record = found.to_json() | {"certificate": written}
-        about = About(found.model, scene, chosen)
+            feeding, written = certified(feeding, certificate, "feeds", proved=feeding.written, recheck=again)
+        record = feeding.to_json() | {"certificate": written}
+        about = About(feeding.model, scene, chosen)
         files = []
         if out is not None:
             from limitsets.base.files import as_json
             from limitsets.face import plot
             from limitsets.face.report.writing import laid as files_laid
 
-            drawn = [("part", plot.part(chosen)), ("feeding", plot.feeding(found))]
+            drawn = [("part", plot.part(chosen)), ("feeding", plot.feeding(feeding))]
             files = files_laid(out, drawn, lambda _: {"feeding.json": as_json(about.added(record))}, form)
-    if json and (note := _unused(found)):
+    if json and (note := _unused(feeding)):
         print(f"limitsets: {note}", file=sys.stderr, flush=True)
-    answer(record, json, lambda: _text(found, files, written), csv=(csv, found.table), about=about)
-    raise typer.Exit(0 if no_proof or found.proved else 1)
+    answer(record, json, lambda: _text(feeding, files, written), csv=(csv, feeding.table), about=about)
+    raise typer.Exit(0 if no_proof or feeding.proved else 1)
 
 
-def _unused(found: Feeding) -> str:
-    """Say that the scene's scatter is not used, and what uses it."""
-    scene = found.end.scene
-    if scene.world.scatter is None or scene.effects.spread is not None or found.scatter.given():
+def _unused(feeding: Feeding) -> str:
+    """Say that the scene's scatter is not used, and which option would use it."""
+    scene = feeding.end.scene
+    if scene.world.scatter is None or scene.effects.spread is not None or feeding.scatter.given():
         return ""
     return '[world] scatter is not used: --scatter Q=DEV is, or spread = "gaussian" or "bounded" in [effects]'
 
 
-def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> None:
+def _text(feeding: Feeding, files: list[Path], written: dict[str, Any] | None) -> None:
     from limitsets.face.report.pages import in_time
-    from limitsets.face.report.robust_pages import law_words
 
-    end, unit = found.end, found.end.scene.unit
-    laws = (law_words(name, getattr(found.scatter, name), unit) for name in found.scatter.given())
-    note = "".join(f"; {said}" for said in [_unused(found), *laws] if said)
-    if found.vacuous:
-        computed = found.shares.shares
-        ways = ", ".join(
-            f"{100 * computed[name]:.4g} % {how}" for name, how in UNFED.items() if computed[name]
-        )
-        typer.echo(
-            f"{end.scene.name}: nothing is fed, none of {found.trials.fate.size} parts thrown, and of all starts {ways}"
-        )
-    typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted{note}")
-    if end.laid:
-        from limitsets.feeder.goals import laid_words
-
-        typer.echo(
-            f"all starts, proved and random, are where parts are laid down: {laid_words(end.laid, unit)}"
-        )
-    parts = ", ".join(f"{lo:.4g} to {hi:.4g} {unit}" for lo, hi in end.clear) or "nowhere"
-    typer.echo(f"clear of the wall beyond the end: {parts}")
-    if found.safe is not None and found.fed is not None:
-        for line in (*found.safe.lines(end.side, laid=bool(end.laid)), *found.fed.lines(unit)):
+    end = feeding.end
+    _print_arm_end(feeding)
+    if feeding.safe is not None and feeding.fed is not None:
+        for line in (*feeding.safe.lines(end.side, laid=bool(end.laid)), *feeding.fed.lines(end.scene.unit)):
             typer.echo(line)
-    show(found.table())
-    if edge := found.shares.shares["edge"]:
+    show(feeding.table())
+    if edge := feeding.shares.shares["edge"]:
         typer.echo(
             f"assumed: {100 * edge:.2f} % of the parts are thrown from so near the end of the arm that the throw acts"
             " beyond it; what that throw does is not simulated, and the proofs throw as if the arm went on"
         )
-    if found.brackets is not None:
-        for line in _proved(found.brackets):
+    if feeding.brackets is not None:
+        for line in _proved(feeding.brackets):
             typer.echo(line)
-    most = found.shares.quantile(0.95)
+    most = feeding.shares.quantile(0.95)
     throw_rate = end.scene.world.throw_rate
     until = "" if most is None else f", 95 % of the starts after {most}{in_time(most, throw_rate)}"
-    mean = found.shares.mean_throws
-    if found.vacuous:
+    mean = feeding.shares.mean_throws
+    if feeding.vacuous:
         typer.echo("no part comes beyond the end of the arm: limitsets analyse says how far they come")
     else:
-        ended = [how for fate, how in ENDED.items() if found.shares.shares[fate] >= NOTHING]
+        ended = [how for fate, how in ENDED.items() if feeding.shares.shares[fate] >= NOTHING]
         typer.echo(
             f"throws until a part {' or '.join(['is fed', *ended])}: "
             f"{mean:.1f} in the mean{in_time(mean, throw_rate)}{until}"
         )
-    rate = found.shares.per_minute(throw_rate)
+    rate = feeding.shares.per_minute(throw_rate)
     if rate is not None:
         typer.echo(f"{rate:.2f} parts per minute are fed on the wanted side, one after the other")
-    series = found.trials.series()
+    series = feeding.trials.series()
     if series.size:
         typer.echo(f"{series[0]} right in the first series of 20 trials, {series.mean():.2f} in the mean")
-    if found.curve is not None:
-        typer.echo(found.curve.line())
-    for crowd in found.crowds:
+    if feeding.curve is not None:
+        typer.echo(feeding.curve.line())
+    for crowd in feeding.crowds:
         how = "push" if crowd.between else "pass through"
         each = ", ".join(f"{name} {met}" for name, met in crowd.counts.items() if met)
         once, error = crowd.right_per_throw
@@ -219,19 +200,46 @@ def _text(found: Feeding, files: list[Path], written: dict[str, Any] | None) -> 
         typer.echo(f"written: {', '.join(map(str, files))}")
 
 
+def _print_arm_end(feeding: Feeding) -> None:
+    """Print where the arm ends, which side is wanted there, where parts start, and at which x they clear the wall."""
+    from limitsets.face.report.robust_pages import law_words
+
+    end, unit = feeding.end, feeding.end.scene.unit
+    laws = (law_words(name, getattr(feeding.scatter, name), unit) for name in feeding.scatter.given())
+    note = "".join(f"; {said}" for said in [_unused(feeding), *laws] if said)
+    if feeding.vacuous:
+        computed = feeding.shares.shares
+        ways = ", ".join(
+            f"{100 * computed[name]:.4g} % {how}" for name, how in UNFED.items() if computed[name]
+        )
+        typer.echo(
+            f"{end.scene.name}: nothing is fed, none of {feeding.trials.fate.size} parts thrown, and of all starts "
+            f"{ways}"
+        )
+    typer.echo(f"{end.scene.name}: the arm ends at x = {end.x:g} {unit}, side {end.side} is wanted{note}")
+    if end.laid:
+        from limitsets.feeder.goals import laid_words
+
+        typer.echo(
+            f"all starts, proved and random, are where parts are laid down: {laid_words(end.laid, unit)}"
+        )
+    parts = ", ".join(f"{lo:.4g} to {hi:.4g} {unit}" for lo, hi in end.clear) or "nowhere"
+    typer.echo(f"clear of the wall beyond the end: {parts}")
+
+
 def _proved(brackets: AbsorptionBrackets) -> list[str]:
     """Put proved brackets in words, rounded outward."""
     from limitsets.cell.feeding.feeding_run import FED
 
     last = brackets.within["any"].shape[1] - 1
-    found = []
+    lines = []
     for name in ("right", "wrong", "wall"):
         if name in brackets.within:
             low, high = (float(end) for end in brackets.within[name][:, -1])
             lo, hi = math.floor(low * 1e6) / 1e6, math.ceil(high * 1e6) / 1e6
-            found.append(f"PROVED: {FED[name]} within {last} throws: {lo:.6f} to {hi:.6f}")
+            lines.append(f"PROVED: {FED[name]} within {last} throws: {lo:.6f} to {hi:.6f}")
     first, by = brackets.quantile(0.95)
     if first is not None and by is not None:
         count = f"{first}" if first == by else f"{first} to {by}"
-        found.append(f"PROVED: the least number of throws within which 95 % have ended: {count}")
-    return found
+        lines.append(f"PROVED: the least number of throws within which 95 % have ended: {count}")
+    return lines

@@ -83,18 +83,22 @@ def feedback(
         }
         tried: list[tuple[float, Synthesis]] = []
         if sweep is None:
-            found = run(chosen, _sensor(chosen, beyond, error, side, blind=blind), **options)
+            synthesis = run(chosen, _sensor(chosen, beyond, error, side, blind=blind), **options)
         else:
             at = places_of(chosen, sweep, "--sweep")
             tried = list(zip(at, places(chosen, at, error=place(chosen, error), **options), strict=True))
-            found = min((each for _, each in tried), key=lambda each: (not each.solved, each.found.throws))
+            synthesis = min(
+                (each for _, each in tried), key=lambda each: (not each.solved, each.found.throws)
+            )
         written = None
         if certificate is not None:
             tell("recheck", 0, 1)
             again = not no_recheck
-            found, written = certified(found, certificate, "policy", proved=found.solved, recheck=again)
-        thrown = simulate(found, parts) if found.solved else None
-        record = found.to_json() | {
+            synthesis, written = certified(
+                synthesis, certificate, "policy", proved=synthesis.solved, recheck=again
+            )
+        thrown = simulate(synthesis, parts) if synthesis.solved else None
+        record = synthesis.to_json() | {
             "certificate": written,
             "simulated": thrown,
             "places": [
@@ -102,15 +106,15 @@ def feedback(
             ],
         }
         if out is not None:
-            _write(found, record, out, form)
+            _write(synthesis, record, out, form)
     answer(
         record,
         json,
-        lambda: _text(found, tried, thrown, out, written),
-        csv=(csv if found.solved else None, found.table),
-        about=About(found.model, scene),
+        lambda: _text(synthesis, tried, thrown, out, written),
+        csv=(csv if synthesis.solved else None, synthesis.table),
+        about=About(synthesis.model, scene),
     )
-    raise typer.Exit(0 if found.solved else 1)
+    raise typer.Exit(0 if synthesis.solved else 1)
 
 
 def _goal_at(scene: Any, x: float) -> tuple[float, int]:
@@ -142,35 +146,35 @@ def _starts(scene: Any, words: list[str] | None, begin: str | None) -> Any:
         if words:
             raise LimitsetsError("the starts", "--from and --starts", "one of them", "leave one out")
         return place(scene, begin)
-    found = {}
+    starts = {}
     for word in words or []:
         side, sign, span = word.partition("=")
         lo, colon, hi = span.partition(":")
-        if not (sign and colon and side.strip().isdigit()) or int(side) in found:
+        if not (sign and colon and side.strip().isdigit()) or int(side) in starts:
             remedy = "name each side once, and two places with : between"
             raise LimitsetsError("the starts", word, "SIDE=LO:HI", remedy, key="--starts")
-        found[int(side)] = (place(scene, lo), place(scene, hi))
-    return found or None
+        starts[int(side)] = (place(scene, lo), place(scene, hi))
+    return starts or None
 
 
-def _write(found: Synthesis, record: dict[str, Any], out: Path, form: str) -> None:
+def _write(synthesis: Synthesis, record: dict[str, Any], out: Path, form: str) -> None:
     from limitsets.base.files import as_json
     from limitsets.face.report.writing import laid
 
-    policy = found.found.policy
+    policy = synthesis.found.policy
     drawn = []
     if policy is not None:
         from limitsets.face.plot.policies import policy as draw
 
-        drawn = [("policy", draw(found))]
+        drawn = [("policy", draw(synthesis))]
     text = {"feedback.json": as_json(record)}
     if policy is not None:
-        text["policy.csv"] = found.table().csv()
+        text["policy.csv"] = synthesis.table().csv()
     laid(out, drawn, lambda _: text, form)
 
 
 def _text(
-    found: Synthesis,
+    synthesis: Synthesis,
     tried: list[tuple[float, Synthesis]],
     thrown: Any,
     out: Path | None,
@@ -178,24 +182,24 @@ def _text(
 ) -> None:
     from limitsets.face.report.pages import in_time
 
-    unit = found.scene.unit
-    x, side = found.goal
-    wanted = {"stop": "known to lie", "catch": "to be caught"}[found.mode]
-    typer.echo(f"{found.scene.name}: the part is {wanted} on side {side} at x = {x:.9g} {unit} or beyond")
-    typer.echo(f"starts: {found.starts_are}: {_spans(found.starts.extents())}")
+    unit = synthesis.scene.unit
+    x, side = synthesis.goal
+    wanted = {"stop": "known to lie", "catch": "to be caught"}[synthesis.mode]
+    typer.echo(f"{synthesis.scene.name}: the part is {wanted} on side {side} at x = {x:.9g} {unit} or beyond")
+    typer.echo(f"starts: {synthesis.starts_are}: {_spans(synthesis.starts.extents())}")
     if tried:
         table(
             ("sensor at", ""),
             [(f"{place:.6g} {unit}", _verdict(each)) for place, each in tried],
         )
-    typer.echo(f"question: {found.question}")
-    typer.echo(_verdict(found))
-    if found.found.verdict == "not-solved":
+    typer.echo(f"question: {synthesis.question}")
+    typer.echo(_verdict(synthesis))
+    if synthesis.found.verdict == "not-solved":
         typer.echo(
             "next: more --throws or --cells, --sweep LO:HI:N for another place of the sensor, or another throw in"
             " [[feedback.throws]]"
         )
-    policy = found.found.policy
+    policy = synthesis.found.policy
     if written is not None:
         typer.echo(said_of(written, "there is no policy"))
     if out is not None:
@@ -203,23 +207,23 @@ def _text(
     if policy is None:
         return
     rows = []
-    for state, belief in zip(policy.to_json()["states"], found.beliefs(), strict=True):
+    for state, belief in zip(policy.to_json()["states"], synthesis.beliefs(), strict=True):
         after = ", ".join(f"{word}: {at}" for word, at in state["after"].items() if at is not None)
         rows.append([state["state"], _spans(belief), state["throw"] or "stop", after, state["left"]])
     table(("state", "the part lies on", "throw", "next", "throws left"), rows)
     first = policy.to_json()["first"]
     typer.echo("begin: " + ", ".join(f"{word}: state {at}" for word, at in first.items() if at is not None))
     if thrown is not None:
-        timed = in_time(thrown.mean, found.scene.world.throw_rate, parts=True)
+        timed = in_time(thrown.mean, synthesis.scene.world.throw_rate, parts=True)
         more = "".join(f", {count} {what}" for what, count in thrown.failures.items())
         typer.echo(
             f"thrown: {thrown.reached} of {thrown.parts} came, in {thrown.mean:.3g} throws on average{timed}{more}"
         )
 
 
-def _verdict(found: Synthesis) -> str:
-    what = found.found
-    if found.solved:
+def _verdict(synthesis: Synthesis) -> str:
+    what = synthesis.found
+    if synthesis.solved:
         return f"solved: {what.throws} throws are enough (proved, for every start and every noise named)"
     least = f"no policy of {what.throws} throws" if what.throws >= 0 else "nothing shown"
     if what.verdict == "not-solved":

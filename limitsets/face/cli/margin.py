@@ -66,22 +66,22 @@ def margin(
         begins = laid_ranges(laid)
         chosen, _ = opened(scene, out)
         goal = None if x is None else _goal_at(chosen, x)
-        found = run(
+        margins = run(
             chosen, *(quantity or ()), reading=reading, goal=goal, laid=begins, width=width, progress=tell
         )
-        records = [each.to_json() for each in found]
-        about = About(found[0].model, scene, chosen)
+        records = [each.to_json() for each in margins]
+        about = About(margins[0].model, scene, chosen)
         if out is not None:
-            tell("files", len(found), len(found) + 1)
-            found, records = _write(found, out, form, about, recheck=not no_recheck)
+            tell("files", len(margins), len(margins) + 1)
+            margins, records = _write(margins, out, form, about, recheck=not no_recheck)
     answer(
         records,
         json,
-        lambda: _text(chosen, found, out, no_recheck=no_recheck),
-        csv=(csv, lambda: joined(found)),
+        lambda: _text(chosen, margins, out, no_recheck=no_recheck),
+        csv=(csv, lambda: joined(margins)),
         about=about,
     )
-    bracketed = all(each.proved > 0 and (each.closed or each.refuted is None) for each in found)
+    bracketed = all(each.proved > 0 and (each.closed or each.refuted is None) for each in margins)
     raise typer.Exit(0 if bracketed and chosen.effects.spread is None else 1)
 
 
@@ -104,51 +104,51 @@ def _goal_at(scene: Any, text: str) -> Any:
 def _write(
     given: tuple[Margin, ...], out: Path, form: str, about: About, *, recheck: bool
 ) -> tuple[tuple[Margin, ...], list[dict[str, Any]]]:
-    """Write the files; the margins and their JSON without what the checker denies."""
+    """Write the files; return the margins and their JSON, without the claims that the checker denies."""
     from limitsets.base.errors import AnswerError
     from limitsets.face.plot.margins import tolerance_box, tornado
     from limitsets.face.plot.parts import part
     from limitsets.face.report.writing import laid
     from limitsets.parameters.margins.margin_result import settled
 
-    found, records = [], []
+    margins, records = [], []
     for each in given:
         try:
             left, paths = settled(each, out, recheck=recheck)
         except AnswerError:  # effects: nothing rechecks them, the margin stands
             left, paths = each, ()
-        found.append(left)
+        margins.append(left)
         records.append(left.to_json() | {"certificate": [path.name for path in paths] or None})
-    single = [each for each in found if each.reading != "tolerance"]
+    single = [each for each in margins if each.reading != "tolerance"]
     drawn = [("part", part(given[0].scene))]
     drawn += [("margins", tornado(single))] if single else []
-    drawn += [("joint", tolerance_box(each)) for each in found if each.reading == "tolerance"]
+    drawn += [("joint", tolerance_box(each)) for each in margins if each.reading == "tolerance"]
     laid(out, drawn, lambda _: {"margins.json": as_json(about.added(records))}, form)
-    return tuple(found), records
+    return tuple(margins), records
 
 
-def _text(given: SceneOf, found: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
+def _text(given: SceneOf, margins: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
     from limitsets.face.report.pages import goal_sentence, without_margin
     from limitsets.face.report.robust_pages import READINGS
     from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
     from limitsets.parameters.margins.margin_result import bound, failing, reach_of, void_of
 
     rows = []
-    for each in found:
+    for each in margins:
         unit = each.unit or "times"
         low, high = bound(each.proved, unit), failing(each.refuted, unit, each.direction)
         rows.append([each.quantity, READINGS[each.reading], low, high])
-    scene = found[0].scene
+    scene = margins[0].scene
     whose = f"{scene.name}: {WITHOUT_SCATTER}, " if given.effects.spread else f"{scene.name}: "
-    typer.echo(whose + " and ".join(goal_sentence(goal, scene.unit) for goal in found[0].goals))
-    if len(found) == 1 or any(each.proved > 0.0 or each.refuted for each in found):
+    typer.echo(whose + " and ".join(goal_sentence(goal, scene.unit) for goal in margins[0].goals))
+    if len(margins) == 1 or any(each.proved > 0.0 or each.refuted for each in margins):
         table(HEADS, rows)
     else:
-        typer.echo(f"{len(found)} margins, all of them 0: {found[0].reason}")
-        fails = any(each.refuted == 0.0 for each in found)
-        typer.echo(f"next: {without_margin(given, found[0].goals, fails=fails)}")
-        found = ()
-    for each in found:
+        typer.echo(f"{len(margins)} margins, all of them 0: {margins[0].reason}")
+        fails = any(each.refuted == 0.0 for each in margins)
+        typer.echo(f"next: {without_margin(given, margins[0].goals, fails=fails)}")
+        margins = ()
+    for each in margins:
         void = void_of(each.goals, reach_of(each.pieces), scene.unit)
         if void:
             typer.echo(f"{each.quantity}: what is proved holds vacuously, {void}")
@@ -217,7 +217,7 @@ def robustness(
 
         noise = deviations("--scatter", scatter)
         vector = deviations("--tolerance", tolerance)
-        found = run(
+        sheet = run(
             chosen,
             *(quantity or ()),
             laid=laid_ranges(laid),
@@ -233,28 +233,28 @@ def robustness(
             executor=pool,
             progress=tell,
         )
-        tell("files", len(found.entries), len(found.entries) + 1)
-        files = write_robustness(found, folder, form, html=html)
-    about = About(found.model, scene)  # audited by the sheet itself, unless that was left out
-    answer(found, json, lambda: _text_of_sheet(chosen, found, files), csv=(csv, found.table), about=about)
-    raise typer.Exit(0 if found.verdict == "proved" and not found.failed else 1)
+        tell("files", len(sheet.entries), len(sheet.entries) + 1)
+        files = write_robustness(sheet, folder, form, html=html)
+    about = About(sheet.model, scene)  # audited by the sheet itself, unless that was left out
+    answer(sheet, json, lambda: _text_of_sheet(chosen, sheet, files), csv=(csv, sheet.table), about=about)
+    raise typer.Exit(0 if sheet.verdict == "proved" and not sheet.failed else 1)
 
 
-def _text_of_sheet(given: SceneOf, found: Robustness, files: list[Any]) -> None:
+def _text_of_sheet(given: SceneOf, sheet: Robustness, files: list[Any]) -> None:
     from limitsets.face.report.pages import without_margin
     from limitsets.face.report.robust_pages import HEADS, lines_of, none_holds
     from limitsets.face.report.robust_pages import answer as said
 
-    typer.echo(said(found).replace("**", ""))
-    if any(entry.holds for entry in found.singles):
-        table(HEADS, lines_of(found))
-    elif found.singles:
-        typer.echo(none_holds(found))
-        typer.echo(f"next: {without_margin(given, found.goals, fails=found.decided == 'refuted')}")
-    for part in dict.fromkeys(("joint", "curve", "noise", *found.failed)):
-        reason = found.left_out.get(part)
+    typer.echo(said(sheet).replace("**", ""))
+    if any(entry.holds for entry in sheet.singles):
+        table(HEADS, lines_of(sheet))
+    elif sheet.singles:
+        typer.echo(none_holds(sheet))
+        typer.echo(f"next: {without_margin(given, sheet.goals, fails=sheet.decided == 'refuted')}")
+    for part in dict.fromkeys(("joint", "curve", "noise", *sheet.failed)):
+        reason = sheet.left_out.get(part)
         if reason and reason != "it was not asked for":
             typer.echo(f"no {part}: {reason}")
-    if found.again:
-        typer.echo(f"found by an earlier run: {found.again} of {len(found.entries)} margins")
+    if sheet.again:
+        typer.echo(f"found by an earlier run: {sheet.again} of {len(sheet.entries)} margins")
     typer.echo(f"report: {files[0]}")

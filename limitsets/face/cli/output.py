@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 Words: TypeAlias = list[str] | None
 
-# Folders that this process keeps, until it ends.
+# Folders that this process locks until it ends.
 _LOCKED: set[Path] = set()
 _LOCKS = ExitStack()
 atexit.register(_LOCKS.close)
@@ -44,7 +44,7 @@ def option(flags: str, metavar: str, help: str, **limits: Any) -> Any:  # noqa: 
 
 
 def _names(begun: str) -> list[str]:
-    """Give the built-in scenes for the shell's completion; it adds files by itself where none fits."""
+    """Give the built-in scenes for the shell's completion; the shell adds files if no scene fits."""
     from limitsets.feeder.scene import scenes
 
     return [name for name in scenes() if name.startswith(begun)]
@@ -77,7 +77,7 @@ Format = Annotated[Form, option("--format", "FORMAT", "Of the figures: png, svg 
 
 
 def _require_file(file: Path | None) -> Path | None:
-    """Refuse a file that plainly cannot be written, before anything is computed for it."""
+    """Refuse a file that clearly cannot be written, before the computation begins."""
     if file is not None and file.is_dir():
         raise LimitsetsError("the table's file", str(file), "a regular file", "it is a folder; name a file")
     if file is not None and not file.parent.is_dir():
@@ -101,15 +101,15 @@ Csv = Annotated[
 ]
 
 
-# Columns of a line in a pipe: more than any table has.
+# Width of a line in a pipe: larger than that of any table.
 LONGEST = 100_000
 
-# A longer table is printed by ourselves: rich takes a second for four thousand rows.
+# Longer tables are printed without rich, which takes a second for four thousand rows.
 LONG = 500
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Print a table, wide enough for its text where nobody looks at it on a terminal."""
+    """Print a table; outside a terminal its columns are as wide as their text."""
     if len(rows) > LONG:
         print("\n".join(aligned(heads, [[str(cell) for cell in row] for row in rows])))
         return
@@ -118,11 +118,11 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    # rich asks the terminal, or COLUMNS; where neither says anything lines are as long as they are
+    # rich reads the width from the terminal or COLUMNS; without either, lines are not broken
     told = sys.stdout.isatty() or bool(os.environ.get("COLUMNS"))
     grid = Table(box=SIMPLE_HEAD, pad_edge=False)
     for number, head in enumerate(heads):
-        # names stay whole as long as others can be broken: a name that is cut could be another's
+        # names are not broken if other columns can be: two names could look alike when cut
         names = number == 0 and not any(" " in str(row[0]) for row in rows)
         grid.add_column(escape(head), no_wrap=names or not told, overflow="fold")
     for row in rows:
@@ -130,17 +130,17 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     Console(width=None if told else LONGEST).print(grid)
 
 
-def show(found: Table) -> None:
+def show(listing: Table) -> None:
     """Print a table of an answer, its numbers rounded."""
-    table(found.heads, found.shown())
+    table(listing.heads, listing.shown())
 
 
 def opened(
     scene: str, out: Path | None, word: str = "", read: Callable[[str], SceneOf] | None = None
 ) -> tuple[SceneOf, Path]:
-    """Load a scene; a folder, by default NAME-WORD, that cannot be written is refused before anything is computed.
+    """Load a scene; refuse a folder, by default NAME-WORD, that cannot be written, before the computation begins.
 
-    `read`: how, instead of `limitsets.load`.
+    `read` loads the scene instead of `limitsets.load`.
     """
     from limitsets.feeder.scene import load
 
@@ -156,7 +156,7 @@ def opened(
 
 
 def _keep(folder: Path) -> None:
-    """Keep a folder for this process until it ends."""
+    """Lock a folder for this process until it ends."""
     place = folder.resolve()
     if place not in _LOCKED:
         _LOCKS.enter_context(locked(place))
@@ -164,7 +164,7 @@ def _keep(folder: Path) -> None:
 
 
 def stem_of(scene: SceneOf) -> str:
-    """Give what outputs of a scene are named after: its file, or its name where it is built in.
+    """Give the stem for names of a scene's output: that of its file, or the name of a built-in scene.
 
     Examples
     --------
@@ -176,17 +176,17 @@ def stem_of(scene: SceneOf) -> str:
 
 
 def _require_own(folder: Path, scene: SceneOf) -> None:
-    """Refuse a folder with the report of another scene; say where it is that of other values of this one."""
+    """Refuse a folder with the report of another scene; warn if the report is of this scene with other values."""
     for file in sorted(folder.glob("*.json")):
-        found = {}
+        record = {}
         with suppress(OSError, ValueError, TypeError, KeyError):
-            found = dict(loads(file.read_text(encoding="utf-8"))["scene"])
-        if found and found.get("name") != scene.name:
+            record = dict(loads(file.read_text(encoding="utf-8"))["scene"])
+        if record and record.get("name") != scene.name:
             raise LimitsetsError(
                 "the folder of the report", str(folder), f"one of {scene.name}, or a new one",
-                f"it holds that of {found.get('name')}; name another with --out, or delete it",
+                f"it holds that of {record.get('name')}; name another with --out, or delete it",
             )  # fmt: skip
-        if found and found != scene.as_dict():
+        if record and record != scene.as_dict():
             said = f"limitsets: {folder} holds the report of {scene.name} with other values: it is replaced"
             print(said, file=sys.stderr)
             return
@@ -194,7 +194,7 @@ def _require_own(folder: Path, scene: SceneOf) -> None:
 
 @contextmanager
 def saved(file: Path) -> Iterator[Path]:
-    """Write one file whole: a draft to write to, which takes its place at the end."""
+    """Give a draft to write to, which replaces the file at the end."""
     if file.exists() and not file.is_file():
         raise LimitsetsError(
             "the output file", str(file), "a regular file", "it is a folder or a device; name a file"
@@ -217,9 +217,9 @@ def answer(
     csv: tuple[Path | None, Callable[[], Table]] | None = None,
     about: About | None = None,
 ) -> None:
-    """Give an answer as JSON or as text; write it to a file, and its table as CSV, where they are named.
+    """Print an answer as JSON or as text; write it to a file, and its table as CSV, if these are given.
 
-    Text ends with the model that a verdict is `about`: who looks for assumptions that break does so after the answer.
+    The text ends with the model of the verdict (`about`); its broken assumptions are computed after the answer is out.
     """
     words = as_json(about.added(record) if json and about is not None else record)
     if csv is not None and csv[0] is not None:
@@ -233,7 +233,7 @@ def answer(
     else:
         text()
         if about is not None:
-            sys.stdout.flush()  # the answer does not wait for it
+            sys.stdout.flush()  # printed before the audit, which takes time
             with progress() as tell:
                 tell("assumptions on the limit set", 0, 1)
                 said = about.line()
@@ -241,7 +241,7 @@ def answer(
 
 
 def scene_file(scene: SceneOf, out: Path | None) -> str:
-    """Name the file of a design, as `out` says where; empty where it is written to none."""
+    """Name the file of a design, from `out`; empty if none is written."""
     return "" if out is None else str(out if out.suffix == ".toml" else out / f"{scene.name}.toml")
 
 
@@ -255,16 +255,16 @@ def save_scene(scene: SceneOf, file: Path) -> list[Path]:
 
 
 def show_scene(scene: SceneOf, files: list[Path], about: About | None) -> None:
-    """Say where a design is, or print it where it is in no file; of one that is not as wanted say that it is none.
+    """Name the file of a design, or print the design if there is no file; say so if it is a near miss only.
 
     Parameters
     ----------
     scene : Scene
         The design.
     files : list of Path
-        Written files, the scene among them.
+        Written files, with the scene.
     about : About or None
-        Of which model it is as wanted; None of a near miss, of which nothing is printed that looks like an answer.
+        The model of the design; None for a near miss, for which nothing is printed that looks like an answer.
     """
     from limitsets.feeder.scene import dump
 
@@ -281,9 +281,9 @@ def show_scene(scene: SceneOf, files: list[Path], about: About | None) -> None:
 
 
 class _Interrupts:
-    """Ctrl-C, remembered: raised inside a callback of somebody else's C code an exception may be lost on the way.
+    """Remember Ctrl-C: an exception raised inside a callback from foreign C code may be lost.
 
-    The next step raises it again, so that no file is replaced after it.
+    The next step of progress raises it again, so that no file is replaced after Ctrl-C.
     """
 
     def __init__(self) -> None:
@@ -300,7 +300,7 @@ class _Interrupts:
 
 @contextmanager
 def processes(workers: int | None) -> Iterator[Executor | None]:
-    """Start processes as tasks come, one a core by default; None where a single one is enough."""
+    """Start processes as tasks come, by default one per core; give None if a single process is enough."""
     from limitsets.base.campaign import Processes, present_cores
 
     count = workers or present_cores()
@@ -310,7 +310,7 @@ def processes(workers: int | None) -> Iterator[Executor | None]:
     pool = Processes(count)
     try:
         yield pool
-    except BaseException:  # nobody waits for their answers any more
+    except BaseException:  # their answers are not needed any more
         pool.abandon()
         raise
     pool.end()
@@ -318,7 +318,7 @@ def processes(workers: int | None) -> Iterator[Executor | None]:
 
 @contextmanager
 def progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Show steps on stderr: a bar on a terminal, elsewhere a line for what takes over two seconds."""
+    """Show steps on stderr: a bar on a terminal, elsewhere a line for each step that takes over two seconds."""
     interrupts = _Interrupts()
     ours = (
         threading.current_thread() is threading.main_thread()

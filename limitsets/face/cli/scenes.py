@@ -52,8 +52,8 @@ def scenes(out: Out = None, csv: Csv = None, json: Json = False) -> None:
         "goal",
     )
     words = ("name", "sides", "kappa", "arm_length", "unit", "flight", "flip", "goal")
-    found = Table(columns, [[record[word] for word in words] for record in records], "Built-in scenes")
-    answer(records, json, lambda: show(found), out, (csv, lambda: found))
+    listing = Table(columns, [[record[word] for word in words] for record in records], "Built-in scenes")
+    answer(records, json, lambda: show(listing), out, (csv, lambda: listing))
 
 
 # ---------------------------------------------------------------- `limitsets new`: a scene to start from
@@ -79,7 +79,7 @@ def new(
 
 
 # ----------------------------------------------------------------
-# `limitsets check`: all that is wrong with a scene, at once.
+# `limitsets check`: all errors of a scene at once.
 
 
 WORDS = ("key", "thing", "value", "allowed", "remedy")
@@ -93,26 +93,26 @@ def check(scene: Scene, out: Out = None, csv: Csv = None, json: Json = False) ->
     from limitsets.feeder.scene import load
     from limitsets.feeder.scene.checking import examined
 
-    found, doubts = examined(scene)
-    records = [{"improbable": False, **picked(error, *WORDS, "file")} for error in found]
+    errors, doubts = examined(scene)
+    records = [{"improbable": False, **picked(error, *WORDS, "file")} for error in errors]
     records += [{"improbable": True, **picked(doubt, *WORDS, "file")} for doubt in doubts]
     heads = (*WORDS, "improbable")
     rows = Table(heads, [[str(record[word] or "") for word in heads] for record in records], scene)
 
     def text() -> None:
-        for each in (*found, *doubts):
+        for each in (*errors, *doubts):
             typer.echo(str(each))
         unlikely = f", {_count(len(doubts), 'improbable')}" if doubts else ""
-        typer.echo(f"{scene}: {_count(len(found), 'wrong')}{unlikely}")
-        if not found and (note := _beside_kappa(load(scene))):
+        typer.echo(f"{scene}: {_count(len(errors), 'wrong')}{unlikely}")
+        if not errors and (note := _beside_kappa(load(scene))):
             typer.echo(f"{scene}: {note}")
 
     answer(records, json, text, out, (csv, lambda: rows))
-    raise typer.Exit(2 if found else 0)
+    raise typer.Exit(2 if errors else 0)
 
 
 def _beside_kappa(scene: SceneOf) -> str:
-    """Say of a gravity that changes no throw what it is for; empty where it changes them, or is not given."""
+    """Explain a gravity that changes no throw; empty if it changes throws, or is not given."""
     if scene.gravity is None or "kappa" not in scene.text["throw"]:
         return ""
     speed = math.degrees(scene.value("throw.speed"))
@@ -125,10 +125,10 @@ def _count(number: int, word: str) -> str:
 
 
 # ----------------------------------------------------------------
-# `limitsets doctor`: what is installed, and where the compiled code lies.
+# `limitsets doctor`: the installed packages, and the folder of the compiled code.
 
 
-# Extras that only whoever works on the package itself needs.
+# Extras that are needed only to develop the package itself.
 INNER = ("bench", "dev")
 
 _REQUIREMENT = re.compile(r"""([A-Za-z0-9._-]+)[^;]*(?:;.*\bextra\s*==\s*["']([^"']+)["'])?""")
@@ -170,12 +170,12 @@ def doctor(
 
 
 def _packages() -> list[dict[str, str | None]]:
-    """List what the package asks for, each with the version that is there, and the extra that needs it."""
+    """List the required packages, each with its installed version and the extra that requires it."""
     try:
         lines = requires("limitsets") or []
     except PackageNotFoundError:  # a folder on the path, not installed
         return []
-    found: list[dict[str, str | None]] = []
+    packages: list[dict[str, str | None]] = []
     for line in lines:
         match = _REQUIREMENT.match(line)
         if match is None or match[2] in INNER or match[1] == "limitsets":
@@ -184,8 +184,8 @@ def _packages() -> list[dict[str, str | None]]:
             there: str | None = version(match[1])
         except PackageNotFoundError:
             there = None
-        found.append({"package": match[1], "version": there, "extra": match[2]})
-    return found
+        packages.append({"package": match[1], "version": there, "extra": match[2]})
+    return packages
 
 
 def _cache(*, clear: bool) -> dict[str, Any]:
@@ -198,7 +198,7 @@ def _cache(*, clear: bool) -> dict[str, Any]:
         return {"folder": None, "bytes": 0, "versions": 0, "cleared": False, "reason": "it cannot be written"}
     root = FOLDER.parent
     files = [each for each in root.rglob("*") if each.is_file()]
-    found = {
+    record = {
         "folder": str(root),
         "bytes": sum(each.stat().st_size for each in files),
         "versions": sum(each.is_dir() for each in root.iterdir()),
@@ -215,7 +215,7 @@ def _cache(*, clear: bool) -> dict[str, Any]:
                 "a folder that can be deleted",
                 f"it could not be: {error.strerror}",
             ) from None
-    return found
+    return record
 
 
 def _text(record: dict[str, Any], table: Table) -> None:

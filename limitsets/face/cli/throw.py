@@ -47,8 +47,8 @@ def throw(
         path = trace(chosen.map_of_seed(seed), start, side, count)
     records = _records(path)
 
-    found = _table(chosen.unit, (float(path.x[0]), int(path.side[0])), records)
-    answer(records, json, lambda: show(found), out, (csv, lambda: found))
+    listing = _table(chosen.unit, (float(path.x[0]), int(path.side[0])), records)
+    answer(records, json, lambda: show(listing), out, (csv, lambda: listing))
     if chosen.effects.auto:
         typer.echo(
             "limitsets: auto in [effects] is resolved by limitsets analyse; thrown with: "
@@ -162,7 +162,7 @@ def plot(
 
 
 def _part(scene: str) -> tuple[str, Figure, LimitsetsError | None]:
-    """Draw what needs no analysis; of a part that is refused what can be read of it, and the error."""
+    """Draw the part, which needs no analysis; if it is refused, draw its readable corners and return the error."""
     from limitsets.face.plot.parts import part, refused_part
     from limitsets.feeder.scene import load
     from limitsets.feeder.scene.reading import sketch
@@ -170,10 +170,10 @@ def _part(scene: str) -> tuple[str, Figure, LimitsetsError | None]:
     try:
         chosen = load(scene)
     except LimitsetsError as error:
-        found = sketch(scene)
-        if found is None:
+        outline = sketch(scene)
+        if outline is None:
             raise
-        return found.name, refused_part(found, str(error)), error
+        return outline.name, refused_part(outline, str(error)), error
     return chosen.name, part(chosen), None
 
 

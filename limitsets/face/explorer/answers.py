@@ -1,4 +1,4 @@
-"""What the page says, as HTML in which nothing from outside is markup, and how other scenes are typed or drawn."""
+"""The texts of the page as HTML, with text from outside escaped, and the ways to type or draw another scene."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ KEY = (
 )
 
 LISTED = 12
-"""Points of a cycle that are told one by one."""
+"""Largest number of points of a cycle that are listed one by one."""
 
 VERDICTS = {
     "proved": "&#10003; <b>proved</b>",
@@ -38,20 +38,20 @@ VERDICTS = {
 
 
 def error_line(error: object) -> str:
-    """Say what is wrong, in one line that a screen reader speaks at once."""
+    """Give the error in one line that a screen reader speaks at once."""
     return f'<p role="alert" class="wrong">{escape(str(error))}</p>' if error else '<p role="alert"></p>'
 
 
-def careful_line(found: Estimate, scene: Scene) -> str:
+def careful_line(estimate: Estimate, scene: Scene) -> str:
     """Say from how many starts a throw is outside the model, and for which throws of a limit set the model is wrong."""
     lines = []
-    share = dict(found.shares).get(codes.OUTSIDE_MODEL, 0.0)
+    share = dict(estimate.shares).get(codes.OUTSIDE_MODEL, 0.0)
     if share:
         lines.append(
             f"from {100 * share:.3g} % of the starts the part comes to a throw that is outside the model: it has not "
             "landed within a full turn"
         )
-    broken = ", ".join(map(str, in_limit_sets(other_vertex_first(scene), found.sets)))
+    broken = ", ".join(map(str, in_limit_sets(other_vertex_first(scene), estimate.sets)))
     if broken:
         lines.append(
             f"of some throws of the limit set from side {broken} another vertex lands first, and the model does not "
@@ -60,10 +60,12 @@ def careful_line(found: Estimate, scene: Scene) -> str:
     return "".join(f'<p class="wrong">careful: {line}</p>' for line in lines)
 
 
-def estimate_words(found: Estimate, goal: Goal | None, unit: str, of: str = "") -> str:
-    """Say what is estimated; `of` says of which model."""
+def estimate_words(estimate: Estimate, goal: Goal | None, unit: str, of: str = "") -> str:
+    """Put the estimate into words; `of` names its model."""
     rows = []
-    for k, (extents, bands, order) in enumerate(zip(found.sets, found.bands, found.orders, strict=True)):
+    for k, (extents, bands, order) in enumerate(
+        zip(estimate.sets, estimate.bands, estimate.orders, strict=True)
+    ):
         drawn = sum(map(len, extents.values()))
         is_cycle = all(lo == hi for parts in extents.values() for lo, hi in parts)
         if is_cycle and drawn > LISTED:
@@ -71,23 +73,25 @@ def estimate_words(found: Estimate, goal: Goal | None, unit: str, of: str = "") 
         else:
             places = "; ".join(f"side {side}: {_places(parts)}" for side, parts in sorted(extents.items()))
         visits = "; the order of sides changes" if order is None else f"; sides {'-'.join(map(str, order))}"
-        visits = visits if len(found.lo) > 1 else ""
+        visits = visits if len(estimate.lo) > 1 else ""
         kind = f"; a cycle of period {drawn}" if is_cycle else ""
         joined = f"; {bands} intervals, which these cells join" if bands > drawn else ""
         rows.append((f"limit set {k}", f"{places} {unit}".rstrip() + f"{visits}{kind}{joined}"))
-    if not found.sets:
+    if not estimate.sets:
         rows.append(("limit set", "none: no start was found to stay"))
-    looks = [(*look_of(label), share) for label, share in found.shares]
+    looks = [(*look_of(label), share) for label, share in estimate.shares]
     shares = "; ".join(
         f"{swatch(face, hatch)}{words} {100 * share:.3g} %" for face, hatch, words, share in looks
     )
     rows.append(("starts", shares))
-    points = ", ".join(f"r{side}{chr(39) * number} = {x:.4f}" for side, number, x in found.critical)
+    points = ", ".join(f"r{side}{chr(39) * number} = {x:.4f}" for side, number, x in estimate.critical)
     if points:
         rows.append(("critical points", f"{points} {unit}"))
     if goal is not None:
-        rows.append((f"goal: {escape(goal_sentence(goal, unit))}", _goal_words(found, goal, unit)))
-    how = f"from {CELLS} cells a side" + (", ends from the compiled loop of the atlas" if found.sharp else "")
+        rows.append((f"goal: {escape(goal_sentence(goal, unit))}", _goal_words(estimate, goal, unit)))
+    how = f"from {CELLS} cells a side" + (
+        ", ends from the compiled loop of the atlas" if estimate.sharp else ""
+    )
     return _table("Estimated (follows the sliders, proves nothing)", rows, "; ".join(filter(None, (how, of))))
 
 
@@ -98,22 +102,22 @@ def _places(parts: Sequence[tuple[float, float]]) -> str:
     return escape(interval_text(parts)).replace("\n", ", ")
 
 
-def points_words(found: Points) -> str:
+def points_words(points: Points) -> str:
     """Say how many orbits of a map of two or three dimensions stay, and where the others go."""
-    stay = found.starts - sum(found.gone.values())
-    rows = [("stay", f"{stay} of {found.starts} orbits")]
-    rows += [("leave", f"{count} of {found.starts} orbits {where}") for where, count in found.gone.items()]
+    stay = points.starts - sum(points.gone.values())
+    rows = [("stay", f"{stay} of {points.starts} orbits")]
+    rows += [("leave", f"{count} of {points.starts} orbits {where}") for where, count in points.gone.items()]
     return _table("Estimated (follows the sliders, proves nothing)", rows, "from a few starts")
 
 
-def _goal_words(found: Estimate, goal: Goal, unit: str) -> str:
-    share = sum(share for label, share in found.shares if label >= 0)
-    words = verdict_words(goal, found.holds, share, len(found.sets), vacuous=found.vacuous)
-    return words + ("" if found.threshold is None else f"; threshold x = {found.threshold:.4f} {unit}")
+def _goal_words(estimate: Estimate, goal: Goal, unit: str) -> str:
+    share = sum(share for label, share in estimate.shares if label >= 0)
+    words = verdict_words(goal, estimate.holds, share, len(estimate.sets), vacuous=estimate.vacuous)
+    return words + ("" if estimate.threshold is None else f"; threshold x = {estimate.threshold:.4f} {unit}")
 
 
 def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state: str, of: str = "") -> str:
-    """Say what is proved; `of` says of which model."""
+    """Put the proofs into words; `of` names their model."""
     names = {knob.name: knob.words for knob in knobs}
     rows = []
     for line in lines:
@@ -149,21 +153,21 @@ def _table(title: str, rows: Sequence[tuple[str, str]], foot: str) -> str:
 # Other scenes: drawn by clicking corners, typed, or sent as a file.
 
 
-# Corners that are drawn are kept to so many digits: a click is no more exact.
+# Digits of drawn corners: a click is not more exact.
 DIGITS = 3
 
 
 class Opening:
-    """What opens another scene.
+    """The controls that open another scene.
 
     Parameters
     ----------
     opened : callable
-        Told the scene.
+        Called with the scene.
     drawn : callable
-        Told the corners so far, and whether more are awaited.
+        Called with the corners so far, and whether more are expected.
     say : callable
-        Told what is wrong.
+        Called with the error.
     """
 
     def __init__(
@@ -204,7 +208,7 @@ class Opening:
         self._text.value = dump(scene)
 
     def corner(self, x: float, y: float) -> None:
-        """Add a corner where the part's picture was clicked, if one is being drawn."""
+        """Add a corner at the place of a click on the part's picture, while a part is being drawn."""
         if self._draw.value:
             self._corners.value = f"{self._corners.value} {x:.{DIGITS}g},{y:.{DIGITS}g}".strip()
 
@@ -231,14 +235,14 @@ class Opening:
             self._say(error)
 
     def _read_corners(self) -> list[tuple[float, float]]:
-        words, found = self._corners.value.split(), []
+        words, corners = self._corners.value.split(), []
         for word in words:
             try:
                 x, y = (float(each) for each in word.split(","))
             except ValueError:
                 raise SceneError("a corner", word[:40], "x,y, two numbers", "correct it") from None
-            found.append((x, y))
-        return found
+            corners.append((x, y))
+        return corners
 
     def _read(self, text: str) -> None:
         try:

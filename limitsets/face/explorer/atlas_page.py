@@ -1,4 +1,4 @@
-"""A small atlas beside the scene, computed by a process of its own, or stored; a click opens one of its feeders."""
+"""A small atlas beside the scene, computed in a separate process, or stored; a click opens one of its feeders."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from limitsets.feeder.scene import Scene, dump
 from limitsets.feeder.scene.units import written
 
 # ----------------------------------------------------------------
-# Questions that take seconds, asked of a process of its own which is ended when nobody wants the answer any
-# more.
+# Questions that take seconds are answered by a separate process, which is ended when the answer is not needed
+# any more.
 
 
 RUNNING = threading.BoundedSemaphore(2)
-"""Processes of all visitors together; others wait in line."""
+"""Largest number of processes for all visitors together; further questions wait in line."""
 
 LONGEST = 600.0
-"""Seconds after which an answer is given up."""
+"""Seconds after which a question is given up."""
 
 
 _ALL: weakref.WeakSet[Background] = weakref.WeakSet()
@@ -67,7 +67,7 @@ class Background:
         _ALL.add(self)
 
     def ask(self, question: dict[str, Any]) -> None:
-        """Drop what is being answered and ask this; the answers end with ``{"done": True}``."""
+        """Drop the present question and ask this one; the answers end with ``{"done": True}``."""
         self.stop()
         self._lines, self._wanted = queue.SimpleQueue(), threading.Event()
         about = question, self._lines, self._wanted
@@ -75,18 +75,18 @@ class Background:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the process; what it said is forgotten."""
+        """End the process, and forget its answers."""
         self._wanted.set()
         self._lines = queue.SimpleQueue()
         if self._process is not None:
             self._process.kill()
 
     def answers(self) -> list[dict[str, Any]]:
-        """Take what has been answered since the last call, without waiting."""
-        found = []
+        """Take the answers since the last call, without waiting."""
+        lines = []
         while not self._lines.empty():
-            found.append(self._lines.get())
-        return found
+            lines.append(self._lines.get())
+        return lines
 
     def wait(self) -> list[dict[str, Any]]:
         """Wait for all answers."""
@@ -105,7 +105,7 @@ class Background:
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
             )
             self._process = process
-            if dropped.is_set():  # between the two: nobody else would end it
+            if dropped.is_set():  # `stop` came between the two lines: nothing else would end this process
                 process.kill()
             late = threading.Timer(LONGEST, process.kill)
             late.start()
@@ -141,7 +141,7 @@ def _answered(
 
 
 POINTS = 33
-"""Along each axis of an atlas that is computed for the page."""
+"""Points along each axis of an atlas that is computed for the page."""
 
 
 class AtlasPage:
@@ -150,11 +150,11 @@ class AtlasPage:
     Parameters
     ----------
     opened : callable
-        Told the quantities at a point that was clicked, with their units.
+        Called with the quantities at the clicked point, with their units.
     say : callable
-        Told what is wrong.
+        Called with the error.
     table : dict, optional
-        A stored one, as `limitsets.face.explorer.work.table_of` gives it.
+        A stored atlas, as `limitsets.face.explorer.work.table_of` gives it.
     """
 
     def __init__(
@@ -194,7 +194,7 @@ class AtlasPage:
             self._show(table)
 
     def follow(self, scene: Scene, knobs: tuple[Knob, ...]) -> None:
-        """Know which scene is shown."""
+        """Take note of the scene that is shown."""
         self._scene, self._knobs = scene, knobs
         names = {knob.title: knob.name for knob in knobs}
         if self._x.options != names:
@@ -218,7 +218,7 @@ class AtlasPage:
         self._asked.ask({"what": "atlas", "scene": dump(self._scene), **lines})
 
     def tell(self) -> None:
-        """Show what has been answered."""
+        """Show the answers."""
         for line in self._asked.answers():
             if "error" in line:
                 self._words.object = ""
@@ -264,7 +264,7 @@ class AtlasPage:
         self._canvas.send()
 
     def _mark(self) -> None:
-        """Show where the scene on the page is, if the atlas knows of such a place."""
+        """Mark the place of the page's scene, if it lies in the atlas."""
         if self._table is None or self._scene is None:
             return
         values = {knob.name: knob for knob in self._knobs}
@@ -278,7 +278,7 @@ class AtlasPage:
         self._canvas.send()
 
     def _touched(self, hand: Hand) -> None:
-        """Open the point that is tapped; keys say steps from point to point instead of a place."""
+        """Open the tapped point; arrow keys move from point to point instead."""
         if self._table is None:
             return
         axes = [np.array(axis["values"]) for axis in self._table["axes"]]
@@ -303,7 +303,7 @@ class AtlasPage:
             self._opened({axis["name"]: written(value, axis["unit"]) for axis, value in places})
 
     def close(self) -> None:
-        """End what is still being computed."""
+        """End the computation, if one is running."""
         self._asked.stop()
 
 

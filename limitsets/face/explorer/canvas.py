@@ -1,7 +1,7 @@
-"""What this package draws in the browser by itself: how the page looks, pictures on a canvas, sliders with fields.
+"""The package's own drawing in the browser: the look of the page, pictures on a canvas, sliders with fields.
 
-A figure of Bokeh costs the browser some 20 ms for a picture of the lanes, and its slider, which rebuilds itself at
-every move, 14 ms for a move: too much for 20 pictures a second on two cores.  These cost 2 ms and 5 ms.
+A Bokeh figure of the lanes costs the browser some 20 ms, and a Bokeh slider, which rebuilds itself at every move, 14 ms
+per move: too much for 20 pictures a second on two cores.  The pictures and sliders here cost 2 ms and 5 ms.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ MOST = 65535
 
 
 class Hand(NamedTuple):
-    """What a finger or a mouse does on a picture.
+    """An action of a finger, a mouse or a key on a picture.
 
     Attributes
     ----------
     what : str
-        "tap", of a drag "grasp", "drag", "release", of keys "step" and "enter".
+        "tap"; "grasp", "drag" and "release" for a drag; "step" and "enter" for keys.
     x, y : float
-        Where, in the picture's coordinates; of a step whether to the right and up (1) or back (-1).
+        The place in the picture's coordinates; for a step its direction: right or up (1), or back (-1).
     """
 
     what: str
@@ -49,13 +49,13 @@ class Layer:
     Parameters
     ----------
     kind : str
-        One of those that `canvas.js` draws: bars, strokes, path, marks, words, dots.
+        A kind that `canvas.js` draws: bars, strokes, path, marks, words, dots.
     called : str, optional
         What scripts of a reader, and tests, find it by.
     columns : iterable of str
         The names of its columns.
     **look
-        The same for all its shapes.
+        The look of all its shapes.
     """
 
     def __init__(
@@ -75,13 +75,13 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
     layers : sequence of Layer
         From below to above.
     height : int
-        On the page [pixel].
+        Height on the page [pixel].
     touched : callable, optional
-        Told what a `Hand` does.
+        Called with each `Hand`.
     **view
         How it is laid out: `margins` [pixel] to the left, right, top and bottom; `equal` for one scale on both axes;
         `across` and `up`, names of the axes where they are drawn; `lanes`, words instead of numbers on the other axis;
-        `keys` where arrow keys and Enter are told.
+        `keys` if arrow keys and Enter are reported.
     """
 
     called = param.String()
@@ -106,9 +106,9 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
         super().__init__(called=called, drawn=self._written(), **options)
 
     def send(self) -> None:
-        """Show what has changed, if anything has: one message.  Data of layers are not changed, but replaced."""
+        """Send the changes, if there are any, in one message.  Data of layers are replaced, never changed in place."""
         looks, data = (self.heading, dict(self.view)), [each.data for each in self.layers]
-        # most beats change nothing, and writing takes ten times as long as this
+        # most beats change nothing, and writing takes ten times as long as this comparison
         if looks != self._looks or any(map(operator.is_not, data, self._data)):
             self._looks, self._data = looks, data
             self.drawn = self._written()
@@ -131,7 +131,7 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
         return {"packed": base64.b64encode(np.round(seen * MOST).astype("<u2").tobytes()).decode()}
 
     def _handle_msg(self, data: Any) -> None:
-        """Take what the browser says, which may be anything."""
+        """Take a message of the browser, which may contain anything."""
         self.seen = True
         if self._touched is None or not isinstance(data, dict):
             return
@@ -143,7 +143,7 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
 
 
 class Bar(JSComponent):  # type: ignore[misc]  # panel is not followed
-    """A slider.  Its values are not held back: Panel otherwise waits for 50 ms, and so takes fewer than 20 a second."""
+    """A slider without throttling: Panel's own waits for 50 ms, and so takes fewer than 20 values a second."""
 
     _debounce = 0
 
@@ -169,10 +169,10 @@ class Words(JSComponent):  # type: ignore[misc]  # panel is not followed
 
 
 # ----------------------------------------------------------------
-# How the page looks: one column on a phone, two beside each other where there is room; focus can be seen.
+# The look of the page: one column on a phone, two on a wide screen; the keyboard's focus is visible.
 
 
-# Panel's own page, told that a phone is narrow; `base` is what Panel gives.
+# Panel's own page (`base`), with the line that makes phones use their own width.
 PAGE = """{% extends base %}{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>body { padding: 0 10px 10px !important; box-sizing: border-box; color: #222; }</style>
@@ -233,9 +233,9 @@ class Sliders:
     Parameters
     ----------
     moved : callable
-        Told that a value has changed.
+        Called when a value has changed.
     say : callable
-        Told what is wrong.
+        Called with the error.
     """
 
     def __init__(self, moved: Callable[[], None], say: Callable[[object], None]) -> None:
@@ -252,7 +252,7 @@ class Sliders:
         return "part.mass.center.along" in self.values
 
     def open(self, knobs: tuple[Knob, ...]) -> None:
-        """Begin with these; sliders of the same numbers are kept, and the keyboard's focus with them."""
+        """Show these knobs; sliders of the same quantities are kept, and the keyboard's focus with them."""
         if [knob[:3] for knob in knobs] == [knob[:3] for knob in self.knobs]:
             self.knobs, self._setting = knobs, True
             for knob in knobs:
@@ -279,13 +279,13 @@ class Sliders:
         self.column.objects = rows
 
     def put(self, values: Mapping[str, float], *, told: bool = True) -> None:
-        """Move sliders without a hand."""
+        """Move sliders by program."""
         self._setting = True
         for name, value in values.items():
             knob = next(each for each in self.knobs if each.name == name)
             self.values[name] = value
             bar = self._bars[name]
-            shown = min(max(value, knob.lo), knob.hi)  # what is typed may lie beyond
+            shown = min(max(value, knob.lo), knob.hi)  # a typed value may lie beyond the slider's ends
             if bar.value != shown:
                 bar.value = shown
         self._setting = False

@@ -1,7 +1,7 @@
-"""Knobs, the numbers that sliders move, and what follows them in some 10 ms: attractors, basins, the goal's threshold.
+"""Knobs, the numbers that sliders move, and their estimates in some 10 ms: attractors, basins, the goal's threshold.
 
-Cells find what attracts and from where; the compiled loop of the atlas then finds the ends of each attractor to the
-last digits, where it can decide them.  Both are estimates: no rounding is enclosed, and images of cells are sampled.
+Cells give the attractors and their basins; the compiled loop of the atlas then gives the ends of each attractor to the
+last digits, if it can decide them.  Both are estimates: no rounding is enclosed, and images of cells are sampled.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from limitsets.systems.topology import Topologies, topologies
 from limitsets.systems.topology.work import DECIDED
 
 # ----------------------------------------------------------------
-# Knobs: the numbers of a scene, or of a map, that sliders move, and what follows from moving them.
+# Knobs: the numbers of a scene, or of a map, that sliders move, and the scene or map after a move.
 
 
-# Point masses that get sliders; more would be a table, not a picture.
+# Largest number of point masses with sliders; more would be a table, not a picture.
 MOST_POINTS = 3
 STEPS = 400
-# Ends of the slider of a point mass, which cannot be 0.
+# Ends of the slider of a point mass, as factors: a mass cannot be 0.
 LIGHTEST, HEAVIEST = 0.1, 3.0
 
 
@@ -49,11 +49,11 @@ class Knob(NamedTuple):
     name : str
         The quantity of the scene, or the field of the map's parameters.
     words : str
-        What it is called.
+        The name on the page.
     unit : str
         Its unit; empty for a map.
     value, lo, hi : float
-        Where it stands, and the slider's ends, in this unit.
+        The value, and the ends of the slider, in this unit.
     """
 
     name: str
@@ -65,13 +65,13 @@ class Knob(NamedTuple):
 
     @property
     def step(self) -> float:
-        """What one press of an arrow key moves: a round number, some 400 of them from end to end."""
+        """The step of an arrow key: a round number, about 1/400 of the slider."""
         rough = (self.hi - self.lo) / STEPS
         ten = 10.0 ** math.floor(math.log10(rough))
         return float(f"{ten * min((1, 2, 5, 10), key=lambda each: abs(each * ten - rough)):.3g}")
 
     def read(self, text: str) -> float:
-        """Read what is typed: a number in the knob's unit, or with a unit of its own.
+        """Read a typed value: a number in the knob's unit, or with its own unit.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class Knob(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Its name and unit."""
+        """The name with the unit."""
         return f"{self.words} [{self.unit}]" if self.unit else self.words
 
 
@@ -133,18 +133,18 @@ def _of_mass(scene: Scene) -> list[Knob]:
                 float(max(m[1] for m in measured)),
             ),
         ]
-    found = []
+    knobs = []
     lo, hi = scene.vertices.min(axis=0), scene.vertices.max(axis=0)
     for k in range(min(len(tree["part"]["mass"].get("points", [])), MOST_POINTS)):
         for axis, word in enumerate("xy"):
             name = f"part.mass.points[{k}].{word}"
             ends = float(lo[axis]), float(hi[axis])
-            found.append(Knob(name, f"point mass {k}, {word}", unit, scene.value(name), *ends))
+            knobs.append(Knob(name, f"point mass {k}, {word}", unit, scene.value(name), *ends))
         name = f"part.mass.points[{k}].mass"
         text, own = text_at(tree, name), unit_read(tree, unit, name)
         mass = convert(parse(text, "mass"), own)
-        found.append(Knob(name, f"point mass {k}, mass", own, mass, LIGHTEST * mass, HEAVIEST * mass))
-    return found
+        knobs.append(Knob(name, f"point mass {k}, mass", own, mass, LIGHTEST * mass, HEAVIEST * mass))
+    return knobs
 
 
 def _of_throw(scene: Scene) -> Knob:
@@ -171,7 +171,7 @@ def _of_gravity(scene: Scene) -> list[Knob]:
 
 
 def texts_of(knobs: tuple[Knob, ...], values: Mapping[str, float]) -> dict[str, str]:
-    """Write the values that differ from where the knobs stood, with their units."""
+    """Write the values of the knobs that were moved, with their units."""
     units = {knob.name: knob for knob in knobs}
     return {
         name: written(value, units[name].unit) for name, value in values.items() if value != units[name].value
@@ -179,7 +179,7 @@ def texts_of(knobs: tuple[Knob, ...], values: Mapping[str, float]) -> dict[str, 
 
 
 def scene_with(scene: Scene, knobs: tuple[Knob, ...], values: Mapping[str, float]) -> Scene:
-    """Give the scene with its knobs at other values; one that was not moved stays as it is written.
+    """Give the scene with its knobs at other values; quantities that were not moved stay as they are written.
 
     A tilt that is moved leaves the speed of the machine as it is, whether the scene gives a speed or kappa.
 
@@ -227,12 +227,12 @@ def knobs_of_map(params: Any) -> tuple[Knob, ...]:
     >>> [(knob.name, knob.lo, knob.hi) for knob in knobs_of_map(maps.Henon())]
     [('a', 0.7, 2.1), ('b', 0.15, 0.45)]
     """
-    found = []
+    knobs = []
     for name, value in zip(params._fields, params, strict=True):
         if isinstance(value, float | int | np.floating):
             ends = sorted((0.5 * float(value), 1.5 * float(value))) if value else [-1.0, 1.0]
-            found.append(Knob(name, name, "", float(value), round(ends[0], 9), round(ends[1], 9)))
-    return tuple(found)
+            knobs.append(Knob(name, name, "", float(value), round(ends[0], 9), round(ends[1], 9)))
+    return tuple(knobs)
 
 
 def map_with(params: Any, values: Mapping[str, float]) -> Any:
@@ -241,17 +241,17 @@ def map_with(params: Any, values: Mapping[str, float]) -> Any:
 
 
 # ----------------------------------------------------------------
-# What follows the sliders: attractors, basins, critical points and the goal's threshold, in some 10 ms.
+# Estimates while a slider moves: attractors, basins, critical points and the goal's threshold, in some 10 ms.
 
 
 CELLS = 2048
 """Cells per side."""
 
-# Of the orbits on which jogs are counted, and of the samples among which branches change.
+# Throws of the orbits on which jogs are counted; samples between which a change of branch is searched.
 THROWS, SAMPLES = 2000, 512
-# Points of a map in the plane, from so many starts; what an orbit runs through first is left out.
+# Points of a map in the plane, starts of their orbits, and first steps of each orbit that are left out.
 POINTS, STARTS, SKIP = 12_000, 8, 500
-# An orbit is gone that is so many sizes of the domain from its middle.
+# An orbit has left if it is this many sizes of the domain away from the middle of the domain.
 FAR = 100.0
 
 Extents = dict[int, list[tuple[float, float]]]
@@ -259,33 +259,33 @@ Extents = dict[int, list[tuple[float, float]]]
 
 @dataclass(frozen=True)
 class Estimate:
-    """What is estimated of one map of one dimension.
+    """The estimate of a map of one dimension.
 
     Attributes
     ----------
     lo, hi : tuple of float
-        Where a part can rest on each side [length].
+        Least and largest x at which a part can rest, by side [length].
     sets : tuple of dict
         Per attractor its intervals by side.
     bands : tuple of int
-        Per attractor how many intervals the compiled loop tells apart; 0 where it does not decide.
+        Per attractor the number of intervals that the compiled loop separates; 0 if it does not decide.
     sharp : bool
         Whether the points of cycles and the outermost ends of other attractors are those of the compiled loop;
         otherwise ends are edges of cells.
     orders : tuple
         Per attractor the flip order, None where it changes.
     shares : tuple of (int, float)
-        Of the starts, those of each label that occurs: a number of an attractor, or a code of an exit.
+        Share of the starts for each label that occurs: the number of an attractor, or the code of an exit.
     basins : tuple of (int, float, float, int)
         Side, ends, label.
     critical : tuple of (int, int, float)
         Side, number on the side, x.
     holds : bool or None
-        Whether the goal does; None where that is not decided, or there is no goal.
+        Whether the goal holds; None if this is not decided, or there is no goal.
     vacuous : bool
-        Whether it holds because nothing gets there.
+        Whether the goal holds only because no part gets to its x.
     threshold : float or None
-        Where the goal begins or ceases to hold.
+        The x at which the goal begins or ceases to hold.
     """
 
     lo: tuple[float, ...]
@@ -303,7 +303,7 @@ class Estimate:
 
 
 def estimate(scene: Scene) -> Estimate:
-    """Estimate where the throws of a scene lead.
+    """Estimate attractors and basins of a scene.
 
     Examples
     --------
@@ -331,16 +331,16 @@ def estimate_of_map(params: Any, domain: Domain) -> Estimate:
 
 def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
     graph = transitions(params, grid(domain, cells=CELLS))
-    found = attractors(graph, throws=THROWS)
-    split = basins(graph, found)
-    told = _told(params, domain, len(found))
-    sharpened = [_sharpened(each, params, told) for each in found]
+    limit_sets = attractors(graph, throws=THROWS)
+    split = basins(graph, limit_sets)
+    topology = _told(params, domain, len(limit_sets))
+    sharpened = [_sharpened(each, params, topology) for each in limit_sets]
     sets = tuple(extents for extents, _ in sharpened)
     goal: dict[str, Any] = {}
     if scene is not None and scene.goal is not None:
         from limitsets.parameters.analysis.checks import goal_outcome
 
-        outcome = goal_outcome(scene.goal, graph, found, split, sets)
+        outcome = goal_outcome(scene.goal, graph, limit_sets, split, sets)
         goal = {"holds": outcome.holds, "vacuous": outcome.vacuous, "threshold": outcome.threshold}
     labels, counts = np.unique(split.labels, return_inverse=True)
     weight = np.bincount(counts, weights=graph.grid.measure) / graph.grid.measure.sum()
@@ -348,12 +348,12 @@ def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
         tuple(domain.lo[:, 0].tolist()),
         tuple(domain.hi[:, 0].tolist()),
         sets,
-        tuple(bands for _, bands in sharpened),
-        told is not None,
-        tuple(each.flip_order for each in found),
-        tuple(zip(labels.tolist(), weight.tolist(), strict=True)),
-        tuple(_runs(split)),
-        tuple(
+        bands=tuple(bands for _, bands in sharpened),
+        sharp=topology is not None,
+        orders=tuple(each.flip_order for each in limit_sets),
+        shares=tuple(zip(labels.tolist(), weight.tolist(), strict=True)),
+        basins=tuple(_runs(split)),
+        critical=tuple(
             (side, number, point.x)
             for side, points in critical_points(params, domain, samples=SAMPLES).items()
             for number, point in enumerate(points)
@@ -363,50 +363,51 @@ def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
 
 
 def _told(params: Any, domain: Domain, count: int) -> Topologies | None:
-    """Ask the compiled loop of the atlas; None where it does not decide, or counts other attractors."""
+    """Ask the compiled loop of the atlas; None if it does not decide, or finds more or fewer attractors than cells."""
     if not has_slope(params) or not count:
         return None
     anchor = None if domain.anchor is None else domain.anchor[None]
-    found = topologies(stacked([params]), domain.lo[:, 0][None], domain.hi[:, 0][None], anchor)
-    return found if found.undecided[0] == DECIDED and found.attractors[0] == count else None
+    topology = topologies(stacked([params]), domain.lo[:, 0][None], domain.hi[:, 0][None], anchor)
+    return topology if topology.undecided[0] == DECIDED and topology.attractors[0] == count else None
 
 
-def _sharpened(attractor: Attractor, params: Any, told: Topologies | None) -> tuple[Extents, int]:
-    """Replace the cells of a cycle by its points, and move the outermost ends of other attractors to their own.
+def _sharpened(attractor: Attractor, params: Any, topology: Topologies | None) -> tuple[Extents, int]:
+    """Replace the cells of a cycle by its points, and the outermost ends of other attractors by exact ones.
 
-    Both where they lie in the cells, which may join what are several intervals; how many these are, 0 if not known.
+    Both happen only if points or ends lie in the attractor's cells, which may join several intervals.  The number of
+    these intervals comes second, 0 if it is not known.
     """
-    found = {side: list(parts) for side, parts in attractor.extents.items()}
-    for k in range(0 if told is None else int(told.attractors[0])):
-        assert told is not None  # the range is empty
-        lowest, reach, period = told.lowest[0, k], told.reach[0, k], int(told.period[0, k])
+    ends = {side: list(parts) for side, parts in attractor.extents.items()}
+    for k in range(0 if topology is None else int(topology.attractors[0])):
+        assert topology is not None  # the range is empty
+        lowest, reach, period = topology.lowest[0, k], topology.reach[0, k], int(topology.period[0, k])
         sides = [int(side) for side in np.flatnonzero(np.isfinite(lowest))]
-        if sides != sorted(found) or not all(
-            found[side][0][0] <= reach[side] and lowest[side] <= found[side][-1][1] for side in sides
+        if sides != sorted(ends) or not all(
+            ends[side][0][0] <= reach[side] and lowest[side] <= ends[side][-1][1] for side in sides
         ):
             continue
         if period:
-            cycle = orbit(params, float(told.start[0, k]), int(told.start_side[0, k]), period - 1)
+            cycle = orbit(params, float(topology.start[0, k]), int(topology.start_side[0, k]), period - 1)
             points = {side: np.sort(cycle.x[cycle.side == side]).tolist() for side in sides}
             return {side: [(x, x) for x in points[side]] for side in sides}, period
         for side in sides:
-            found[side][0] = float(lowest[side]), found[side][0][1]
-            found[side][-1] = found[side][-1][0], float(reach[side])
-        return found, int(told.bands[0, k].sum())
-    return found, 0
+            ends[side][0] = float(lowest[side]), ends[side][0][1]
+            ends[side][-1] = ends[side][-1][0], float(reach[side])
+        return ends, int(topology.bands[0, k].sum())
+    return ends, 0
 
 
 def _runs(split: Basins) -> list[tuple[int, float, float, int]]:
     """Join cells of one label that lie side by side."""
-    found = []
+    runs = []
     for side in range(split.grid.sides):
         edges, labels = split.grid.edges[side][0], split.labels[split.grid.of_side(side)]
         if not labels.size:
             continue
         border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
         for first, last in pairwise(border.tolist()):
-            found.append((side, float(edges[first]), float(edges[last]), int(labels[first])))
-    return found
+            runs.append((side, float(edges[first]), float(edges[last]), int(labels[first])))
+    return runs
 
 
 class Points(NamedTuple):
@@ -415,11 +416,11 @@ class Points(NamedTuple):
     Attributes
     ----------
     x : ndarray of shape (n, dimension)
-        Of the orbits that stay.
+        Points of the orbits that stay.
     starts : int
-        How many orbits there were.
+        Number of orbits.
     gone : dict of str to int
-        Where the others went, in words, and how many of them.
+        Number of the other orbits, by the place where they left, in words.
     """
 
     x: npt.NDArray[np.float64]
@@ -430,7 +431,7 @@ class Points(NamedTuple):
 def points_of_map(params: Any, domain: Domain) -> Points:
     """Sample the attractors of a map of two or three dimensions by orbits from a few starts.
 
-    Orbits that leave are left out: no points where all of them do.
+    Orbits that leave are left out: there are no points if all of them leave.
 
     Examples
     --------
@@ -444,7 +445,7 @@ def points_of_map(params: Any, domain: Domain) -> Points:
     """
     share = np.array([0.5 + 0.5 * math.cos(2.4 * k) * math.sqrt((k + 0.5) / STARTS) for k in range(STARTS)])
     other = np.roll(share, 3)
-    found, gone = [np.empty((0, kind_of(params).dimension))], Counter[str]()
+    samples, gone = [np.empty((0, kind_of(params).dimension))], Counter[str]()
     for side in range(domain.sides):
         lo, hi = domain.lo[side], domain.hi[side]
         for k in range(STARTS):
@@ -454,12 +455,12 @@ def points_of_map(params: Any, domain: Domain) -> Points:
             if fate:
                 gone[fate] += 1
             else:
-                found.append(path.x[SKIP:])
-    return Points(np.concatenate(found), STARTS * domain.sides, dict(gone))
+                samples.append(path.x[SKIP:])
+    return Points(np.concatenate(samples), STARTS * domain.sides, dict(gone))
 
 
 def _fate(path: Orbit, lo: npt.NDArray[np.float64], hi: npt.NDArray[np.float64]) -> str:
-    """Say where an orbit goes that does not stay within many times the size of where the map is looked at."""
+    """Say where an orbit leaves the surroundings of the domain, `FAR` times its size; empty if it stays."""
     far = (path.x - 0.5 * (lo + hi)) / (hi - lo)
     gone = np.flatnonzero(~(np.abs(far) <= FAR).all(axis=1))
     if not gone.size:

@@ -1,7 +1,7 @@
-"""The page of a scene, and that of a map: sliders, pictures and answers, and what happens when they are touched.
+"""The pages of a scene and of a map: sliders, pictures and answers, and their reactions to the visitor.
 
-Everything that moves is done by `beat`, some sixty times a second: slider events only say that something has changed,
-so that a hand that is faster than the computation leaves no queue behind.
+`beat`, called some sixty times a second, does all the drawing: slider events only mark the page as changed, so that a
+hand that is faster than the computation leaves no queue.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from limitsets.feeder.scene.left_out import Model
 from limitsets.systems.cells import Domain
 
 # ----------------------------------------------------------------
-# The page of a map: its parameters as sliders, and where it leads.
+# The page of a map: its parameters as sliders, and its attractors.
 
 
 WORDS = 0.25
@@ -52,14 +52,14 @@ WORDS = 0.25
 
 
 class MapPage:
-    """What one visitor sees of a map.
+    """The page of one visitor who looks at a map.
 
     Parameters
     ----------
     params : NamedTuple
         The map's parameters.
     domain : Domain
-        Where it is looked at.
+        The part of the state space that is shown.
     """
 
     def __init__(self, params: Any, domain: Domain) -> None:
@@ -93,7 +93,7 @@ class MapPage:
         self._dirty = True
 
     def beat(self) -> None:
-        """Draw what has changed."""
+        """Draw the changes."""
         if not self._told and time.monotonic() - self._wrote > WORDS:
             self._told, self._wrote = True, time.monotonic()
             self.sliders.tell()
@@ -109,12 +109,12 @@ class MapPage:
                 self.points.show(points.x)
                 self._words = points_words(points)
             else:
-                found = estimate_of_map(params, self._domain)
+                answer = estimate_of_map(params, self._domain)
                 if self._refit:
-                    self.lanes.frame(found, "")
+                    self.lanes.frame(answer, "")
                     self._refit = False
-                self.lanes.show(found)
-                self._words = estimate_words(found, None, "")
+                self.lanes.show(answer)
+                self._words = estimate_words(answer, None, "")
         except LimitsetsError as error:
             self.say(error)
         else:
@@ -122,15 +122,15 @@ class MapPage:
         self._shown.canvas.send()
 
     def close(self) -> None:
-        """Nothing is being computed."""
+        """Do nothing: a map has no running computations."""
 
 
 # ----------------------------------------------------------------
-# The page of a scene: one visitor's sliders, pictures and answers, and what happens when they are touched.
+# The page of a scene: one visitor's sliders, pictures and answers, and their reactions to the visitor.
 
 
 RESTS = 0.6
-"""Seconds after which a slider that is not moved rests."""
+"""Seconds without a move after which a slider counts as at rest."""
 
 
 THROWS, FPS, SLOW = 6, 20.0, 2.0
@@ -140,14 +140,14 @@ SAVE: dict[str, Any] = {"stylesheets": [SLIDER], "sizing_mode": "stretch_width"}
 
 
 class ScenePage:
-    """What one visitor sees of a scene.
+    """The page of one visitor who looks at a scene.
 
     Parameters
     ----------
     scene : Scene
-        Where it begins.
+        The scene shown first.
     atlas : dict, optional
-        Of a stored atlas, as `limitsets.face.explorer.work.table_of` gives it.
+        The table of a stored atlas, as `limitsets.face.explorer.work.table_of` gives it.
     """
 
     def __init__(self, scene: Scene, atlas: dict[str, Any] | None = None) -> None:
@@ -210,7 +210,7 @@ class ScenePage:
                 part(reset, self._toml, svg, self.opening.column, room="1 1 300px"),
                 **wide,
             ),
-            pn.FlexBox(  # a line that comes or goes moves nothing that a hand may be on
+            pn.FlexBox(  # a line that appears or disappears does not shift the controls under the visitor's hand
                 part(self._careful, self._estimated, room="1 1 330px"),
                 part(self._proved, room="1 1 330px"),
                 **wide,
@@ -221,7 +221,7 @@ class ScenePage:
 
     @property
     def _of(self) -> str:
-        """Of which model the page speaks, and which facts of the scene that leaves out."""
+        """The model of the page, and the facts of the scene that the model leaves out."""
         return Model.of(self.scene).line()
 
     def say(self, error: object = "") -> None:
@@ -231,7 +231,7 @@ class ScenePage:
     # ------------------------------------------------------------ what happens
 
     def open(self, scene: Scene) -> None:
-        """Begin with a scene."""
+        """Show another scene."""
         self.base, self.scene = scene, scene
         self.sliders.open(knobs_of(scene))
         self.opening.show(scene)
@@ -241,11 +241,11 @@ class ScenePage:
         self._moved()
 
     def _moved(self) -> None:
-        """Remember that something has changed; `beat` draws it."""
+        """Mark the page as changed; `beat` draws it."""
         self._dirty, self._asked, self._last, self._film = True, False, time.monotonic(), None
 
     def beat(self) -> None:
-        """Do what is due: draw what has changed, show the next frame of a film, ask for proofs, tell their answers."""
+        """Do the next step: draw changes, show the next frame of a film, ask for proofs, show their answers."""
         if self._dirty:
             self._dirty = False
             try:
@@ -269,18 +269,18 @@ class ScenePage:
         self.atlas.tell()
 
     def _redraw(self, scene: Scene) -> None:
-        found = estimate(scene)
+        answer = estimate(scene)
         self.scene = scene
         self.say()
         if self._refit:
-            self.lanes.frame(found, scene.unit)
+            self.lanes.frame(answer, scene.unit)
             self._title.object = (
                 f"<h1>limitsets: {scene.name}</h1>"  # a name of letters, digits, dots and dashes
             )
             self._refit = False
         if not self._startable(scene):
             side, parts = (
-                next(iter(found.sets[0].items())) if found.sets else (0, [(found.lo[0], found.hi[0])])
+                next(iter(answer.sets[0].items())) if answer.sets else (0, [(answer.lo[0], answer.hi[0])])
             )
             self.start = 0.5 * sum(parts[0]), side
             self._x.value, self._side.value = round(self.start[0], 3), side
@@ -288,9 +288,9 @@ class ScenePage:
         self.part.show(scene)
         self.arm.rest(scene, *self.start)
         self.lanes.mark(*self.start)
-        self.lanes.show(found, scene)
-        self._found, self._told = found, False
-        self._proofs.stop()  # also where nothing is answered yet: an answer would be of another scene
+        self.lanes.show(answer, scene)
+        self._found, self._told = answer, False
+        self._proofs.stop()  # also before the first answer: a later answer would be of another scene
         self._lines = []
         self._proved.object = proof_words([], (), "waits until the sliders rest", self._of)
 
@@ -339,7 +339,7 @@ class ScenePage:
             if film.position[number].tolist() == [
                 last.x,
                 last.side,
-            ]:  # it has not left: the arm is near again
+            ]:  # the part has not left: show the arm close up again
                 self.arm.rest(self.scene, last.x, last.side)
 
     def _on_lanes(self, hand: Hand) -> None:
@@ -347,7 +347,7 @@ class ScenePage:
             self.throw(hand.x, round(-hand.y))
 
     def _on_part(self, hand: Hand) -> None:
-        """Move the centre of mass with a hand that began on its mark; a tap is a corner, while a part is drawn."""
+        """Move the centre of mass with a drag that began on its mark; while a part is drawn, a tap adds a corner."""
         if hand.what == "tap":
             self.opening.corner(hand.x, hand.y)
         elif hand.what == "grasp":
@@ -373,12 +373,12 @@ class ScenePage:
     def _svg(self) -> io.BytesIO:
         from limitsets.face.plot import limit_set
 
-        found, written = estimate(self.scene), io.BytesIO()
-        limit_set(self.scene, found.sets).savefig(written, format="svg")
+        answer, written = estimate(self.scene), io.BytesIO()
+        limit_set(self.scene, answer.sets).savefig(written, format="svg")
         written.seek(0)
         return written
 
     def close(self) -> None:
-        """End what is still being computed."""
+        """End running computations."""
         self._proofs.stop()
         self.atlas.close()

@@ -1,4 +1,4 @@
-"""The pictures of the part, of the arm, of where parts come to rest, and of where a map leads."""
+"""The pictures of the part, of the arm, of the places of rest, and of the attractors of a map."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from limitsets.feeder.scene.units import convert, parse
 Array = npt.NDArray[np.float64]
 
 PART, ARM, TRAIL = "#F2C14E", "#9a9a9a", "#666666"
-# How thick the arm is, of its length.
+# Thickness of the arm, as a share of its length.
 THICK = 0.02
 
 
@@ -42,18 +42,18 @@ BARE = (6, 6, 24, 6)
 """Margins of a picture without axes [pixel]."""
 
 PAD = 0.08
-"""Room around what has to be in sight, of its size."""
+"""Room around the shapes in sight, as a share of their size."""
 
 
 def _see(canvas: Canvas, corners: Array) -> None:
-    """Keep corners in sight."""
+    """Set the view such that the corners are in sight."""
     lo, hi = corners.min(axis=0), corners.max(axis=0)
     room = PAD * (hi - lo)
     canvas.view["x"], canvas.view["y"] = np.stack([lo - room, hi + room]).T.tolist()
 
 
 def _short(mass: str) -> str:
-    """Write a mass with as many digits as a slider tells."""
+    """Write a mass with as many digits as its slider shows."""
     given = parse(mass, "mass")
     return f"{convert(given, given.unit):.4g} {given.unit}"
 
@@ -64,7 +64,7 @@ def _words(colour: str = style.INK, size: int = 12, **look: Any) -> Layer:
 
 
 class PartPicture:
-    """The part by itself: outline, numbers of its sides, centre of mass; and corners that are being drawn."""
+    """The part alone: outline, numbers of its sides, centre of mass, and the corners of a part that is being drawn."""
 
     def __init__(self, touched: Callable[[Hand], None]) -> None:
         self._outline = Layer("path", "outline", line=style.INK, width=1.5, fill=PART)
@@ -117,13 +117,13 @@ class PartPicture:
         _see(self.canvas, scene.vertices)
 
     def is_at_mark(self, x: float, y: float) -> bool:
-        """Whether a place is as near to the mark as a finger can tell: an eighth of the part's size."""
+        """Whether a place is within a finger's width of the mark: an eighth of the part's size."""
         (cx,), (cy,) = self.centre.data["x"], self.centre.data["y"]
         size = np.ptp(np.array([self._outline.data["x"], self._outline.data["y"]]), axis=1).max()
         return float(np.hypot(x - cx, y - cy)) <= 0.125 * float(size)
 
     def sketch(self, corners: Sequence[tuple[float, float]]) -> None:
-        """Show corners that are being drawn, closed once there are three."""
+        """Show the corners of a part that is being drawn; the outline is closed once there are three."""
         closed = [*corners, *corners[:1]] if len(corners) > 2 else list(corners)
         self.corners.data = self._dots.data = {"x": [x for x, _ in closed], "y": [y for _, y in closed]}
 
@@ -156,7 +156,7 @@ class ArmPicture:
         self.canvas.heading = f"the arm, {end:g} {scene.unit}; x = {x:.2f} on side {side}"
 
     def begin(self, film: Film) -> None:
-        """Choose what is in sight for a whole film."""
+        """Choose the view for a whole film."""
         assert film.surface is not None  # of throws on the arm
         places = film.poses[:, 0, :2]
         size = float(np.hypot(*film.outlines[0].T).max())
@@ -198,15 +198,16 @@ class ArmPicture:
 
 
 # ----------------------------------------------------------------
-# The pictures of where parts come to rest, and of where a map leads.
+# The pictures of the places of rest, and of the attractors of a map.
 
 
 MARGINS = (52, 12, 24, 38)
-"""Left, right, above and below the frame, where axes and words are [pixel]."""
+"""Room for axes and words to the left, right, top and bottom of the frame [pixel]."""
 
 PIXELS, FEW = 500, 40
 """Points of a plane map at so few places, in a picture so wide, are a cycle: they are drawn so that they are seen."""
 
+BARS = ("left", "right", "bottom", "top", "face", "hatch")
 WRITTEN = ("x", "y", "words", "align")
 
 
@@ -214,9 +215,8 @@ class LanesPicture:
     """A lane for each side: basins as strips, limit sets as bars in them, critical points, the goal, the start."""
 
     def __init__(self, touched: Callable[[Hand], None] | None = None) -> None:
-        bars = "left", "right", "bottom", "top", "face", "hatch"
-        self._basins = Layer("bars", "basins", columns=bars, line="#777777")
-        self._sets = Layer("bars", "limit sets", columns=bars, line=style.INK)
+        self._basins = Layer("bars", "basins", columns=BARS, line="#777777")
+        self._sets = Layer("bars", "limit sets", columns=BARS, line=style.INK)
         stroke = "x", "y0", "y1"
         self._critical = Layer("strokes", "critical points", columns=stroke, line=style.INK, width=3)
         self._goal = Layer("path", "goal", line=style.GOAL, width=2.5, dash=[2, 4])
@@ -237,9 +237,9 @@ class LanesPicture:
         layers = [*shapes, self._points, self._limit, self._asked]
         self.canvas = Canvas("lanes", layers, 285, touched, margins=MARGINS, across="x", up="", lanes=[])
 
-    def frame(self, found: Estimate, unit: str) -> None:
-        """Lay the lanes out."""
-        count, lo, hi = len(found.lo), min(found.lo), max(found.hi)
+    def frame(self, estimate: Estimate, unit: str) -> None:
+        """Set axes and lanes."""
+        count, lo, hi = len(estimate.lo), min(estimate.lo), max(estimate.hi)
         room = 0.01 * (hi - lo)
         self.canvas.view |= {
             "x": [min(lo, 0.0) - room, hi + room],
@@ -248,45 +248,45 @@ class LanesPicture:
             "lanes": [f"side {side}" for side in range(count)],
         }
 
-    def show(self, found: Estimate, scene: Scene | None = None) -> None:
+    def show(self, estimate: Estimate, scene: Scene | None = None) -> None:
         """Draw an estimate."""
         rows = [
-            (lo, hi, -side - 0.3, -side + 0.3, *look_of(label)[:2]) for side, lo, hi, label in found.basins
+            (lo, hi, -side - 0.3, -side + 0.3, *look_of(label)[:2]) for side, lo, hi, label in estimate.basins
         ]
-        self._basins.data = _columns(rows, "left", "right", "bottom", "top", "face", "hatch")
+        self._basins.data = _columns(rows, *BARS)
         rows = []
-        for k, extents in enumerate(found.sets):
+        for k, extents in enumerate(estimate.sets):
             face, hatch = style.SETS[k % len(style.SETS)]
             for side, parts in extents.items():
                 rows += [(lo, hi, -side - 0.14, -side + 0.14, face, pattern(hatch)) for lo, hi in parts]
-        self._sets.data = _columns(rows, "left", "right", "bottom", "top", "face", "hatch")
-        marks = [(x, -side - 0.3, -side + 0.3) for side, _, x in found.critical]
+        self._sets.data = _columns(rows, *BARS)
+        marks = [(x, -side - 0.3, -side + 0.3) for side, _, x in estimate.critical]
         self._critical.data = _columns(marks, "x", "y0", "y1")
         names = [
             (x, -side - 0.3, f"r{side}{chr(39) * number} {x:.2f}", "center", f"r{side}{chr(39) * number}")
-            for side, number, x in found.critical
+            for side, number, x in estimate.critical
         ]
         self._points.data = _columns(names, *WRITTEN, "short")
         goal = None if scene is None else scene.goal
         asked: list[tuple[Any, ...]] = []
         if scene is not None and isinstance(goal, OrientedBeyond | Reaches):
-            align = "right" if goal.x > 0.5 * max(found.hi) else "left"
+            align = "right" if goal.x > 0.5 * max(estimate.hi) else "left"
             asked = [(goal.x, 0.62, f" goal: side {goal.side} from {goal.x:g} {scene.unit} on ", align)]
-        ends = [(x, y) for x, *_ in asked for y in (0.15 - len(found.lo), 0.55)]
+        ends = [(x, y) for x, *_ in asked for y in (0.15 - len(estimate.lo), 0.55)]
         self._goal.data, self._asked.data = _columns(ends, "x", "y"), _columns(asked, *WRITTEN)
-        low = 0.28 - len(found.lo)
-        at = [] if found.threshold is None else [found.threshold]
+        low = 0.28 - len(estimate.lo)
+        at = [] if estimate.threshold is None else [estimate.threshold]
         limits = [(x, low, f"threshold {x:.3f}", "right") for x in at]
         self._threshold.data = self._limit.data = _columns(limits, *WRITTEN)
-        self.canvas.heading = f"estimate: limit sets, basins{', critical points' * bool(found.critical)}"
+        self.canvas.heading = f"estimate: limit sets, basins{', critical points' * bool(estimate.critical)}"
 
     def mark(self, x: float, side: float) -> None:
-        """Show where the part is."""
+        """Mark the place of the part."""
         self._start.data = {"x": [x], "y": [0.22 - side]}
 
 
 class PointsPicture:
-    """Points of the attractors of a map of two or three dimensions, of which the first two coordinates are shown."""
+    """The first two coordinates of points on the attractors of a map of two or three dimensions."""
 
     def __init__(self, lo: Sequence[float], hi: Sequence[float]) -> None:
         self._points = Layer("dots", "points", colour=style.JOG)
@@ -298,7 +298,7 @@ class PointsPicture:
         self.canvas.view |= dict(zip("xy", ends.T.tolist(), strict=True))
 
     def show(self, points: Array) -> None:
-        """Draw them; an axis follows once they come to its end, or fill less than a quarter of what they could."""
+        """Draw points; an axis is set anew once they come to its end, or fill less than a quarter of it."""
         if len(points):
             lo, hi = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
             room = 0.5 * np.maximum(hi - lo, 0.1 * self._size)

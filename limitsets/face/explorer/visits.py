@@ -26,13 +26,13 @@ from limitsets.systems.maps import coerce, domain_of, kind_of
 from limitsets.systems.maps.contract import require_dimension
 
 # ----------------------------------------------------------------
-# A server for the page: on this machine alone, unless another address and who may come are named.
+# A server for the page: on this machine alone, unless another address and its allowed visitors are given.
 
 
 HERE = "127.0.0.1"
 
 MOST_SENT = 1 << 20
-"""Bytes of one message of a visitor."""
+"""Largest size of a message of a visitor [bytes]."""
 
 
 def serve(
@@ -47,7 +47,7 @@ def serve(
 ) -> None:
     """Serve the page until Ctrl-C; all that a browser asks for comes from this server.
 
-    What the other arguments are says `limitsets.face.explorer.visits.Explorer.show`.
+    The other arguments are those of `limitsets.face.explorer.visits.Explorer.show`.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def serve(
     Raises
     ------
     LimitsetsError
-        The port is taken, or nobody is allowed to come.
+        The port is taken, or no visitor is allowed.
     """
     here = address in (HERE, "localhost")
     if not here and not origins:
@@ -80,10 +80,10 @@ def serve(
         show=False,
         start=False,
         title=f"limitsets: {title}",
-        verbose=False,  # `ready` says where it listens
+        verbose=False,  # `ready` prints the address
         websocket_max_message_size=MOST_SENT,
     )
-    logging.getLogger("bokeh").setLevel(logging.ERROR)  # a visitor who leaves is no warning
+    logging.getLogger("bokeh").setLevel(logging.ERROR)  # a visitor who leaves is no cause for a warning
     server.io_loop.asyncio_loop.set_exception_handler(_gone)
     server.start()
     ready(f"http://{address}:{chosen}")
@@ -93,7 +93,7 @@ def serve(
 
 
 def _gone(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Pass over what could not be sent any more because a visitor has left."""
+    """Ignore messages that could not be sent because a visitor has left."""
     if not isinstance(context.get("exception"), WebSocketClosedError):
         loop.default_exception_handler(context)
 
@@ -111,7 +111,7 @@ def _free_port(address: str, port: int) -> int:
 
 
 # ----------------------------------------------------------------
-# Visitors: each has a page of his own, in a browser or in a notebook, and a beat that moves it.
+# Visitors: each has a separate page, in a browser or in a notebook, and a beat that moves it.
 
 
 COMPILING = "compiling, once: the throw, images of cells, attractors"
@@ -126,7 +126,7 @@ def _say(address: str) -> None:
 
 
 class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not followed
-    """A scene or a map that can be looked at: whoever looks gets a page of his own.
+    """A scene or a map to look at: every visitor gets a separate page.
 
     Attributes
     ----------
@@ -161,11 +161,11 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
         return cls(lambda: MapPage(chosen, where), type(chosen).__name__)
 
     def __repr__(self) -> str:
-        """Say how it is looked at."""
+        """Say how to look at it."""
         return f"<explorer of {self.title}: .show() serves it, a notebook shows it>"
 
     def __panel__(self) -> pn.viewable.Viewable:
-        """Make the page of one visitor, and let it beat as long as he stays."""
+        """Make the page of one visitor, and let it beat until the visitor leaves."""
         page = self.page()
         document = pn.state.curdoc
         if document is not None and document.session_context is not None:
@@ -177,16 +177,16 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
         return page.layout
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> Any:
-        """Show it in a notebook, where Panel is not loaded yet with scripts that come from no other server."""
+        """Show the page in a notebook; load Panel first if needed, with scripts that come from no other server."""
         if not in_notebook():
             return None
-        if not pn.extension._loaded:  # noqa: SLF001 - Panel says it nowhere else
+        if not pn.extension._loaded:  # noqa: SLF001 - Panel gives this nowhere else
             pn.extension(inline=True)
         self._compile()
         return super()._repr_mimebundle_(include, exclude)
 
     def prepare(self, progress: Progress) -> None:
-        """Make one page, so that what is not compiled yet is compiled before a visitor waits for it."""
+        """Make one page, so that all kernels are compiled before the first visitor comes."""
         progress(COMPILING, 0, 1)
         self.page().close()
         self._prepared = True
@@ -210,34 +210,34 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
         Parameters
         ----------
         address : str
-            Where it listens: by default for this machine alone.
+            The address of the server: by default reachable from this machine alone.
         port : int
-            0 for any that is free.
+            The port; 0 for any free port.
         origins : sequence of str
-            Names, with ports, under which browsers may ask: needed for any other address.
+            Names, with ports, by which browsers may address the server: needed for any other address.
         show : bool
             Whether to open a browser.
         ready : callable
-            Told the page's address once it listens; prints it by default.
+            Called with the page's address once the server listens; prints it by default.
 
         Raises
         ------
         LimitsetsError
-            The port is taken, or nobody is allowed to come.
+            The port is taken, or no visitor is allowed.
         """
         self._compile()
         serve(self.__panel__, self.title, address=address, port=port, origins=origins, show=show, ready=ready)
 
 
 def _beating(beat: Callable[[], None]) -> None:
-    """Beat, in the background: nobody is told that the server is busy, at each beat."""
+    """Beat in the background, without Panel's sign that the server is busy."""
     PeriodicCallback(callback=beat, period=BEAT, background=True).start()
 
 
 class _UnderACell(pn.Column):  # type: ignore[misc]  # panel is not followed
     """A page in a notebook, which beats once its pictures are on a screen.
 
-    News that come before would put Panel's messages out of step for good.
+    Messages before that would put Panel's messages out of step for good.
     """
 
     def __init__(self, page: ScenePage | MapPage) -> None:
@@ -246,7 +246,7 @@ class _UnderACell(pn.Column):  # type: ignore[misc]  # panel is not followed
         _beating(self._beat)
 
     def _on_msg(self, *message: Any) -> None:
-        """Take what the browser says where the page beats; JupyterLab hands it over in a thread of its own."""
+        """Take a message of the browser in the thread of the page's beat; JupyterLab delivers it in another thread."""
         self._loop.call_soon_threadsafe(super()._on_msg, *message)
 
     def _beat(self) -> None:

@@ -1,6 +1,6 @@
-"""What takes seconds, in a process of its own, ``python -m limitsets.face.explorer.work``: proofs, margins, an atlas.
+"""Slow computations in a separate process, ``python -m limitsets.face.explorer.work``: proofs, margins, an atlas.
 
-It reads one question as JSON from standard input, and answers with lines of JSON as the answers come.
+The process reads one question as JSON from standard input, and answers with lines of JSON as the answers come.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ if TYPE_CHECKING:
 
 
 MOST_BYTES = 64 * 1024
-"""Of a scene's text: the largest that comes with the package has 2 kB."""
+"""Largest size of a scene's text [bytes]: the largest built-in scene has 2 kB."""
 
 MOST_SIDES = 16
-"""Of a part: the work of a picture grows with them."""
+"""Largest number of a part's sides: the work for a picture grows with it."""
 
 
 def scene_from(text: str) -> Scene:
     r"""Read a scene that a visitor typed or sent.
 
-    Whatever it is, it is read as TOML: a name of a file or of a built-in scene is not looked up.
+    Every text is read as TOML: names of files or of built-in scenes are not looked up.
 
     Raises
     ------
     SceneError
-        It is too large, no TOML, or no scene.
+        The text is too large, no TOML, or no scene.
 
     Examples
     --------
@@ -116,7 +116,7 @@ def _sides_in(goal: Any) -> list[int]:
     return [each for each in goal if isinstance(each, int)] if isinstance(goal, list) else []
 
 
-# Points along each axis of a stored atlas that are shown; the rest would be smaller than a finger.
+# Points along each axis of a stored atlas that are shown: more would be smaller than a finger.
 MOST_SHOWN = 48
 
 
@@ -155,14 +155,14 @@ def _proofs(scene: Scene, margins: list[str]) -> Iterator[dict[str, Any]]:
         return
     for name in margins:
         try:
-            (found,) = margin(scene, name, reading="fixed")
+            (bracket,) = margin(scene, name, reading="fixed")
         except LimitsetsError as error:
             yield {"margin": name, "error": str(error)}
             continue
-        refuted = None if found.refuted is None else bound(found.refuted, found.unit, up=True)
+        refuted = None if bracket.refuted is None else bound(bracket.refuted, bracket.unit, up=True)
         yield {
             "margin": name,
-            "proved": bound(found.proved, found.unit)
+            "proved": bound(bracket.proved, bracket.unit)
             + (f" {WITHOUT_SCATTER}" if scene.effects.spread else ""),
             "refuted": refuted,
         }
@@ -180,7 +180,7 @@ def table_of(data: xr.Dataset) -> dict[str, Any]:
     Raises
     ------
     LimitsetsError
-        It has not two axes, or says nothing of classes.
+        The atlas does not have two axes, or has no classes.
     """
     from limitsets.face.plot.atlas_maps import look_of
     from limitsets.parameters.atlas.classes import is_classified, legend, numbers_of

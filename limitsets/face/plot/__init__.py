@@ -8,8 +8,8 @@ is in colour alone: lines have styles, areas hatches, points markers.  No window
 with the object interface.  A file never has the name of a function of the room: after an
 import of that file `plot.map` would be a module.
 
-A file is imported where one of its functions is first asked for: what the maps of an atlas need is not loaded for a
-limit set.
+A file is imported at the first use of one of its functions, so that a limit set does not load the libraries for maps
+of an atlas.
 """
 
 import sys

@@ -44,30 +44,30 @@ if TYPE_CHECKING:
 # What the pictures of an atlas share: axes, pixels about the points, hatches, and the mark of the scene itself.
 
 
-def title_of(found: Atlas) -> str:
-    """Name what is varied."""
-    return str(found.dataset.attrs.get("title", "")).removeprefix("atlas of ")
+def title_of(answers: Atlas) -> str:
+    """Give the title: the names of the varied quantities."""
+    return str(answers.dataset.attrs.get("title", "")).removeprefix("atlas of ")
 
 
-# Hatch of points at which no part gets to the X of the goal: another than those of the classes in `atlas_maps`.
+# Hatch of points at which no part gets to the X of the goal; it differs from the hatches of classes.
 UNREACHED = "oo"
 
 
-def frame(found: Atlas, tall: float = 0.0) -> tuple[Figure, Axes]:
+def frame(answers: Atlas, tall: float = 0.0) -> tuple[Figure, Axes]:
     """Make a figure with its axes labelled, flat where one quantity varies, but at least so tall [inches]."""
-    names = found.axes
+    names = answers.axes
     figure, (axes,) = style.canvas(10.2, max(5.4 if len(names) == 2 else 2.6, tall))
-    axes.set_xlabel(_with_unit(found, names[-1]))
+    axes.set_xlabel(_with_unit(answers, names[-1]))
     if len(names) == 2:
-        axes.set_ylabel(_with_unit(found, names[0]))
-    x, y = pixels(found)
+        axes.set_ylabel(_with_unit(answers, names[0]))
+    x, y = pixels(answers)
     axes.set_xlim(x[0], x[-1])
     axes.set_ylim(y[0], y[-1])
     return figure, axes
 
 
-def _with_unit(found: Atlas, name: str) -> str:
-    unit = found.dataset[name].attrs.get("units", "")
+def _with_unit(answers: Atlas, name: str) -> str:
+    unit = answers.dataset[name].attrs.get("units", "")
     return f"{name} [{unit}]" if unit else name
 
 
@@ -79,9 +79,9 @@ def edges(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
 
 
-def pixels(found: Atlas) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def pixels(answers: Atlas) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Edges of the pixels along x and along y."""
-    data, names = found.dataset, found.axes
+    data, names = answers.dataset, answers.axes
     across = edges(data[names[-1]].values)
     return across, edges(data[names[0]].values) if len(names) == 2 else np.array([0.0, 1.0])
 
@@ -111,14 +111,14 @@ def hatched(
     )  # fmt: skip
 
 
-def goal_line(axes: Axes, found: Atlas) -> list[Any]:
-    """Draw where the scene's goal begins or ceases to hold, ticks where it fails; the entry of a legend."""
-    data = found.dataset
+def goal_line(axes: Axes, answers: Atlas) -> list[Any]:
+    """Draw the line at which the goal begins or ceases to hold, ticks where it fails; return the legend's entry."""
+    data = answers.dataset
     if "threshold" not in data:
         return []
     from limitsets.feeder.goals import OrientedBeyond
 
-    goal = _goal_of(found)
+    goal = _goal_of(answers)
     over = (data["threshold"].values - goal.x) * (1 if isinstance(goal, OrientedBeyond) else -1)
     fails = over[np.isfinite(over)] > 0.0
     if fails.all() or not fails.any():
@@ -128,13 +128,13 @@ def goal_line(axes: Axes, found: Atlas) -> list[Any]:
         )
     ticks: dict[str, Any] = {"spacing": 8.0, "length": 0.6}
     looks = [Stroke(linewidth=3.2, foreground="white"), Normal()]
-    names = found.axes
+    names = answers.axes
     if len(names) == 2:
         xs, ys = (data[name].values for name in reversed(names))
         line = axes.contour(
             xs, ys, np.ma.masked_invalid(over), [0.0], colors=style.GOAL, linewidths=1.6, zorder=4
         )
-        # a contour has the higher values on its left
+        # higher values are on the left of a contour
         line.set(path_effects=[*looks, withTickedStroke(angle=90, **ticks)], gid="goal")
     else:
         x = data[names[0]].values
@@ -150,31 +150,31 @@ def goal_line(axes: Axes, found: Atlas) -> list[Any]:
     ]
 
 
-def _goal_of(found: Atlas) -> Any:
-    """Read the goal of an atlas that says thresholds: only these two kinds have one."""
+def _goal_of(answers: Atlas) -> Any:
+    """Read the goal of an atlas with thresholds: only these two kinds of goal have one."""
     from limitsets.feeder.goals import OrientedBeyond, Reaches
     from limitsets.feeder.scene import load
 
-    goal = load(found.dataset.attrs["scene"]).goal
+    goal = load(answers.dataset.attrs["scene"]).goal
     assert isinstance(goal, OrientedBeyond | Reaches)
     return goal
 
 
-def unreached(axes: Axes, found: Atlas) -> list[Any]:
-    """Hatch where no part gets to the goal's X: a goal that asks of parts beyond X holds there of none.
+def unreached(axes: Axes, answers: Atlas) -> list[Any]:
+    """Hatch points at which no part gets to the goal's X: there a goal about parts beyond X holds of no part.
 
     Returns the entry of a legend.
     """
-    data = found.dataset
+    data = answers.dataset
     if "threshold" not in data or "reach" not in data:
         return []
-    goal = _goal_of(found)
+    goal = _goal_of(answers)
     reach = np.where(np.isnan(data["reach"].values), -np.inf, data["reach"].values)
     farthest = reach.reshape(*data["threshold"].shape, -1, reach.shape[-1]).max(axis=(-2, -1))
     none = np.isfinite(farthest) & (farthest <= goal.x)
     if not none.any():
         return []
-    hatched(axes, *pixels(found), np.atleast_2d(none), UNREACHED)
+    hatched(axes, *pixels(answers), np.atleast_2d(none), UNREACHED)
     return [
         Patch(
             label=f"no part gets to x = {goal.x:g}", hatch=UNREACHED, fill=False, edgecolor=style.INK, lw=0.5
@@ -182,11 +182,11 @@ def unreached(axes: Axes, found: Atlas) -> list[Any]:
     ]
 
 
-def mark(axes: Axes, found: Atlas) -> list[Any]:
-    """Mark the scene or map itself, if it lies in the window; the entry of a legend."""
+def mark(axes: Axes, answers: Atlas) -> list[Any]:
+    """Mark the scene or map itself, if it lies in the window; return the legend's entry."""
     values = []
-    for name in found.axes:
-        value, given = _value_of(found, name), found.dataset[name].values
+    for name in answers.axes:
+        value, given = _value_of(answers, name), answers.dataset[name].values
         if value is None or not given[0] <= value <= given[-1]:
             return []
         values.append(value)
@@ -201,12 +201,12 @@ def mark(axes: Axes, found: Atlas) -> list[Any]:
     x, y = values[-1], values[0] if len(values) == 2 else 0.15
     axes.plot([x], [y], zorder=6, gid="design", **look)
     numbers = ", ".join(f"{value:.6g}" for value in reversed(values))
-    return [style.key(f"{title_of(found)}: {numbers}", **look)]
+    return [style.key(f"{title_of(answers)}: {numbers}", **look)]
 
 
-def _value_of(found: Atlas, name: str) -> float | None:
-    """Return the value of a quantity in the scene or map that is varied, in the unit of its axis."""
-    data, plan = found.dataset, found.dataset.attrs["plan"]
+def _value_of(answers: Atlas, name: str) -> float | None:
+    """Return the value of a quantity in the unvaried scene or map, in the unit of its axis."""
+    data, plan = answers.dataset, answers.dataset.attrs["plan"]
     if "scene" not in plan:
         value = plan.get("parameters", {}).get(name)
         return float(value) if isinstance(value, int | float) else None
@@ -223,19 +223,19 @@ def _value_of(found: Atlas, name: str) -> float | None:
 # Maps of an atlas: the classes of its points, with a legend in words.
 
 
-# Paul Tol's light scheme, made for areas and colour-blind readers, without its orange; a cycle's face.
+# Faces of cycles: Paul Tol's light scheme, made for areas and colour-blind readers, without its orange.
 FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#99DDFF", "#BBCC33", "#AAAA00")
-# Bands that no cycle is are darker by this share of ink; without an attractor these, by what every start does.
+# Attractors other than cycles are darker by this share of ink; classes without an attractor have the faces below.
 DARKER = 0.16
-# Shares of white of classes with the same face: other bands by side, another order, seven bands more.
+# Shares of white that separate classes with the same face: other bands by side, another order, seven more bands.
 LIGHTER = (0.0, 0.32, 0.58)
 ALL_LEAVE, ALL_COLLAPSE, NEITHER_ALL = "#EE9A62", "#6A4C93", "#F6D9C4"
 DOUBT, DOUBT_HATCH = "#B4B4B4", "xxxx"
 LEAVE_HATCH, COLLAPSE_HATCH = "////", "...."
 MOST_LINES = 12
-# What a line of the legend, and the room below an entry, take [inches].
+# Height of a line of the legend, and of the room below an entry [inches].
 LINE, GAP = 0.145, 0.13
-# Beyond so many edges between pixels lines would hide what they part.
+# With more edges between pixels than this, lines would hide the pixels that they separate.
 MOST_EDGES = 12_000
 # Least room around a number, as a share of the points along the shorter axis.
 ROOM = 0.025
@@ -253,22 +253,22 @@ def look_of(number: int, name: str) -> dict[str, Any]:
     """
     if number == UNDECIDED:
         return {"facecolor": DOUBT, "hatch": DOUBT_HATCH}
-    found = named_class(name)
-    hatch = LEAVE_HATCH * (found.leaves == "some") + COLLAPSE_HATCH * (found.collapses == "some")
-    if not found.attractors:
-        face = {found.leaves: ALL_LEAVE, found.collapses: ALL_COLLAPSE}.get("all", NEITHER_ALL)
+    topology = named_class(name)
+    hatch = LEAVE_HATCH * (topology.leaves == "some") + COLLAPSE_HATCH * (topology.collapses == "some")
+    if not topology.attractors:
+        face = {topology.leaves: ALL_LEAVE, topology.collapses: ALL_COLLAPSE}.get("all", NEITHER_ALL)
         return {"facecolor": face, "hatch": hatch}
-    parts = sum(sum(each.bands) for each in found.attractors)
-    share = 0.0 if any(each.period for each in found.attractors) else DARKER
-    lap, hue = divmod(parts + 2 * len(found.attractors) - 3, len(FACES))
-    light = LIGHTER[(lap + sum(map(_spread, found.attractors))) % len(LIGHTER)]
+    parts = sum(sum(each.bands) for each in topology.attractors)
+    share = 0.0 if any(each.period for each in topology.attractors) else DARKER
+    lap, hue = divmod(parts + 2 * len(topology.attractors) - 3, len(FACES))
+    light = LIGHTER[(lap + sum(map(_spread, topology.attractors))) % len(LIGHTER)]
     colour = (1.0 - share) * np.array(to_rgb(FACES[hue])) + share * np.array(to_rgb(style.INK))
     mixed = (1.0 - light) * colour + light
     return {"facecolor": tuple(round(each, 4) for each in mixed.tolist()), "hatch": hatch}
 
 
 def _spread(kind: AttractorKind) -> int:
-    """Give a small number that tells attractors of as many bands apart: by sides, and by the order of these."""
+    """Give a small number that differs for attractors with equally many bands, by their sides and the sides' order."""
     order = kind.flip_order
     turned = 2 if order is None else int(order != tuple(sorted(order)))
     return turned + sum(side * bands for side, bands in enumerate(kind.bands))
@@ -291,7 +291,7 @@ def atlas(found: Atlas) -> Figure:
     Raises
     ------
     AnswerError
-        It says nothing of classes.
+        The atlas has no classes.
 
     Examples
     --------
@@ -360,10 +360,10 @@ def _words(number: int, entry: Entry) -> str:
 
 
 def _paint(
-    axes: Axes, found: Atlas, rows: npt.NDArray[np.int64], looks: Mapping[int, dict[str, Any]]
+    axes: Axes, answers: Atlas, rows: npt.NDArray[np.int64], looks: Mapping[int, dict[str, Any]]
 ) -> None:
     """Paint the classes, their hatches, and lines between them."""
-    x, y = pixels(found)
+    x, y = pixels(answers)
     picture = np.ones((*rows.shape, 3))
     for number, look in looks.items():
         picture[rows == number] = to_rgb(look["facecolor"])
@@ -384,9 +384,9 @@ def _paint(
         )
 
 
-def _label(axes: Axes, found: Atlas, where: npt.NDArray[np.bool_], words: str) -> None:
-    """Write the number of a class into its largest region, as far from the region's edge as can be."""
-    if len(found.axes) == 1:
+def _label(axes: Axes, answers: Atlas, where: npt.NDArray[np.bool_], words: str) -> None:
+    """Write the number of a class into its largest region, at the point farthest from the region's edge."""
+    if len(answers.axes) == 1:
         where = np.repeat(where, max(where.size // 4, 3), axis=0)
     regions, count = label(where)
     if count == 0:
@@ -396,7 +396,7 @@ def _label(axes: Axes, found: Atlas, where: npt.NDArray[np.bool_], words: str) -
     i, j = np.unravel_index(room.argmax(), room.shape)
     if room[i, j] < max(ROOM * min(where.shape), 1.5):
         return
-    x = float(found.dataset[found.axes[-1]].values[j])
-    y = float(found.dataset[found.axes[0]].values[i]) if len(found.axes) == 2 else 0.5
+    x = float(answers.dataset[answers.axes[-1]].values[j])
+    y = float(answers.dataset[answers.axes[0]].values[i]) if len(answers.axes) == 2 else 0.5
     box = {"boxstyle": "circle,pad=0.22", "fc": "white", "ec": style.INK, "lw": 0.5, "alpha": 0.92}
     axes.text(x, y, words, ha="center", va="center", fontsize=style.SMALL, bbox=box, zorder=5, gid="number")

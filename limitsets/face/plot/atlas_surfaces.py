@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-# Even to the eye, in grey and for colour-blind readers.
+# A map of colours that looks even, also in grey and to colour-blind readers.
 COLOURS = "cividis"
-# Percentiles between which colours are spread: a few values far off do not take them all.
+# Percentiles between which colours are spread, so that a few extreme values do not use up the colours.
 SPREAD = (1.0, 99.0)
 NOTHING, NOTHING_HATCH = "#DDDDDD", "////"
 WORDS = {
@@ -94,9 +94,9 @@ def atlas_surface(found: Atlas, variable: str, side: int | None = None) -> Figur
     return figure
 
 
-def _values(found: Atlas, variable: str, side: int | None) -> Array:
-    """Read the variable at every point; nan where there is none."""
-    data = found.dataset
+def _values(answers: Atlas, variable: str, side: int | None) -> Array:
+    """Read the variable at every point; nan at points without a value."""
+    data = answers.dataset
     if variable not in data or "flag_values" in data[variable].attrs:
         known = [str(name) for name in data if "flag_values" not in data[name].attrs]
         raise AnswerError("the variable to draw", variable, ", ".join(known), "name one of these")
@@ -118,29 +118,29 @@ def _values(found: Atlas, variable: str, side: int | None) -> Array:
             raise AnswerError("the variable share", "missing", "one beside the others", "ask for it too")
         largest = np.nan_to_num(data["share"].values, nan=-1.0).argmax(axis=-1)
         values = np.take_along_axis(values, largest[..., None], axis=-1)[..., 0]
-    if values.ndim != len(found.axes):
+    if values.ndim != len(answers.axes):
         raise AnswerError("the variable to draw", variable, "one number at each point", "name another")
     return values
 
 
-def _level(found: Atlas, variable: str) -> tuple[float, str] | None:
+def _level(answers: Atlas, variable: str) -> tuple[float, str] | None:
     if variable == "lyapunov":
         return 0.0, "0"
-    plan = found.dataset.attrs["plan"]
+    plan = answers.dataset.attrs["plan"]
     if variable != "threshold" or "scene" not in plan:
         return None
     from limitsets.feeder.scene import load
 
-    goal = load(found.dataset.attrs["scene"]).goal
+    goal = load(answers.dataset.attrs["scene"]).goal
     x = getattr(goal, "x", None)
     return None if x is None else (float(x), f"x of the goal, {x:g}")
 
 
 def _painted(
-    figure: Figure, axes: Axes, found: Atlas, values: Array, words: str, level: tuple[float, str] | None
+    figure: Figure, axes: Axes, answers: Atlas, values: Array, words: str, level: tuple[float, str] | None
 ) -> list[object]:
-    """Paint a surface of two quantities, with its scale; the entries of a legend."""
-    x, y = pixels(found)
+    """Paint a surface over two quantities, with its scale; return the legend's entries."""
+    x, y = pixels(answers)
     there = np.isfinite(values)
     axes.set_facecolor(NOTHING)
     hatched(axes, x, y, ~there, NOTHING_HATCH)
@@ -154,7 +154,7 @@ def _painted(
         extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(cut, "neither")
         figure.colorbar(image, ax=axes, label=words, extend=extend, pad=0.02)
         if level is not None and values[there].min() < level[0] < values[there].max():
-            xs, ys = (found.dataset[name].values for name in reversed(found.axes))
+            xs, ys = (answers.dataset[name].values for name in reversed(answers.axes))
             axes.contour(
                 xs, ys, np.ma.masked_invalid(values), [level[0]], colors="white", linewidths=2.4, zorder=3
             )
@@ -171,10 +171,10 @@ def _painted(
 
 
 def _lined(
-    axes: Axes, found: Atlas, values: Array, words: str, level: tuple[float, str] | None
+    axes: Axes, answers: Atlas, values: Array, words: str, level: tuple[float, str] | None
 ) -> list[object]:
     """Draw a line against one quantity."""
-    x = found.dataset[found.axes[0]].values
+    x = answers.dataset[answers.axes[0]].values
     axes.plot(x, values, color=style.JOG, lw=1.1, marker="." if x.size < 60 else "", gid="values")
     axes.autoscale(axis="y")
     axes.set_ylabel(words)
@@ -257,24 +257,24 @@ def bifurcation(found: Continuation, by: str | None = None) -> Figure:
     return figure
 
 
-def _scale(found: Continuation, name: str) -> tuple[float, str]:
-    """Factor and label of the axis: angles of a scene in degrees."""
-    if found.unit is None or name == "t":
+def _scale(continuation: Continuation, name: str) -> tuple[float, str]:
+    """Give factor and label of the axis: angles of a scene are in degrees."""
+    if continuation.unit is None or name == "t":
         return 1.0, name
     pattern = "".join("[i]" if part.isdigit() else part for part in name.replace("[", "]").split("]"))
     dimension = NAMES.get(pattern, "")
-    unit = base_unit(dimension, found.unit)
+    unit = base_unit(dimension, continuation.unit)
     if dimension in ("angular speed", "angle"):
         return math.degrees(1.0), f"{name} [{unit.replace('rad', 'deg')}]"
     return 1.0, f"{name} [{unit}]"
 
 
-def _bands(axes: Axes, found: Continuation, side: int, along: NDArray[np.float64]) -> None:
-    """Draw the bands of one side between steps that have as many of them."""
-    for number in found.numbers:
+def _bands(axes: Axes, continuation: Continuation, side: int, along: NDArray[np.float64]) -> None:
+    """Draw the bands of one side between neighbouring steps with the same number of bands."""
+    for number in continuation.numbers:
         areas: list[Any] = []
         lines: list[Any] = []
-        for k, (here, there) in enumerate(pairwise(found.attractors)):
+        for k, (here, there) in enumerate(pairwise(continuation.attractors)):
             if number not in here or number not in there:
                 continue
             first, last = (states[number].extents.get(side, []) for states in (here, there))
@@ -292,14 +292,14 @@ def _bands(axes: Axes, found: Continuation, side: int, along: NDArray[np.float64
     axes.autoscale_view()
 
 
-def _critical(axes: Axes, found: Continuation, side: int, along: NDArray[np.float64]) -> None:
+def _critical(axes: Axes, continuation: Continuation, side: int, along: NDArray[np.float64]) -> None:
     lines = [
         [(along[k], c), (along[k + 1], d)]
-        for k, (here, there) in enumerate(pairwise(found.critical))
+        for k, (here, there) in enumerate(pairwise(continuation.critical))
         if len(here[side]) == len(there[side])
         for c, d in zip(here[side], there[side], strict=True)
     ]
-    # Joined where they belong together, so that the dashes do not begin anew at every step.
+    # Points of one curve are joined, so that the dashes do not begin anew at every step.
     ways: list[list[tuple[float, float]]] = []
     for first, last in lines:
         way = next((each for each in ways if each[-1] == first), None)
@@ -312,9 +312,11 @@ def _critical(axes: Axes, found: Continuation, side: int, along: NDArray[np.floa
         axes.plot(x, y, zorder=4, gid="critical point", **CRITICAL)
 
 
-def _events(panels: list[Axes], found: Continuation, sides: list[int], name: str, factor: float) -> set[str]:
-    """Mark the events; the kinds that there are."""
-    for event in found.events:
+def _events(
+    panels: list[Axes], continuation: Continuation, sides: list[int], name: str, factor: float
+) -> set[str]:
+    """Mark the events; return the kinds that occur."""
+    for event in continuation.events:
         ends = event.t if name == "t" else (event.values[0][name], event.values[1][name])
         at, look = factor * 0.5 * (ends[0] + ends[1]), EVENTS[event.kind]
         for axes in panels:
@@ -325,15 +327,15 @@ def _events(panels: list[Axes], found: Continuation, sides: list[int], name: str
         else:
             axes, y, how = panels[0], 1.02, {"transform": panels[0].get_xaxis_transform()}
         axes.plot([at], [y], mfc="none", zorder=6, clip_on=False, gid=event.kind, **MARK, **look, **how)
-    return {event.kind for event in found.events}
+    return {event.kind for event in continuation.events}
 
 
-def _legend(found: Continuation, kinds: set[str]) -> list[Any]:
+def _legend(continuation: Continuation, kinds: set[str]) -> list[Any]:
     handles: list[Any] = []
-    for number in found.numbers[: len(style.SETS)]:
+    for number in continuation.numbers[: len(style.SETS)]:
         face, _ = style.SETS[number % len(style.SETS)]
         handles.append(Patch(facecolor=face, edgecolor=style.INK, lw=0.5, label=f"attractor {number}"))
-    if any(points for each in found.critical for points in each.values()):
+    if any(points for each in continuation.critical for points in each.values()):
         handles.append(style.key("critical point", **CRITICAL))
     handles += [
         style.key(f"event: {kind}", mfc="none", **MARK, **look)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from limitsets.systems.sets import Basins
 
 
-# Lightness falls, so that neighbours differ in grey as well; hatches tell them apart in strips.
+# Lightness falls, so that neighbours differ in grey as well; in strips they also differ by hatches.
 ATTRACTORS = ("#CFE5F5", "#F0B429", "#5FB59B", "#B5548A", "#3F4E96", "#2B2A1E")
 HATCHES = ("", "///", "...", "\\\\\\", "xxx", "+++")
 EDGE: dict[str, Any] = {"edgecolor": "#444444", "lw": 0.4}
@@ -90,7 +90,7 @@ def basins(source: Any, shares: Basins, found: Any = None) -> Figure:
 
 
 def _words(source: Any) -> tuple[str, str]:
-    """Say whose basins they are, and the unit of x in brackets."""
+    """Give the name of the basins' scene or map for the title, and the unit of x in brackets."""
     if isinstance(source, Scene):
         return f" of {source.name}", f" [{source.unit}]"
     if isinstance(source, Grid):
@@ -98,13 +98,15 @@ def _words(source: Any) -> tuple[str, str]:
     return f" of {kind_of(getattr(source, 'map', source)).name}", ""
 
 
-def _cells_of(found: Any) -> list[CellSet]:
+def _cells_of(attractors: Any) -> list[CellSet]:
     """Read sets of cells off attractors, or one of them."""
-    several = found if isinstance(found, Iterable) else [found]
+    several = attractors if isinstance(attractors, Iterable) else [attractors]
     cells = [getattr(each, "cells", None) for each in several]
     known = [each for each in cells if isinstance(each, CellSet)]
     if len(known) < len(cells):
-        raise AnswerError("what to draw", type(found).__name__, "attractors", "pass those of ls.attractors")
+        raise AnswerError(
+            "what to draw", type(attractors).__name__, "attractors", "pass those of ls.attractors"
+        )
     return known
 
 
@@ -182,7 +184,7 @@ def _legend(shares: Basins) -> list[Patch]:
 
 
 def _percent(share: float) -> str:
-    """Round to a tenth, but never to all or nothing."""
+    """Round to a tenth of a percent, but never to 0 or 100."""
     percent = 100 * share
     if percent >= 100 - 1e-9 or percent == 0:
         return f"{percent:.0f} %"
@@ -193,7 +195,7 @@ def _percent(share: float) -> str:
 # The Morse graph: recurrent sets in layers, each above its successors.
 
 
-# More nodes than this cannot be told apart: the attracting and the largest are drawn, the title says how many are not.
+# Nodes that are drawn at most: the attracting and the largest ones; the title says how many are left out.
 MOST = 12
 Place = tuple[float, float]
 
@@ -207,7 +209,7 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = 
     graph : networkx.DiGraph or TransitionGraph
         From `limitsets.morse_graph`, or the transition graph itself.
     name : str
-        Whose it is, for the title.
+        Name of the scene or map, for the title.
     unit : str
         Of x, behind the intervals.
 
@@ -246,7 +248,7 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = 
 
 
 def _condensed(whole: nx.DiGraph[int]) -> nx.DiGraph[Any]:
-    """Keep at most `MOST` nodes and the order among them; ways out become nodes named after them."""
+    """Keep at most `MOST` nodes and their order; each kind of exit becomes a node with its name."""
     rank = sorted(
         whole.nodes, key=lambda node: (-whole.nodes[node]["attracting"], -whole.nodes[node]["cells"])
     )
@@ -262,7 +264,7 @@ def _condensed(whole: nx.DiGraph[int]) -> nx.DiGraph[Any]:
 
 
 def _places(drawn: nx.DiGraph[Any]) -> dict[Any, Place]:
-    """Height: the longest way down; across: side by side, in the middle of what they lead to."""
+    """Place nodes at the height of their longest way down, each above the middle of its successors."""
     place: dict[Any, Place] = {}
     order = {node: number for number, node in enumerate(drawn)}
 
@@ -295,10 +297,10 @@ def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, fe
     axes.annotate(str(node), (x, y), ha="center", va="center", fontsize=style.SMALL)
     lines = [f"{data['cells']} cell{'' if data['cells'] == 1 else 's'}"]
     if few:
-        members = data.get("members")  # a graph made elsewhere has intervals only
+        members = data.get("members")  # a graph from elsewhere has only intervals
         axes_of = range(1 if members is None else members.grid.dimension)
         along = [data["extents"], *(data["members"].extents(axis) for axis in axes_of[1:])]
-        sides = members is None or members.grid.sides > 1  # a map without sides says nothing of side 0
+        sides = members is None or members.grid.sides > 1  # a map without sides has no name for side 0
         every = [(side, axis, parts) for axis in axes_of for side, parts in along[axis].items()]
         for side, axis, parts in every:
             shown = ", ".join(f"{lo:z.2f} to {hi:z.2f}" for lo, hi in parts[:2])

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from limitsets.parameters.design import Design, RobustDesign
 
 
-HALF = 0.3  # half the height of a bar; lanes are 1 apart
-MOST = 12  # scenes that are drawn: start, design, and of those between evenly many
-GAP = 0.9  # between the lanes of one scene and the next, beside the 1
+HALF = 0.3  # half the height of a bar; the distance of lanes is 1
+MOST = 12  # scenes that are drawn at most: start, design, and evenly spaced steps between them
+GAP = 0.9  # between the lanes of one scene and the next, in addition to 1
 # A second attractor of the same scene.
 ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
 
@@ -36,14 +36,14 @@ ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": "
 def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Figure:
     """Draw the limit sets of the scenes on a design's path, one group of bars per scene, one bar row per side.
 
-    Of more than twelve scenes start, design and evenly many of the steps between are drawn.
+    Of more than twelve scenes, the start, the design and evenly spaced steps between them are drawn.
 
     Parameters
     ----------
     found : Design
         From `limitsets.design`; with `stages` its path moves the critical points evenly.
     sets : sequence, optional
-        What `limitsets.inverse.limit_sets_along` gave; computed otherwise.
+        The answer of `limitsets.inverse.limit_sets_along`; computed if it is left out.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def _lanes(axes: Axes, scene: Scene, top: float) -> None:
 
 
 def _marks(axes: Axes, scene: Scene, top: float) -> None:
-    """Mark every critical point; the first of a side is the one that is designed."""
+    """Mark every critical point; the design moves the first one of each side."""
     for side, points in critical_points(scene.bare_map, scene.domain).items():
         for number, point in enumerate(points):
             look: dict[str, Any] = {"lw": 2.2, "gid": "critical point"}
@@ -105,47 +105,51 @@ def _marks(axes: Axes, scene: Scene, top: float) -> None:
             axes.plot([point.x] * 2, ends, color=style.FLIP, zorder=4, **look)
 
 
-def _words(axes: Axes, found: Design, scene: Scene, step: int, middle: float) -> None:
-    """Say beside each scene what its quantities are."""
-    head = "start" if step == 0 else "design" if step == len(found.path) - 1 else f"step {step}"
+def _words(axes: Axes, solution: Design, scene: Scene, step: int, middle: float) -> None:
+    """Write the values of its quantities beside each scene."""
+    head = "start" if step == 0 else "design" if step == len(solution.path) - 1 else f"step {step}"
     values = []
-    for name in found.jacobian.names[:4]:
+    for name in solution.jacobian.names[:4]:
         if name.startswith("throw."):
             values.append(f"$\\kappa$ = {scene.kappa:.4g} {scene.unit}")
         else:
-            unit = found.quantities()[name][2]
+            unit = solution.quantities()[name][2]
             values.append(f"{name.split('.')[-1].replace('_', ' ')} = {scene.value(name):.4g} {unit}")
     how: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "va": "center", "gid": "words"}
     style.note(axes, "\n".join([head, *values]), (1.0, middle), (6, 0), fontsize=style.SMALL - 1.0, **how)
 
 
-def _frame(axes: Axes, found: Design, sets: Sequence[Sequence[Extents]], depth: float) -> None:
+def _frame(axes: Axes, solution: Design, sets: Sequence[Sequence[Extents]], depth: float) -> None:
     ends = [x for row in sets for x in style.ends_of(row)]
-    ends += [x for x in (*found.before.x.tolist(), *found.jacobian.x.tolist()) if x <= found.start.arm_length]
-    lo, hi = min(ends, default=0.0), max(ends, default=found.start.arm_length)
+    ends += [
+        x
+        for x in (*solution.before.x.tolist(), *solution.jacobian.x.tolist())
+        if x <= solution.start.arm_length
+    ]
+    lo, hi = min(ends, default=0.0), max(ends, default=solution.start.arm_length)
     room = 0.05 * (hi - lo)
     axes.set_xlim(max(lo - room, 0.0), hi + room)
     axes.set_ylim(-depth + GAP + 0.1, 0.8)
-    axes.set_xlabel(f"x of the centre of mass from the joint [{found.start.unit}]")
+    axes.set_xlabel(f"x of the centre of mass from the joint [{solution.start.unit}]")
     style.lanes(axes)
-    style.goal(axes, found.start, zorder=3)
+    style.goal(axes, solution.start, zorder=3)
 
 
-def _legend(found: Design, count: int, several: bool) -> list[Any]:
+def _legend(solution: Design, count: int, several: bool) -> list[Any]:
     sides = [Patch(label=f"limit set on side {k}", lw=0.8, **style.of_set(k)) for k in range(count)]
     another = [Patch(label="another limit set", **ANOTHER)] if several else []
     mark = style.key("first critical point", color=style.FLIP, marker="|", ms=10, mew=2.2, ls="")
-    return [*sides, *another, mark, *style.key_of_goal(found.start)]
+    return [*sides, *another, mark, *style.key_of_goal(solution.start)]
 
 
 # ----------------------------------------------------------------
-# A robust design: margin against throws to feed, and the share of each quantity of the tolerance.
+# A robust design: margin against throws to feed, and the share of the tolerance that each quantity takes.
 
 
 BEFORE, AFTER = "#6E6E6E", style.JOG
-# Bars of the scene before, apart from the design's also in grey.
+# Bars of the scene before, which differ from those of the design also in grey.
 PALE = "#D6D6D6"
-# What is drawn of the quantities' names: the last word says which it is.
+# Quantities that are drawn at most.
 MOST_ROWS = 12
 
 
@@ -158,9 +162,9 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
     found : RobustDesign
         From `limitsets.inverse.robust_design`.
     wanted : float, optional
-        A margin that was wanted, a factor on the tolerance, as a line.
+        The wanted margin, as a factor on the tolerance; drawn as a line.
     bound : float, optional
-        A margin that no design can have, a factor on the tolerance, as a line.
+        A margin that no design can have, as a factor on the tolerance; drawn as a line.
 
     Returns
     -------
@@ -186,17 +190,24 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
     return figure
 
 
-def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
-    margins = [option.candidate.found.margin for option in found.front]
-    means = np.array([option.feeding.mean for option in found.front])
-    late = np.array([option.feeding.quantile_95 for option in found.front])
+def _front(axes: Axes, optimum: RobustDesign) -> list[Line2D]:
+    margins = [option.candidate.found.margin for option in optimum.front]
+    means = np.array([option.feeding.mean for option in optimum.front])
+    late = np.array([option.feeding.quantile_95 for option in optimum.front])
     axes.vlines(margins, means, late, color=AFTER, lw=0.8, alpha=0.6)
     look: dict[str, Any] = {"color": AFTER, "marker": "o", "ms": 4.0, "lw": 0.8}
     axes.plot(margins, means, **look)
     handles = [style.key("designs that none beats, sampled", **look)]
     points = [
-        (found.before_margins, found.before_sampled, found.before_feeding, BEFORE, "s", "the scene before"),
-        (found.margins, found.sampled, found.feeding, style.FLIP, "D", "the design"),
+        (
+            optimum.before_margins,
+            optimum.before_sampled,
+            optimum.before_feeding,
+            BEFORE,
+            "s",
+            "the scene before",
+        ),
+        (optimum.margins, optimum.sampled, optimum.feeding, style.FLIP, "D", "the design"),
     ]
     for margins_of, sampled, feeding, colour, marker, label in points:
         if sampled is None or feeding is None:
@@ -218,13 +229,13 @@ def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
     return handles
 
 
-def _costs(axes: Axes, found: RobustDesign) -> None:
+def _costs(axes: Axes, optimum: RobustDesign) -> None:
     """Draw how much of the room between threshold and reach one tolerance of each quantity takes."""
-    names = list(found.sampled.effects)[:MOST_ROWS]
+    names = list(optimum.sampled.effects)[:MOST_ROWS]
     rows = np.arange(len(names))
     for sampled, colour, shift, label in (
-        (found.before_sampled, BEFORE, -0.19, "before"),
-        (found.sampled, style.FLIP, 0.19, "design"),
+        (optimum.before_sampled, BEFORE, -0.19, "before"),
+        (optimum.sampled, style.FLIP, 0.19, "design"),
     ):
         if sampled is None or not sampled.effects:
             continue

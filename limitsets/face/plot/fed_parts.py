@@ -31,7 +31,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "edge": {"color": style.INK, "ls": (0, (5, 1.5, 1, 1.5))},
     "left": {"color": style.JOG, "ls": (0, (1, 1.5))},
 }
-# Shares below this are not drawn.
+# Smaller shares are not drawn.
 LEAST = 1e-6
 WORDS_OF_FATES = {
     "right": "side wanted, clear",
@@ -74,9 +74,9 @@ def feeding(found: Feeding) -> Figure:
     return figure
 
 
-def _corners(found: Feeding, beyond: float, tipped: float) -> NDArray[np.float64]:
-    """Vertices of a part on the side wanted, tipped over the end of the arm, from the end [length]."""
-    scene, side = found.end.scene, found.end.side
+def _corners(answer: Feeding, beyond: float, tipped: float) -> NDArray[np.float64]:
+    """Vertices of a part on the wanted side, tipped over the end of the arm, relative to this end [length]."""
+    scene, side = answer.end.scene, answer.end.side
     corners = [(float(x), float(y)) for x, y in scene.vertices]
     left, right = side_ends(len(corners), side)
     placed = []
@@ -89,10 +89,10 @@ def _corners(found: Feeding, beyond: float, tipped: float) -> NDArray[np.float64
     return np.array(placed)
 
 
-def _cavity(axes: Axes, found: Feeding) -> None:
-    scene = found.end.scene
+def _cavity(axes: Axes, answer: Feeding) -> None:
+    scene = answer.end.scene
     cavity = scene.cavity
-    assert cavity is not None  # `feed` refuses a scene without one
+    assert cavity is not None  # `feed` refuses a scene without a cavity
     ramp = cavity.depth / math.tan(cavity.angle)
     outline = [
         (-8.0, 0.0),
@@ -102,9 +102,9 @@ def _cavity(axes: Axes, found: Feeding) -> None:
         (cavity.width, 0.0),
     ]
     axes.plot(*zip(*outline, strict=True), color=style.INK, lw=1.6)
-    beyond = 0.25 * float(scene.sides.a[found.end.side])
+    beyond = 0.25 * float(scene.sides.a[answer.end.side])
     for share, alpha in ((0.0, 1.0), (0.5, 0.6), (1.0, 1.0)):
-        corners = _corners(found, beyond, share * cavity.angle)
+        corners = _corners(answer, beyond, share * cavity.angle)
         axes.add_patch(Polygon(corners, closed=True, fill=False, ec=style.JOG, lw=1.1, alpha=alpha))
     axes.set_aspect("equal")
     axes.autoscale_view()
@@ -113,17 +113,17 @@ def _cavity(axes: Axes, found: Feeding) -> None:
     style.open_frame(axes)
 
 
-def _tipping(axes: Axes, found: Feeding) -> None:
-    scene = found.end.scene
-    side = found.end.side
-    most = min(float(scene.sides.a[side]), scene.arm_length - found.end.x)
+def _tipping(axes: Axes, answer: Feeding) -> None:
+    scene = answer.end.scene
+    side = answer.end.side
+    most = min(float(scene.sides.a[side]), scene.arm_length - answer.end.x)
     e = np.geomspace(1e-6 * most, most, 300)
     axes.plot(e, tipping_times(scene, side)(e), color=style.INK, lw=1.3)
     rate = scene.world.throw_rate
     if rate is not None:
         axes.axhline(1.0 / rate, color=style.FLIP, lw=1.1, ls=style.FLIP_LINE)
         style.note(axes, f"next throw, {rate:g} Hz", (float(e[0]), 1.0 / rate), (2, 3), color=style.FLIP)
-    for lo, hi in found.end.clear:
+    for lo, hi in answer.end.clear:
         axes.axvspan(max(lo, float(e[0])), hi, color="#9BD1B8", alpha=0.4, lw=0)
     axes.set_xscale("log")
     axes.set_ylim(bottom=0.0)
@@ -134,27 +134,27 @@ def _tipping(axes: Axes, found: Feeding) -> None:
     style.open_frame(axes)
 
 
-def _throws_until_fed(axes: Axes, found: Feeding) -> None:
-    rows = found.shares.by_throw
-    last = (found.shares.quantile(0.999) or rows.shape[0]) + 2
+def _throws_until_fed(axes: Axes, answer: Feeding) -> None:
+    rows = answer.shares.by_throw
+    last = (answer.shares.quantile(0.999) or rows.shape[0]) + 2
     number = np.arange(1, min(last, rows.shape[0]) + 1)
     for column, name in enumerate(FATES[:-1]):
         total = np.cumsum(rows[:, column])[: number.size]
         if total.size and total[-1] > 0.0:
-            label = f"{WORDS_OF_FATES[name]}: {100 * found.shares.shares[name]:.3g} %"
+            label = f"{WORDS_OF_FATES[name]}: {100 * answer.shares.shares[name]:.3g} %"
             axes.step(number, total, where="post", lw=1.3, label=label, **LOOKS[name])
-    axes.set_title(f"fates of {found.trials.fate.size} parts", loc="left", fontsize=style.TEXT)
+    axes.set_title(f"fates of {answer.trials.fate.size} parts", loc="left", fontsize=style.TEXT)
     axes.set_xlabel("throws", fontsize=style.SMALL)
     axes.set_ylabel("share of random starts", fontsize=style.SMALL)
     axes.set_ylim(0.0, 1.4 * axes.get_ylim()[1])  # room for the legend over the steps
     axes.set_yticks([tick for tick in axes.get_yticks() if tick <= 1.0])
-    if axes.get_legend_handles_labels()[0]:  # none where all parts stay
+    if axes.get_legend_handles_labels()[0]:  # no throw if all parts stay
         axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
     style.open_frame(axes)
 
 
-def _levels(axes: Axes, found: Feeding) -> None:
-    curve = found.curve
+def _levels(axes: Axes, answer: Feeding) -> None:
+    curve = answer.curve
     assert curve is not None
     axes.plot(curve.factors, curve.right, color=style.INK, marker="o", ms=3.5, lw=1.3)
     axes.axhline(curve.wanted, color=style.GOAL, lw=1.0, ls=(0, (4, 2)), label=f"{100 * curve.wanted:g} %")
@@ -223,10 +223,10 @@ def assembly(found: Assembly) -> Figure:
     return figure
 
 
-def _outcomes(axes: Axes, found: Assembly) -> None:
-    shown = [name for name in OUTCOMES if found.counts[name] or name == "assembled"]
+def _outcomes(axes: Axes, answer: Assembly) -> None:
+    shown = [name for name in OUTCOMES if answer.counts[name] or name == "assembled"]
     for row, name in enumerate(reversed(shown)):
-        rate = rate_of(found.counts[name], len(found.rows))
+        rate = rate_of(answer.counts[name], len(answer.rows))
         low, high = rate.interval
         axes.barh(row, rate.share, 0.6, **style.of_set(0 if name == "assembled" else 4))
         axes.plot([low, high], [row, row], color=style.INK, lw=1.3)
@@ -240,10 +240,10 @@ def _outcomes(axes: Axes, found: Assembly) -> None:
     style.open_frame(axes)
 
 
-def _throws_of_pairs(axes: Axes, found: Assembly) -> None:
-    for k, (scene, (_, colour)) in enumerate(zip(found.pair.scenes, PARTS, strict=True)):
-        right = np.sort([row["throws"][k] for row in found.rows if row["fates"][k] == "right"])
-        share = np.arange(1, right.size + 1) / len(found.rows)
+def _throws_of_pairs(axes: Axes, answer: Assembly) -> None:
+    for k, (scene, (_, colour)) in enumerate(zip(answer.pair.scenes, PARTS, strict=True)):
+        right = np.sort([row["throws"][k] for row in answer.rows if row["fates"][k] == "right"])
+        share = np.arange(1, right.size + 1) / len(answer.rows)
         axes.step(
             right, share, where="post", color=colour, ls=("-", style.FLIP_LINE)[k], lw=1.3, label=scene.name
         )
@@ -255,19 +255,19 @@ def _throws_of_pairs(axes: Axes, found: Assembly) -> None:
     style.open_frame(axes)
 
 
-def _case(axes: Axes, found: Assembly, name: str) -> None:
-    number = found.example(name)
+def _case(axes: Axes, answer: Assembly, name: str) -> None:
+    number = answer.example(name)
     assert number is not None  # only outcomes with a case are drawn
-    film = found.film(number)
+    film = answer.film(number)
     last = len(film.times) - 1
-    if name == "assembled":  # the film goes on through the next throws
+    if name == "assembled":  # the film continues through the next throws
         rests = [time for time, _, word in film.marks if word == "thrown"]
         last = int(np.searchsorted(film.times, rests[1])) - 1 if len(set(rests)) > 1 else last
     for polygon in film.ground:
         axes.add_patch(Polygon(polygon, closed=True, fc="#d9d9d9", ec="#9a9a9a", lw=0.6))
     for frame in [*np.linspace(0, last, GHOSTS + 2).astype(int)[:-1].tolist(), last]:
         _parts(axes, film, frame, whole=frame == last)
-    scene = found.pair.scenes[0]
+    scene = answer.pair.scenes[0]
     cavity = scene.cavity
     assert cavity is not None
     axes.set_xlim(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from limitsets.feeder.engine.depression import Pose
 
 
-# After so many points a curve has no more marks.
+# A curve with more points than this has no marks.
 MARKS = 9
 
 
@@ -62,16 +62,16 @@ def _short(state: str) -> str:
     return state.replace("leaning, vertex ", "leaning, P").replace(" lowest", "")
 
 
-def _placed(found: TrayFill, pose: Pose, share: float = 1.0) -> NDArray[np.float64]:
-    """Where the vertices are, or points on the way to them."""
-    corners = turned(share * about_centre(found.scene), pose.angle)
+def _placed(filling: TrayFill, pose: Pose, share: float = 1.0) -> NDArray[np.float64]:
+    """Places of the vertices, or of points between the centre of mass and the vertices."""
+    corners = turned(share * about_centre(filling.scene), pose.angle)
     corners += pose.x, pose.y
     return corners
 
 
-def _poses(axes: Axes, found: TrayFill) -> None:
+def _poses(axes: Axes, filling: TrayFill) -> None:
     """Draw a depression for each state, one below the other in two columns, with a part in it."""
-    plate, counts = found.passes.plate, found.counts
+    plate, counts = filling.passes.plate, filling.counts
     wide, tall = 2.0 * plate.size, 1.35 * plate.size
     for number, state in enumerate(counts.met):
         column, row = number % 2, number // 2
@@ -89,8 +89,8 @@ def _poses(axes: Axes, found: TrayFill) -> None:
         good = state == counts.right
         look = {"fc": "#9BD1B8", "ec": style.GOAL} if good else {"fc": "none", "ec": style.FLIP}
         pose = counts.poses[state]
-        axes.add_patch(Polygon(_placed(found, pose) + at, closed=True, lw=1.3, **look))
-        for k, (x, y) in enumerate(_placed(found, pose, 0.55) + at):
+        axes.add_patch(Polygon(_placed(filling, pose) + at, closed=True, lw=1.3, **look))
+        for k, (x, y) in enumerate(_placed(filling, pose, 0.55) + at):
             axes.text(x, y, f"P{k}", fontsize=6.5, ha="center", va="center", color=style.FAINT)
         words = f"{_short(counts.states[state])}{': right' if good else ''}"
         axes.text(at[0] - edge, at[1] - plate.depth - 0.1 * tall, words, fontsize=style.SMALL, va="top")
@@ -100,14 +100,14 @@ def _poses(axes: Axes, found: TrayFill) -> None:
     axes.set_title("as parts came to lie, one of each state", loc="left", fontsize=style.TEXT)
 
 
-def _curve(axes: Axes, found: TrayFill) -> None:
-    filled = found.filled
+def _curve(axes: Axes, filling: TrayFill) -> None:
+    filled = filling.filled
     passes = np.arange(filled.right.size)
     axes.fill_between(passes, *filled.interval.T, color="#9BD1B8", alpha=0.5, lw=0)
     axes.plot(passes, filled.right, color=style.GOAL, lw=1.5, label="chain, with its 95 % interval")
     places = np.unique(np.geomspace(1, passes[-1], MARKS).round().astype(int))
     looks = {False: ("o", style.INK, "a new part each pass"), True: ("s", style.FLIP, "parts return")}
-    for each in found.histories:
+    for each in filling.histories:
         marker, colour, words = looks[each.returning]
         shares, ends = each.filled[places], np.array([each.interval(int(k)) for k in places])
         bars = np.abs(ends - shares[:, None]).T
@@ -116,7 +116,7 @@ def _curve(axes: Axes, found: TrayFill) -> None:
         axes.errorbar(
             places * shift, shares, bars, ls="", marker=marker, ms=4, lw=0.9, color=colour, label=label
         )
-    _crowds(axes, found, places)
+    _crowds(axes, filling, places)
     axes.set_xscale("symlog", linthresh=1.0)
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlim(0.0, 1.3 * passes[-1])
@@ -128,13 +128,15 @@ def _curve(axes: Axes, found: TrayFill) -> None:
     style.open_frame(axes)
 
 
-def _crowds(axes: Axes, found: TrayFill, places: NDArray[np.intp]) -> None:
-    """Draw many parts at once beside the chain of single ones, where they were asked for."""
-    chain = found.crowd_chain
-    if chain is not None and not np.array_equal(chain.right, found.filled.right):
-        words = f"chain, {found.crowds[0].parts / found.crowds[0].depressions:g} parts a pass and depression"
+def _crowds(axes: Axes, filling: TrayFill, places: NDArray[np.intp]) -> None:
+    """Draw trays with many parts at once beside the chain of single parts, if they were asked for."""
+    chain = filling.crowd_chain
+    if chain is not None and not np.array_equal(chain.right, filling.filled.right):
+        words = (
+            f"chain, {filling.crowds[0].parts / filling.crowds[0].depressions:g} parts a pass and depression"
+        )
         axes.plot(np.arange(chain.right.size), chain.right, color=style.GOAL, lw=1.2, ls="--", label=words)
-    for crowd in found.crowds:
+    for crowd in filling.crowds:
         colour, shift = (style.ROLL, 0.96) if crowd.between else (style.JOG, 1.04)
         how = "push" if crowd.between else "pass through"
         words = f"{crowd.parts} at once that {how} each other"
@@ -157,8 +159,8 @@ def _crowds(axes: Axes, found: TrayFill, places: NDArray[np.intp]) -> None:
             )
 
 
-def _shares(axes: Axes, found: TrayFill) -> None:
-    counts, filled = found.counts, found.filled
+def _shares(axes: Axes, filling: TrayFill) -> None:
+    counts, filled = filling.counts, filling.filled
     numbers = np.array([0, *counts.met])
     of = int(counts.captured.sum())
     first = counts.captured[numbers] / of
@@ -180,8 +182,8 @@ def _shares(axes: Axes, found: TrayFill) -> None:
     style.open_frame(axes)
 
 
-def _kicks(axes: Axes, found: TrayFill) -> None:
-    counts = found.counts
+def _kicks(axes: Axes, filling: TrayFill) -> None:
+    counts = filling.counts
     numbers = [0, *counts.met]
     shares = counts.kicked[np.ix_(counts.met, numbers)].astype(float)
     shares /= shares.sum(axis=1, keepdims=True)
@@ -195,13 +197,13 @@ def _kicks(axes: Axes, found: TrayFill) -> None:
     axes.tick_params(axis="x", rotation=35)
 
 
-def _memory(axes: Axes, found: TrayFill) -> None:
+def _memory(axes: Axes, filling: TrayFill) -> None:
     rows = [("captured rightly\nafter misses", "captures"), ("released\nafter kicks it stood", "releases")]
     words, height = ("0", "1", "2 or more"), 0.0
     ticks, names = [], []
     for title, method in rows:
         for past in range(3):
-            for each in found.histories:
+            for each in filling.histories:
                 count, of = getattr(each, method)()[past]
                 share = count / of if of else math.nan
                 low, high = binomial_interval(count, of) if of else (0.0, 1.0)

@@ -35,7 +35,7 @@ ROLLED: dict[str, Any] = {"color": style.ROLL, "ls": style.ROLL_LINE}
 
 @arguments_checked
 def limit_set(scene: Scene | TransitionGraph, found: Any, *, axes: Axes | None = None) -> Figure:
-    r"""Draw where a part comes to rest on each side, and how throws carry it on.
+    r"""Draw the places of rest on each side, and how throws lead from one to the next.
 
     One lane per side; the first is repeated below the last, so that every flip goes down by one lane.  Bars are the
     limit set.  Grey bands show where the flipping part of each bar goes, arcs and arrows the throws of one orbit.
@@ -90,7 +90,7 @@ def limit_set(scene: Scene | TransitionGraph, found: Any, *, axes: Axes | None =
 
 
 def _lanes_of(about: Subject) -> int:
-    """One for each side, and of several the first one again."""
+    """Lanes from top to bottom: one per side, and the first one again if there are several."""
     return about.sides + (about.sides > 1)
 
 
@@ -113,7 +113,7 @@ def _bars(axes: Axes, extents: Extents, number: int, count: int) -> None:
 
 
 def _bands(axes: Axes, about: Subject, extents: Extents) -> None:
-    """Shade from each stretch of a bar that flips to where it lands."""
+    """Shade the bands from each flipping stretch of a bar to its image."""
     for side, parts in extents.items():
         for lo, hi in parts:
             x = np.linspace(lo, hi, SAMPLES_OF_ARROWS)
@@ -144,7 +144,7 @@ def _throws(axes: Axes, path: Orbit, count: int) -> None:
             y, middle = -side + BAR, 0.5 * (x + to)
             top = y + HOP * min(1.0, max(0.3, abs(to - x) / wide))
             arc = Path([(x, y), (middle, top), (to, y)], [Path.MOVETO, Path.CURVE3, Path.CURVE3])
-            head = "-|>" if abs(to - x) > 0.25 * wide else "-"  # shorter hops than this would be all head
+            head = "-|>" if abs(to - x) > 0.25 * wide else "-"  # a shorter arrow would be all head
             look = {"arrowstyle": head, "mutation_scale": 6, "color": style.JOG, "gid": "jog"}
             arrow = FancyArrowPatch(path=arc, lw=1.1, zorder=4, **look)
         else:
@@ -167,7 +167,7 @@ def _critical(axes: Axes, about: Subject) -> list[float]:
 
 
 def _frame_lanes(axes: Axes, about: Subject, sets: list[Extents], marked: list[float]) -> None:
-    """Limits, labels, and the intervals in figures beside each lane."""
+    """Set limits and labels, and write the intervals beside each lane."""
     ends = style.ends_of(sets) + marked
     if isinstance(about.goal, OrientedBeyond):
         ends.append(about.goal.x)
@@ -305,12 +305,12 @@ def _cobweb(axes: Axes, path: Orbit, side: int) -> None:
 
 
 def _whole(about: Subject) -> tuple[float, float]:
-    """Where states lie: of a scene from the joint on."""
+    """Give the range of states: for a scene it begins at the joint."""
     return (0.0 if about.thrown else float(about.domain.lo.min())), about.most
 
 
 def _limits(axes: Axes, about: Subject, sets: list[Extents], critical: list[float]) -> None:
-    """Show the whole arm, or where the sets and critical points are; the panels share their limits."""
+    """Set the limits: the whole arm, or the surroundings of sets and critical points; the panels share them."""
     lo, hi = _whole(about)
     if ends := style.ends_of(sets):
         first, last = min(ends + critical), max(ends + critical)

@@ -32,12 +32,12 @@ OPEN: dict[str, Any] = {"facecolor": "#F4F4F4", "edgecolor": "#9A9A9A", "hatch":
 BOX: dict[str, Any] = {"facecolor": "none", "edgecolor": style.FLIP, "ls": (0, (4, 2)), "lw": 1.2}
 FAILS: dict[str, Any] = {"color": style.FLIP, "marker": "D", "ms": 5.0, "ls": "none"}
 READINGS = {"fixed": "", "per-throw": ", every throw"}
-# Where the two columns of numbers end, to the right of the axes [points].
+# Right ends of the two columns of numbers, from the axes [points].
 COLUMNS = (66, 138)
 
 
 def _percent(margin: Margin, size: float) -> tuple[float, str]:
-    """Give a size as percent, and of what."""
+    """Give a size in percent, and the words for its reference."""
     if margin.unit == "%":
         return size, ""
     nominal = margin.nominal
@@ -58,7 +58,7 @@ def tornado(margins: Sequence[Margin]) -> Figure:
     Parameters
     ----------
     margins : sequence of Margin
-        From `limitsets.margin`; joint ones are left out.
+        From `limitsets.margin`; joint margins are left out.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def tornado(margins: Sequence[Margin]) -> Figure:
 
 
 def _bar(axes: Axes, margin: Margin, row: int, low: float, high: float) -> None:
-    """Draw one margin; where no upper end is known nothing is shown up to the end of the axis."""
+    """Draw one margin; if no upper end is known, the rest of the axis stays empty."""
     proved = max(_percent(margin, margin.proved)[0], low)
     end = high if margin.refuted is None else max(_percent(margin, margin.refuted)[0], low)
     axes.barh(row, end - proved, left=proved, height=0.62, gid="open", zorder=1, **OPEN)
@@ -197,7 +197,7 @@ def tolerance_box(margin: Margin) -> Figure:
 # An orbit that violates a goal, throw by throw: places of rest, sides, and the forbidden places.
 
 
-# States that are drawn: the last of them; and throws after an orbit of a single state.
+# States that are drawn: the last ones; and throws that continue an orbit of a single state.
 LAST, ONWARD = 40, 12
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h")
@@ -224,9 +224,9 @@ def counterexample(
     orbit : sequence of mapping
         States with "x" and "side", as `limitsets.parameters.sheet.entries.Entry` and the JSON of a proof have them.
     violated : Goal, optional
-        What it violates.
+        The goal that the orbit violates.
     name : str
-        What deviates, for the title's second line.
+        The deviating quantity, for the second line of the title.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def counterexample(
     Raises
     ------
     AnswerError
-        No states.
+        The orbit has no states.
 
     Examples
     --------
@@ -296,14 +296,14 @@ def counterexample(
 
 
 def _thrown_on(scene: Scene, x: float, side: int) -> list[tuple[float, int]]:
-    """Give the next rests: a single state says nothing of where it comes from."""
+    """Give the next places of rest, for an orbit of a single state."""
     path = orbit_of(scene.map, x, side, ONWARD)
     stays = path.code >= 0
     return [(float(x), int(side)) for x, side in zip(path.x[1:][stays], path.side[1:][stays], strict=True)]
 
 
 def _areas(axes: Axes, violated: Goal | None, unit: str) -> list[Any]:
-    """Shade where only one side is allowed, or where the part should come."""
+    """Shade the places at which only one side is allowed, or to which the part should come."""
     if not isinstance(violated, OrientedBeyond | Reaches):
         return []
     at, side, top = violated.x, violated.side, axes.get_ylim()[1]
@@ -324,7 +324,7 @@ def _mark(side: int) -> dict[str, Any]:
 # An audit as strips along the arm: places where each assumption of the model holds or breaks.
 
 
-HALF = 0.36  # half the height of a strip; strips are 1 apart
+HALF = 0.36  # half the height of a strip; the distance of strips is 1
 HOLDS: dict[str, Any] = {"facecolor": "#E4EEF5", "edgecolor": "none"}
 BROKEN: dict[str, Any] = {"facecolor": "#E39B72", "edgecolor": "#8A2F00", "hatch": "////", "lw": 0.6}
 UNKNOWN: dict[str, Any] = {"facecolor": "#F1F1F1", "edgecolor": "#B5B5B5", "hatch": "...", "lw": 0.0}
@@ -370,18 +370,18 @@ def audit(found: Audit) -> Figure:
     return figure
 
 
-def _strip(axes: Axes, found: Audit, finding: Finding, side: int, row: int) -> None:
-    first, last = float(found.scene.sides.a[side]), found.scene.arm_length
+def _strip(axes: Axes, findings: Audit, finding: Finding, side: int, row: int) -> None:
+    first, last = float(findings.scene.sides.a[side]), findings.scene.arm_length
     gid, look = ("cannot tell", UNKNOWN) if finding.missing else ("holds", HOLDS)
     style.bar(axes, first, last, row, HALF, gid=gid, zorder=2, **look)
     for lo, hi in finding.ranges.get(side, ()):
         style.bar(axes, lo, hi, row, HALF, gid="broken", zorder=2, **BROKEN)
 
 
-def _legend(found: Audit, rows: tuple[Finding, ...]) -> list[Any]:
+def _legend(findings: Audit, rows: tuple[Finding, ...]) -> list[Any]:
     handles: list[Any] = [Patch(label="holds", **HOLDS), Patch(label="breaks", **BROKEN)]
     if any(finding.missing for finding in rows):
         handles.append(Patch(label="cannot tell: a fact is missing", **UNKNOWN))
-    if found.extents:
+    if findings.extents:
         handles.append(style.key("between these lines: the limit set", color=style.JOG, lw=1.4))
     return handles

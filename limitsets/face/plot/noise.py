@@ -1,4 +1,4 @@
-"""What scatters: density of the places of rest, number of throws, level of the noise; and the residuals of a fit."""
+"""Figures of noise: density of the places of rest, number of throws, level of the noise; and the residuals of a fit."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 BAR = "#C9DCEA"
 LINES = ("-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 1.5, 1.2, 1.5)))
 COLOURS = (style.JOG, style.FLIP, style.ROLL, style.GOAL)
-# Shares below this are not drawn: a mark on the axis says where they are.
+# Smaller shares are not drawn: a mark on the axis stands for them.
 LEAST = 1e-6
-# What numbers are called in a legend, and what their axis shows.
+# Names of numbers in a legend, and labels of their axes.
 WORDS = {
     "wrong beyond": "of the rests beyond X",
     "first beyond is wrong": "of the first rests beyond X",
@@ -39,11 +39,11 @@ WORDS = {
 }
 
 
-def _main(found: NoiseStatistics) -> NoisyClass:
-    if not found.classes:
+def _main(statistics: NoiseStatistics) -> NoisyClass:
+    if not statistics.classes:
         remedy = "nothing stays: nothing to draw"
         raise AnswerError("the classes of the noisy scene", "none", "one at least", remedy)
-    return max(found.classes, key=lambda part: len(part.cells))
+    return max(statistics.classes, key=lambda part: len(part.cells))
 
 
 def _plain(axes: Axes) -> None:
@@ -53,7 +53,7 @@ def _plain(axes: Axes) -> None:
 
 @arguments_checked
 def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = None) -> Figure:
-    """Draw how often the part rests where, side by side, and beside it what many throws did.
+    """Draw the density of the places of rest, one panel per side, and for comparison the shares of many throws.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def _widened(lo: float, hi: float) -> tuple[float, float]:
 
 @arguments_checked
 def noise_arrivals(found: NoiseStatistics, thrown: SampledStatistics | None = None) -> Figure:
-    """Draw how many throws it takes from random starts to the goal: shares, and what is still under way.
+    """Draw the number of throws from random starts to the goal: the shares that arrive, and that have not arrived.
 
     Parameters
     ----------
@@ -141,8 +141,8 @@ def noise_arrivals(found: NoiseStatistics, thrown: SampledStatistics | None = No
     return figure
 
 
-def _marks(axes: Axes, found: NoiseStatistics) -> None:
-    mean, most = found.feeding.mean, found.feeding.quantile(0.95)
+def _marks(axes: Axes, statistics: NoiseStatistics) -> None:
+    mean, most = statistics.feeding.mean, statistics.feeding.quantile(0.95)
     if mean is not None:
         axes.axvline(mean, color=style.FLIP, lw=1.2, label=f"mean {mean:.1f}")
     if most is not None:
@@ -160,9 +160,9 @@ def noise_levels(
     levels : Levels
         From `limitsets.robust.noise_levels`.
     at : mapping of str to float
-        One entry: what the axis shows, in words, and its value at a factor of 1: ``{"speed noise [%]": 0.5}``.
+        One entry: the label of the axis, and its value at a factor of 1: ``{"speed noise [%]": 0.5}``.
     shown : mapping of str to sequence of str, optional
-        Panels: title, and the numbers in it.
+        Titles of the panels, each with the numbers in it.
 
     Returns
     -------
@@ -190,7 +190,7 @@ def noise_levels(
             axes.set_ylabel("throws", fontsize=style.SMALL)
         else:
             axes.set_yscale("log")
-            # a decade at least, or rounding looks like a change
+            # at least a decade, or rounding would look like a change
             low, high = axes.get_ylim()
             axes.set_ylim(min(low, high / 30.0), 1.3 * high)
             axes.set_ylabel("share", fontsize=style.SMALL)
@@ -201,7 +201,7 @@ def noise_levels(
 
 
 def _against_level(axes: Axes, levels: Levels, names: Sequence[str], unit: float) -> None:
-    """Draw the numbers of one panel; below the least share that is drawn, marks on the axis."""
+    """Draw the numbers of one panel; shares that are too small are marks on the axis."""
     x, none = levels.factors * unit, np.zeros(levels.factors.size, dtype=bool)
     for name, colour, line in zip(names, COLOURS, LINES, strict=False):
         values: NDArray[np.float64] = levels.numbers.get(name, np.full(x.size, np.nan))
@@ -218,7 +218,7 @@ def _against_level(axes: Axes, levels: Levels, names: Sequence[str], unit: float
 
 
 # ----------------------------------------------------------------
-# Figure of a fit: what is left of the landings, side by side.
+# Figure of a fit: the residuals of the landings, one panel per side.
 
 
 BARS = "#B5C8D6"

@@ -35,7 +35,7 @@ FOOT: dict[str, Any] = {"color": style.JOG, "lw": 1.3, "ls": (0, (4, 2))}
 OUTLINE: dict[str, Any] = {"facecolor": "#e8eef4", "edgecolor": style.INK, "lw": 1.8}
 TIPS: dict[str, Any] = {"color": style.FLIP, "lw": 3.0, "ls": (0, (1.5, 1))}
 
-# What the name of a side keeps from it [points].
+# Distance of a side's name from the side [points].
 CLEAR = 4
 
 
@@ -95,12 +95,12 @@ def part(scene: Scene) -> Figure:
     return figure
 
 
-def refused_part(found: Sketch, why: str) -> Figure:
+def refused_part(sketch: Sketch, why: str) -> Figure:
     """Draw a part that is refused as it is written: its corners by number, its sides, what is wrong.
 
     Parameters
     ----------
-    found : Sketch
+    sketch : Sketch
         From `limitsets.feeder.scene.reading.sketch`.
     why : str
         The error.
@@ -109,7 +109,7 @@ def refused_part(found: Sketch, why: str) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    corners, count = found.vertices, len(found.vertices)
+    corners, count = sketch.vertices, len(sketch.vertices)
     size = max(float(np.ptp(corners, axis=0).max()), 1e-300)
     figure, (axes,) = style.canvas(7.6, 6.0)
     axes.set_aspect("equal")
@@ -121,7 +121,7 @@ def refused_part(found: Sketch, why: str) -> Figure:
     axes.plot(*corners.T, ls="", marker="o", ms=4, color=style.INK, zorder=3)
     middle = corners.mean(axis=0)
     for k, corner in enumerate(corners):
-        way = middle - corner  # the names of sides are outside
+        way = middle - corner  # inside, because the names of sides are outside
         shift = tuple((16.0 * way / max(float(np.hypot(*way)), 1e-300)).tolist())
         at = tuple(corner.tolist())
         style.note(axes, f"P{k}", at, shift, ha="center", va="center", gid="corner")
@@ -131,35 +131,35 @@ def refused_part(found: Sketch, why: str) -> Figure:
         left, right = (corners[k] for k in side_ends(count, side))
         length = float(np.hypot(*(right - left)))
         outward = turn * np.array([right[1] - left[1], left[0] - right[0]]) / max(length, 1e-300)
-        words = f"side {side}: {length:.5g} {found.unit}"
+        words = f"side {side}: {length:.5g} {sketch.unit}"
         away = _clear(words, style.SMALL, outward) * outward
         halfway = tuple((0.5 * (left + right)).tolist())
         style.note(axes, words, halfway, tuple(away.tolist()), ha="center", va="center", zorder=4, gid="side")
-    if found.centre is not None:
-        axes.plot(*found.centre, zorder=5, gid="centre of mass", **CENTRE)
-        style.note(axes, "centre of mass", found.centre, (9, 0), va="center", zorder=5)
+    if sketch.centre is not None:
+        axes.plot(*sketch.centre, zorder=5, gid="centre of mass", **CENTRE)
+        style.note(axes, "centre of mass", sketch.centre, (9, 0), va="center", zorder=5)
     reason = "\n".join(textwrap.wrap(why, 92))
-    axes.set_xlabel(f"x [{found.unit}]\n\n{reason}", fontsize=style.SMALL)
-    axes.set_ylabel(f"y [{found.unit}]")
-    style.title(figure, f"{found.name}: the part as it is written, which is refused")
+    axes.set_xlabel(f"x [{sketch.unit}]\n\n{reason}", fontsize=style.SMALL)
+    axes.set_ylabel(f"y [{sketch.unit}]")
+    style.title(figure, f"{sketch.name}: the part as it is written, which is refused")
     return figure
 
 
 def _clear(words: str, size: float, way: Array) -> float:
-    """Say how far the middle of words has to be from a side, for them to be clear of it [points]."""
+    """Give the distance of the middle of words from a side at which they are clear of it [points]."""
     return CLEAR + float(np.abs(way) @ (0.31 * size * len(words), 0.5 * size))
 
 
 def _centre_at(scene: Scene) -> Array:
-    """Where the centre of mass is, from the left end of side 0."""
+    """Place the centre of mass, relative to the left end of side 0."""
     return np.array([float(scene.sides.a[0]), float(scene.sides.d[0])])
 
 
 def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> None:
-    """Name each side outside of its middle, with its length; mark where the part cannot rest."""
+    """Write name and length of each side outside its middle; mark sides on which the part cannot rest."""
     count = len(corners)
     for side in range(count):
-        # of the outline the first vertex is the left end of side 0
+        # the first vertex of the outline is the left end of side 0
         left, right = (corners[k] for k in side_ends(count, side))
         along = (right - left) / np.hypot(*(right - left))
         outward = np.array([along[1], -along[0]])
@@ -167,7 +167,9 @@ def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> Non
         away = _clear(words, style.TEXT, outward) + (10 if side == 0 else 0)
         shift = away * outward
         leader = None
-        if outward[1] < -0.1 and side != 0:  # an edge that overhangs: beside it, and not down on the arm
+        if (
+            outward[1] < -0.1 and side != 0
+        ):  # an overhanging edge: its name stands beside it, not down on the arm
             shift = np.array([away / outward[0], 0.0])
             leader = {"arrowstyle": "-", "color": style.INK, "lw": 0.7}
         middle = tuple((0.5 * (left + right)).tolist())
@@ -178,7 +180,7 @@ def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> Non
             "weight": "bold",
             "arrowprops": leader,
         }
-        if side == 0:  # over the line down from the centre of mass
+        if side == 0:  # above the line down from the centre of mass
             how["bbox"] = {"boxstyle": "square,pad=0.2", "fc": "white", "ec": "none"}
         style.note(axes, words, middle, tuple(shift.tolist()), zorder=6, gid="side", **how)
         if not resting[side]:
@@ -186,7 +188,7 @@ def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> Non
 
 
 def _centre(axes: Axes, scene: Scene, size: float) -> None:
-    """Draw the centre of mass, how far it is from the left end of side 0, and how high."""
+    """Draw the centre of mass, with its distances from the left end of side 0 and from the arm."""
     a, d = float(scene.sides.a[0]), float(scene.sides.d[0])
     axes.plot([a, a], [0.0, d], zorder=3, gid="height", **FOOT)
     low = -0.2 * size
@@ -200,15 +202,15 @@ def _centre(axes: Axes, scene: Scene, size: float) -> None:
 
 
 def _masses(scene: Scene) -> list[tuple[Array, str]]:
-    """Give the masses added to a plate: where they are drawn, and how heavy, as the scene writes it."""
+    """Give the masses added to a plate: their places, and their weights as the scene writes them."""
     points = scene.text["part"]["mass"].get("points", ())
-    found = []
+    masses = []
     for k, point in enumerate(points):
         name = f"part.mass.points[{k}]"
         about = np.array([[scene.value(f"{name}.{axis}") for axis in "xy"]]) - np.asarray(scene.centre)
         place = turned(about, angle_on_side(scene, 0))[0] + _centre_at(scene)
-        found.append((place, str(point["mass"])))
-    return found
+        masses.append((place, str(point["mass"])))
+    return masses
 
 
 def _added(axes: Axes, scene: Scene, masses: list[tuple[Array, str]]) -> None:
@@ -245,7 +247,7 @@ def _legend_of_part(masses: list[Any], resting: list[bool]) -> list[Any]:
 # One throw: the part in the air, and how it comes to rest (Fig. 3 of the paper).
 
 
-SHOWN = 3  # outlines in the air, and as many on the way from the impact to rest
+SHOWN = 3  # outlines in the air, and the same number on the way from the impact to rest
 WIDEST, TALLEST, LETTERS = 4.6, 8.0, 11  # of panels beside each other [inches], and letters to an inch
 AIR, LANDED = "#0072B2", "#C04A00"
 FLYING: dict[str, Any] = {"edgecolor": AIR, "ls": (0, (3, 2))}
@@ -277,7 +279,7 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     AnswerError
         For a start from which there is no flight.
     MapError
-        For a side that the part has not.
+        For a side that the part does not have.
 
     Examples
     --------
@@ -327,7 +329,7 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
 
 
 def _canvas(width: float, height: float) -> tuple[Figure, list[Axes]]:
-    """Two panels of one extent: beside each other where the picture is tall, else one above the other."""
+    """Make two panels with the same limits: beside each other if the picture is tall, else one above the other."""
     if height > 0.6 * width:
         tall = min(TALLEST, max(3.4, WIDEST * height / width))
         return style.canvas(10.4, tall + 1.6, 1, 2, sharex=True, sharey=True)
@@ -335,7 +337,7 @@ def _canvas(width: float, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def _placed(scene: Scene, side: int, poses: Array) -> list[Array]:
-    """Outlines in some poses, the left end of the side thrown from first."""
+    """Outlines in some poses; the left end of the side of the throw comes first."""
     shape, start = outline(scene, side), angle_on_side(scene, side)
     return [np.array([x, y]) + turned(shape, angle - start) for x, y, angle in poses.tolist()]
 
@@ -354,7 +356,7 @@ def _part(axes: Axes, corners: Array, **look: Any) -> None:
 
 
 def _impact(axes: Axes, moves: Motion, corners: Array, zorder: float) -> None:
-    """Draw the part when it meets the arm, and the vertex that is struck."""
+    """Draw the part at the impact, and the vertex that strikes."""
     _part(axes, corners, facecolor=(0.72, 0.84, 0.93, 0.8), zorder=zorder, gid="impact", **STRUCK)
     axes.plot(*moves.struck, **VERTEX, ms=9, zorder=7, gid="struck vertex")
 
@@ -362,7 +364,7 @@ def _impact(axes: Axes, moves: Motion, corners: Array, zorder: float) -> None:
 def _flight(axes: Axes, scene: Scene, throw: Throw, moves: Motion, air: list[Array]) -> None:
     _part(axes, air[0], facecolor="#dcdcdc", zorder=2, gid="start", **REST)
     for k, corners in enumerate(air[1:-1]):
-        # Later ones cover earlier ones in part, as a photograph with a strobe would show them.
+        # Later outlines partly cover earlier ones, as in a photograph with a strobe.
         look = {"facecolor": (0.86, 0.92, 0.97, 0.72), "lw": 1.0, "zorder": 3 + 0.1 * k, **FLYING}
         _part(axes, corners, gid="in the air", **look)
     _impact(axes, moves, air[-1], zorder=4)

@@ -1,4 +1,4 @@
-"""Figure of a policy: in every state where the part may lie, what is thrown, and where each answer leads."""
+"""Figure of a policy: for every state the places at which the part may lie, the throw, and the next state by answer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from limitsets.proofs.policies import Synthesis
 
 
-# Rows that can be named, and the most height of a row and of all [inches].
+# Largest number of rows with names; largest height of a row, and of all rows [inches].
 MOST, ROW, TALL = 60, 0.26, 16.0
 COLOURS = (style.JOG, style.FLIP, style.ROLL, style.INK)
 HATCHES = ("", "////", "....", "xxxx")
@@ -91,7 +91,7 @@ def _row(axes: Axes, k: int, parts: Any, throw: int) -> None:
 
 
 def _label(table: Any, k: int) -> str:
-    """State, throw, and the next states by the answer."""
+    """Name a row: its state, its throw, and the next states by the answer."""
     throw = "stop" if table.throw[k] < 0 else table.throws[int(table.throw[k])]
     after = ", ".join(
         f"{word} {at}".strip()
@@ -101,17 +101,17 @@ def _label(table: Any, k: int) -> str:
     return f"{k}: {throw}" + (f" → {after}" if after else "")
 
 
-def _keys(found: Synthesis) -> list[Any]:
+def _keys(synthesis: Synthesis) -> list[Any]:
     from matplotlib.patches import Patch
 
     keys: list[Any] = [
         Patch(facecolor=COLOURS[k % 4], edgecolor="white", hatch=HATCHES[k % 4], label=f"throw: {name}")
-        for k, name in enumerate(found.throws)
+        for k, name in enumerate(synthesis.throws)
     ]
-    if found.mode == "stop":
+    if synthesis.mode == "stop":
         keys.append(Patch(facecolor="white", edgecolor=style.GOAL, lw=1.4, label="stop: the part is there"))
-    words = "side {} from here on" if found.mode == "stop" else "caught from here on: right on side {}"
-    keys.append(style.key(f"goal: {words.format(found.goal[1])}", **style.GOAL_LINE))
-    if hasattr(found.sensor, "x"):
+    words = "side {} from here on" if synthesis.mode == "stop" else "caught from here on: right on side {}"
+    keys.append(style.key(f"goal: {words.format(synthesis.goal[1])}", **style.GOAL_LINE))
+    if hasattr(synthesis.sensor, "x"):
         keys.append(style.key("sensor", color=style.INK, lw=1.0, ls=(0, (5, 2))))
     return keys

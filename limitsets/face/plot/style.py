@@ -1,4 +1,4 @@
-"""Shared by all figures: what a figure is of, colours, line styles, hatches, an empty figure, a piece of an orbit."""
+"""Shared by all figures: their subject, colours, line styles, hatches, an empty figure, a piece of an orbit."""
 
 from __future__ import annotations
 
@@ -29,32 +29,32 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------
-# What a figure is of: a scene, or a map of one's own with its domain, as a transition graph carries them.
+# The subject of a figure: a scene, or a user's map with its domain, as a transition graph has them.
 
 
 class Subject(NamedTuple):
-    """A map in one dimension, and how to speak of it.
+    """A map in one dimension, and the words for it.
 
     Parameters
     ----------
     name : str
-        Whose figure it is.
+        Name of the scene or map.
     unit : str
-        Of x; empty for a map of one's own.
+        Unit of x; empty for a user's map.
     map : NamedTuple
         The parameters of the map.
     domain : Domain
-        Where its states lie.
+        The domain of the map.
     least, most : ndarray of shape (sides,), float
-        Where a state can be on each side, and on any: of a scene a_i and the arm's end.
+        Least state on each side, and largest on any side; for a scene a_i and the end of the arm.
     goal : Goal or None
-        Of a scene.
+        Goal of the scene.
     branches : tuple of str
         Names of the codes from 0.
     flags : dict
-        Where another vertex lands first, per side.
+        Places from which another vertex lands first, per side.
     thrown : bool
-        Whether it is a scene.
+        Whether the map is that of a scene.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Subject(NamedTuple):
 
     @property
     def sides(self) -> int:
-        """How many there are."""
+        """Number of sides."""
         return len(self.least)
 
 
@@ -89,17 +89,35 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
     """
     if isinstance(source, Scene):
         branches, flags = kind_of(source.map).branches, other_vertex_first(source)
-        ends = (source.sides.a, source.arm_length)
         return Subject(
-            source.name, source.unit, source.map, source.domain, *ends, source.goal, branches, flags, True
-        )  # fmt: skip
+            source.name,
+            source.unit,
+            source.map,
+            domain=source.domain,
+            least=source.sides.a,
+            most=source.arm_length,
+            goal=source.goal,
+            branches=branches,
+            flags=flags,
+            thrown=True,
+        )
     domain = source.grid.domain
     if source.grid.dimension > 1:
         remedy = "draw its basins, or a section of it"
         raise AnswerError("the dimension of the map", source.grid.dimension, "1", remedy)
     kind = kind_of(source.map)
-    ends = (domain.lo[:, 0], float(domain.hi.max()))
-    return Subject(type(source.map).__name__, "", source.map, domain, *ends, None, kind.branches, {}, False)
+    return Subject(
+        type(source.map).__name__,
+        "",
+        source.map,
+        domain=domain,
+        least=domain.lo[:, 0],
+        most=float(domain.hi.max()),
+        goal=None,
+        branches=kind.branches,
+        flags={},
+        thrown=False,
+    )
 
 
 # ----------------------------------------------------------------
@@ -128,9 +146,9 @@ JOG_LINE, FLIP_LINE, ROLL_LINE = "-", (0, (4.5, 1.8)), (0, (4.5, 1.5, 1.0, 1.5))
 GOAL_LINE: dict[str, Any] = {"color": GOAL, "lw": 1.3, "ls": (0, (1, 1.5))}
 SMALL, TEXT = 8.5, 10.0
 
-# Steps before an orbit is taken to be on its attractor.
+# Steps after which an orbit counts as being on its attractor.
 TRANSIENT = 2000
-# Throws of an orbit that are drawn.
+# Throws of an orbit that are drawn at most.
 MOST = 90
 
 
@@ -148,23 +166,23 @@ def panels(
 ) -> tuple[Figure, list[Axes]]:
     """Make a figure of panels that share their limits, and label the lowest in each column.
 
-    `size` is that of a panel, `room` what is left around all of them [inches].
+    `size` is the size of a panel, `room` the border around all of them [inches].
     """
     rows = math.ceil(count / columns)
     wide, tall = size[0] * columns + room[0], size[1] * rows + room[1]
-    figure, found = canvas(wide, tall, rows, columns, sharex=True, sharey=True)
-    for axes in found[count:]:
+    figure, frames = canvas(wide, tall, rows, columns, sharex=True, sharey=True)
+    for axes in frames[count:]:
         axes.set_axis_off()
-    for k, axes in enumerate(found[:count]):
+    for k, axes in enumerate(frames[:count]):
         lowest = k + columns >= count
         axes.xaxis.set_tick_params(labelbottom=lowest)
         axes.set_xlabel(below if lowest else "")
-    return figure, found[:count]
+    return figure, frames[:count]
 
 
-def extents_of(found: Any) -> list[Extents]:
+def extents_of(source: Any) -> list[Extents]:
     """Read intervals off an attractor, a limit set, an analysis, or several of them."""
-    extents = getattr(found, "extents", found)
+    extents = getattr(source, "extents", source)
     if isinstance(extents, Mapping):
         return [extents]
     if isinstance(extents, Iterable) and not isinstance(extents, str):
@@ -173,7 +191,7 @@ def extents_of(found: Any) -> list[Extents]:
         if len(known) == len(parts):
             return known
     allowed = "attractors, limit sets or an analysis"
-    raise AnswerError("what to draw", type(found).__name__, allowed, "pass one of these")
+    raise AnswerError("what to draw", type(source).__name__, allowed, "pass one of these")
 
 
 def ends_of(sets: Iterable[Extents]) -> list[float]:
@@ -182,7 +200,7 @@ def ends_of(sets: Iterable[Extents]) -> list[float]:
 
 
 def stretch(scene: Scene | Subject, extents: Extents, throws: int = 12) -> Orbit | None:
-    """Cut whole rounds out of an orbit: from an arrival on its first side to a later one, `throws` of them or more.
+    """Cut whole rounds out of an orbit: from one arrival on its first side to another, at least `throws` throws later.
 
     Parameters
     ----------
@@ -191,12 +209,12 @@ def stretch(scene: Scene | Subject, extents: Extents, throws: int = 12) -> Orbit
     extents : mapping
         Intervals of the attractor.
     throws : int
-        Least number of throws; there are at most 90, whether or not a round is complete then.
+        Least number of throws; there are at most 90, even if the last round is then not complete.
 
     Returns
     -------
     Orbit or None
-        None where no orbit stays.
+        None if no orbit stays.
     """
     starts = [(hi - lo, side, 0.5 * (lo + hi)) for side, parts in extents.items() for lo, hi in parts]
     if not starts:
@@ -217,7 +235,7 @@ def stretch(scene: Scene | Subject, extents: Extents, throws: int = 12) -> Orbit
 
 
 def of_set(number: int) -> dict[str, Any]:
-    """Face, hatch and edge of a set of this number."""
+    """Give face, hatch and edge of the set with this number."""
     face, hatch = SETS[number % len(SETS)]
     return {"facecolor": face, "hatch": hatch, "edgecolor": INK}
 
@@ -228,28 +246,28 @@ def bar(axes: Axes, lo: float, hi: float, middle: float, half: float, **look: An
 
 
 def note(axes: Axes, words: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
-    """Write words at a shift [points] from a place: in data, or as `xycoords` says."""
+    """Write words at a shift [points] from a place, in data coordinates or those of `xycoords`."""
     axes.annotate(words, at, xytext=shift, textcoords="offset points", **{"fontsize": SMALL, **how})
 
 
 def name(axes: Axes, words: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
-    """Name a critical point, left below a place; `keep_apart` knows such names."""
+    """Write the name of a critical point, left below a place; `keep_apart` finds such names by their gid."""
     note(axes, words, at, shift, ha="right", va="top", gid="name", **how)
 
 
 def open_frame(axes: Axes, *borders: str) -> None:
-    """Take borders of a frame away: the top and the right one, and those named."""
+    """Remove borders of a frame: the top and the right one, and those named."""
     axes.spines[["top", "right", *borders]].set_visible(False)
 
 
 def lanes(axes: Axes) -> None:
-    """Leave nothing of the frame but its base: there is a lane for each name on the left."""
+    """Remove the frame except its base, for figures with one lane per name on the left."""
     open_frame(axes, "left")
     axes.tick_params(axis="y", length=0)
 
 
 def goal(axes: Axes, scene: Scene | Subject, zorder: float) -> None:
-    """Draw a line where the goal begins beyond which only one side is allowed, if that is the scene's goal."""
+    """Draw the line beyond which only one side is allowed, if the scene's goal is of this kind."""
     if isinstance(scene.goal, OrientedBeyond):
         axes.axvline(scene.goal.x, zorder=zorder, gid="goal", **GOAL_LINE)
 
@@ -260,7 +278,7 @@ def key(label: str, **look: Any) -> Line2D:
 
 
 def key_of_goal(scene: Scene | Subject) -> list[Line2D]:
-    """Make the entry of what `goal` draws."""
+    """Make the legend's entry for the line that `goal` draws."""
     if not isinstance(scene.goal, OrientedBeyond):
         return []
     return [key(f"goal: side {scene.goal.side} beyond {scene.goal.x:g} {scene.unit}", **GOAL_LINE)]
@@ -278,14 +296,14 @@ def title(figure: Figure, text: str) -> None:
 
 
 def keep_apart(axes: Axes, share: float) -> None:
-    """Take away names of critical points that would run into the name before: each is left of its point.
+    """Remove names of critical points that would overlap the name before; each name is left of its point.
 
     Parameters
     ----------
     axes : Axes
-        With its limits set; the names have the gid "name", and those of one row stand together, from left to right.
+        Axes with their limits set; names have the gid "name", and those of one row are in order from left to right.
     share : float
-        Room that a name takes, of the width of the axes.
+        Width of a name, as a share of the width of the axes.
     """
     lo, hi = axes.get_xlim()
     row, last = None, lo
@@ -298,7 +316,7 @@ def keep_apart(axes: Axes, share: float) -> None:
 
 
 def interval_text(parts: Sequence[tuple[float, float]]) -> str:
-    """Intervals as text, one per line, two lines at most."""
+    """Write intervals, one per line, in at most two lines."""
     lines = [f"{lo:.2f} to {hi:.2f}" for lo, hi in parts[:2]]
     if len(parts) > 2:
         lines[-1] = f"... {len(parts)} intervals"

@@ -1,7 +1,7 @@
 """One throw of the map as motion: the part's vertices in flight, the impact, and the way to rest.
 
-The angle at the impact, the place of rest and the sides turned are the map's.  A throw that scatters gives its kappa
-back by the angle at which its vertex lands, and its landing by where it comes to rest.
+The angle at the impact, the place of rest and the sides turned are those of the map.  For a throw that scatters, kappa
+is computed back from the angle at which its vertex lands, and the noise of its landing from its place of rest.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------
-# Where a part's vertices are: lying on a side, and in flight.  Figures and animations place it by the same
+# Places of a part's vertices: lying on a side, and in flight.  Figures and animations place the part by the same
 # functions.
 #
 # A pose is the centre of mass (x, y) and the angle by which the part has turned from the frame of the scene's vertices.
@@ -54,8 +54,8 @@ def outline(scene: Scene, side: int) -> Array:
 def turned(points: Array, angle: float) -> Array:
     """Turn points counterclockwise about the origin."""
     cosine, sine = math.cos(angle), math.sin(angle)
-    found: Array = points @ np.array([[cosine, sine], [-sine, cosine]])
-    return found
+    images: Array = points @ np.array([[cosine, sine], [-sine, cosine]])
+    return images
 
 
 def centre_in_flight(
@@ -76,15 +76,15 @@ def centre_in_flight(
 # bounce), the way between the two is drawn: `Turning.drawn` says so.
 
 
-# Longer than this near the top of a vertex is not shown [1/w]; a way that is drawn takes so long at most.
+# Longest time of a turn about a vertex that is shown [1/w], also of a turn that is drawn.
 LONGEST, DRAWN = 40.0, 1.0
 MOST_FACES = 60
-# Of the part's size: places nearer than this are the same.
+# Places closer than this share of the part's size count as the same.
 SAME = 1e-6
 
 
 class Impact(NamedTuple):
-    """A vertex has struck.
+    """An impact of a vertex.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Impact(NamedTuple):
     centre : ndarray, shape (2,)
         Its centre of mass [length].
     struck : int
-        Which vertex: 0, or minus so many counterclockwise from it.
+        Number of the vertex: 0, or minus the number of vertices counterclockwise from vertex 0.
     velocity : tuple of (float, float, float)
         Of the centre of mass and of the rotation just before [length, length, 1], of a throw at rate 1.
     """
@@ -110,14 +110,14 @@ class Turning(NamedTuple):
     Attributes
     ----------
     time : float
-        How long it takes, of a throw at rate 1.
+        Duration, for a throw at rate 1.
     pose : callable
         From shares of this time, shape (n,), to poses since the impact, shape (n, 3): where the centre of mass is, and
         by how much the part has turned [length, rad].
     faces : tuple of (float, float, float)
-        Shares of the time at which it rolls on over another vertex, and where that is.
+        Shares of the time at which the part rolls on over another vertex, and the places of these vertices.
     shift : float
-        How much farther the flight led than its formulas say, where landings scatter [length].
+        Noise of the landing: distance of the landing from that of the formulas [length].
     drawn : bool
         Whether it is drawn rather than computed.
     """
@@ -130,7 +130,7 @@ class Turning(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """Turning about one vertex: when it begins, how long it takes, and angle over time."""
+    """A turn about one vertex: its begin, its duration, and the angle over time."""
 
     begin: float
     time: float
@@ -152,7 +152,7 @@ def _inertia(rho: float, arm: Array) -> float:
 
 
 def _struck_rate(rho: float, arm: Array, velocity: tuple[float, float, float]) -> float:
-    """Rate after a plastic impact: angular momentum about the vertex stays."""
+    """Rate after a plastic impact, which conserves angular momentum about the vertex."""
     across, up, rate = velocity
     return (rho * rho * rate + float(arm[0]) * up - float(arm[1]) * across) / _inertia(rho, arm)
 
@@ -160,7 +160,7 @@ def _struck_rate(rho: float, arm: Array, velocity: tuple[float, float, float]) -
 def _pendulum(
     arm: Array, rate: float, ends: tuple[float, float], inertia: float, gravity: tuple[float, float]
 ) -> tuple[float, float, Callable[[Array], Array], int] | None:
-    """Turn until one of two angles: time, rate then, angle over time, and which; None where that takes too long."""
+    """Turn until one of two angles: time, final rate, angle over time, and which; None if this takes too long."""
     from scipy.integrate import solve_ivp
 
     along, down = gravity
@@ -184,7 +184,7 @@ def _pendulum(
 
     for event, way in ((low, -1.0), (high, 1.0)):
         event.terminal, event.direction = True, way  # type: ignore[attr-defined]  # scipy reads them there
-    found = solve_ivp(
+    swing = solve_ivp(
         rates,
         (0.0, LONGEST),
         [0.0, rate],
@@ -194,20 +194,20 @@ def _pendulum(
         rtol=1e-10,
         atol=1e-12,
     )
-    if found.status != 1:
+    if swing.status != 1:
         return None
-    number = 0 if found.t_events[0].size else 1
-    end, solution = float(found.t[-1]), found.sol
-    return end, float(found.y[1, -1]), lambda at: solution(at)[0], number
+    number = 0 if swing.t_events[0].size else 1
+    end, solution = float(swing.t[-1]), swing.sol
+    return end, float(swing.y[1, -1]), lambda at: solution(at)[0], number
 
 
 def _ends(corners: Array, vertex: int) -> tuple[float, float]:
-    """By how much the part may turn about a vertex: clockwise, not positive, and counterclockwise."""
+    """Angles by which the part can turn about a vertex: clockwise (at most 0) and counterclockwise."""
     n = len(corners)
     before, after = corners[(vertex - 1) % n], corners[(vertex + 1) % n]
     here = corners[vertex % n]
     onward, back = after - here, here - before
-    # the two are less than half a turn each; a side that lies down already is 0, to rounding
+    # each angle is less than half a turn; it is 0, up to rounding, for a side that lies on the arm already
     clockwise = math.atan2(float(onward[1]), float(onward[0]))
     counter = -math.atan2(float(back[1]), float(back[0]))
     return -max(clockwise, 0.0), max(counter, 0.0)
@@ -224,36 +224,36 @@ def turned_to_rest(
     rolls: bool,
     scatters: bool,
 ) -> Turning:
-    """Find the way from an impact to rest.
+    """Find the motion from an impact to rest.
 
     Parameters
     ----------
     hit : Impact
         The impact.
     rest : tuple of (ndarray, float)
-        Where the centre of mass comes to rest [length], and by how much the part turns until then [rad].
+        Place of rest of the centre of mass [length], and angle by which the part turns until then [rad].
     sides : int
-        So many sides it turns from the one it was thrown from, counterclockwise.
+        Number of sides by which the part turns, counterclockwise, from the side of the throw.
     rho : float
         Radius of gyration [length].
     gravity : tuple of (float, float)
-        Over the squared rate of the throw, along the arm and off it [length].
+        Gravity over the squared rate of the throw, along the arm and away from it [length].
     pendulum : bool
-        Whether the struck vertex is held and the criterion is that of a pendulum.
+        Whether the striking vertex is held, and the part turns over as a pendulum does.
     rolls : bool
-        Whether it may roll on.
+        Whether the part can roll on.
     scatters : bool
-        Whether the landing place may deviate.
+        Whether the landing has noise.
     """
-    found = _pendulums(hit, sides, rho, gravity, rolls) if pendulum else None
-    if found is not None:
-        last = found[-1]
+    pieces = _pendulums(hit, sides, rho, gravity, rolls) if pendulum else None
+    if pieces is not None:
+        last = pieces[-1]
         off = rest[0] - last.pose(np.array([last.begin + last.time]))[0, :2]
         size = float(np.abs(hit.corners - hit.centre).max())
         shift = float(off[0]) if scatters else 0.0
         if max(abs(float(off[0]) - shift), abs(float(off[1]))) <= SAME * size:
             aside = np.array([shift, 0.0])
-            return _joined([piece._replace(vertex=piece.vertex + aside) for piece in found], rest, shift)
+            return _joined([piece._replace(vertex=piece.vertex + aside) for piece in pieces], rest, shift)
     return _drawn(hit, rest)
 
 
@@ -292,7 +292,7 @@ def _pendulums(
 
 
 def _joined(pieces: list[_Piece], rest: tuple[Array, float], shift: float) -> Turning:
-    """Show one piece after the other; the last frame is where the map says, to the last digit."""
+    """Join the pieces in time; the last pose is exactly that of the map."""
     time = pieces[-1].begin + pieces[-1].time
     begins = np.array([piece.begin for piece in pieces])
 
@@ -312,7 +312,7 @@ def _joined(pieces: list[_Piece], rest: tuple[Array, float], shift: float) -> Tu
 
 
 def _drawn(hit: Impact, rest: tuple[Array, float]) -> Turning:
-    """Draw a way: it turns and shifts evenly, its lowest corner on the arm."""
+    """Draw a motion: the part turns and shifts evenly, with its lowest corner on the arm."""
     shape, floor = hit.corners - hit.centre, float(hit.corners[hit.struck % len(hit.corners), 1])
     foot = hit.corners[hit.struck % len(hit.corners)] - hit.centre
     place, turn = rest
@@ -337,7 +337,7 @@ def _drawn(hit: Impact, rest: tuple[Array, float]) -> Turning:
 # One throw of the map as motion: the flight by its formulas, the impact, and the way to rest.
 
 
-# Effects that the turn about the struck vertex does not know.
+# Effects that the turn about the striking vertex does not include.
 CONTACTS = ("slip", "pivot", "bounce")
 
 
@@ -347,15 +347,15 @@ class Throw(NamedTuple):
     Attributes
     ----------
     x, side : float, int
-        Where the part rests before it [length].
+        Place of rest before the throw [length].
     after, side_after : float, int
-        And after it.
+        Place of rest after the throw [length].
     code, turned : int
-        What it was, and sides turned.
+        Kind of the throw, and number of sides turned.
     phi : float
         Angle at the impact [rad].
     kappa : float
-        Of this throw [length].
+        Kappa of this throw [length].
     other_first : bool
         Whether another corner would have landed first, which the model leaves out.
     scatters : bool
@@ -375,25 +375,25 @@ class Throw(NamedTuple):
 
     @property
     def word(self) -> str:
-        """What it was, in a word."""
+        """The kind of the throw, in a word."""
         if self.code in (codes.INWARD, codes.OUTWARD):
             return "off the arm's end" if self.code == codes.OUTWARD else "into the joint"
         return codes.NAMES[self.code]
 
 
 class Motion(NamedTuple):
-    """How the part moves.
+    """The motion of the part in one throw.
 
     Attributes
     ----------
     flight : callable
         From shares of the flight to poses, shape (n, 3).
     struck : tuple of (float, float)
-        Where the vertex strikes [length].
+        Place at which the vertex strikes [length].
     impact : ndarray, shape (3,)
         The pose there.
     turning : Turning
-        What follows.
+        The motion after the impact.
     """
 
     flight: Callable[[Array], Array]
@@ -403,8 +403,8 @@ class Motion(NamedTuple):
 
 
 def throws_of(scene: Scene, path: Trace, kappa: float | None = None) -> list[Throw]:
-    """Read throws off a trace; those outside the model, which have no impact, are left out with all after them."""
-    found = []
+    """Read throws from a trace, up to the first one outside the model, which has no impact."""
+    throws = []
     for k in range(path.code.size):
         if path.code[k] == codes.OUTSIDE_MODEL or not math.isfinite(float(path.phi[k])):
             break
@@ -412,26 +412,26 @@ def throws_of(scene: Scene, path: Trace, kappa: float | None = None) -> list[Thr
             float(path.x[k]),
             int(path.side[k]),
             float(path.x[k + 1]),
-            int(path.side[k + 1]),
-            int(path.code[k]),
-            int(path.turned[k]),
-            float(path.phi[k]),
-            scene.kappa if kappa is None else kappa,
-            bool(path.other_vertex_first[k]),
+            side_after=int(path.side[k + 1]),
+            code=int(path.code[k]),
+            turned=int(path.turned[k]),
+            phi=float(path.phi[k]),
+            kappa=scene.kappa if kappa is None else kappa,
+            other_first=bool(path.other_vertex_first[k]),
         )
         if scene.effects.spread is not None:
             throw = throw._replace(kappa=kappa_of(scene, throw), scatters=True)
-        found.append(throw)
-    return found
+        throws.append(throw)
+    return throws
 
 
 def stroke_of(scene: Scene) -> float:
-    """Angle of the stroke, where the scene simulates it; 0 for an impulse [rad]."""
+    """Angle of the stroke, if the scene simulates it; 0 for an impulse [rad]."""
     return float(scene.world.stroke or 0.0) if scene.effects.drive else 0.0
 
 
 def lands(scene: Scene, throw: Throw) -> int:
-    """Which vertex strikes: 0, the left one, or minus so many counterclockwise from it."""
+    """Find the vertex that strikes: 0 for the left one, or minus the number of vertices counterclockwise from it."""
     if not scene.effects.landing:
         return 0
     heights = turned(outline(scene, throw.side), throw.phi)[:, 1]
@@ -440,7 +440,7 @@ def lands(scene: Scene, throw: Throw) -> int:
 
 
 def kappa_of(scene: Scene, throw: Throw) -> float:
-    """Kappa of a throw that scatters: that with which its vertex lands at this angle."""
+    """Kappa of a throw that scatters, computed from the angle at which its vertex lands."""
     p, q = outline(scene, throw.side)[lands(scene, throw)]
     d, phi = float(scene.sides.d[throw.side]), throw.phi
     height = d + throw.x * phi + float(p) * math.sin(phi) + float(q) * math.cos(phi)
@@ -448,7 +448,7 @@ def kappa_of(scene: Scene, throw: Throw) -> float:
 
 
 def motion(scene: Scene, throw: Throw) -> Motion:
-    """Say how the part moves in one throw, of a throw at rate 1."""
+    """Give the motion of the part in one throw, at rate 1."""
     kappa, lean = throw.kappa, stroke_of(scene)
     gravity = -kappa * math.sin(lean), -kappa * math.cos(lean)
     exact = scene.flight == "exact"
@@ -503,7 +503,7 @@ def _exact_flight(scene: Scene, throw: Throw, gravity: tuple[float, float]) -> C
 
 
 def _small_flight(scene: Scene, throw: Throw) -> Callable[[Array], Array]:
-    """Hang the part at its left vertex, of which the small-angle formulas give the path: (R - a - h phi, ...)."""
+    """Attach the part to its left vertex, whose path follows the small-angle formulas: (R - a - h phi, ...)."""
     a, d, h = float(scene.sides.a[throw.side]), float(scene.sides.d[throw.side]), scene.surface_height
     fall = throw.kappa - (d if scene.flight == "small-angle-2" else 0.0)
 

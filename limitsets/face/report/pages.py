@@ -1,7 +1,7 @@
 """Pages in the words of someone who builds a feeder: tables, goals as sentences, what a fit says, as Markdown and HTML.
 
-The words stand in `templates`.  A paragraph there may be broken into lines as its sentences come: it is one line in the
-page, and one whose sentences are all left out is none.
+The texts are in `templates`.  A paragraph of a template can have line breaks between its sentences: it becomes one line
+of the page.  A paragraph without any sentence left is dropped.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def percent(share: float) -> str:
-    """Write a share; all and nothing are written only where they are meant.
+    """Write a share; 0 % and 100 % are written only if the share is exactly that.
 
     Examples
     --------
@@ -102,16 +102,16 @@ def count(least: int, most: int) -> str:
 
 
 def in_time(throws: float | None, rate: float | None, *, parts: bool = False) -> str:
-    """Write a number of throws in seconds, and as parts per minute one after the other; empty where no rate is known.
+    """Write a number of throws in seconds, and as parts per minute one after the other; empty if no rate is known.
 
     Parameters
     ----------
     throws : float or None
-        How many.
+        Number of throws.
     rate : float or None
         Throws per second (`world.throw_rate`).
     parts : bool
-        Whether a part is fed after so many.
+        Whether one part is fed after this number of throws.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def intervals(parts: Iterable[tuple[float, float]], digits: int = 3) -> str:
 
 
 def bands(extents: Extents) -> list[tuple[float, float, tuple[int, ...]]]:
-    """Cut the x axis where a side begins or ceases to occur: ``(lo, hi, sides)``, ascending; empty stretches left out.
+    """Cut the x axis at the ends of all intervals: ``(lo, hi, sides)``, ascending, without empty stretches.
 
     Examples
     --------
@@ -144,27 +144,27 @@ def bands(extents: Extents) -> list[tuple[float, float, tuple[int, ...]]]:
     [(1.0, 2.0, (0,)), (2.0, 3.0, (0, 1)), (3.0, 4.0, (1,))]
     """
     cuts = sorted({x for parts in extents.values() for pair in parts for x in pair})
-    found = []
+    pieces = []
     for lo, hi in pairwise(cuts):
         middle = 0.5 * (lo + hi)
         sides = tuple(sorted(s for s, parts in extents.items() if any(a <= middle <= b for a, b in parts)))
         if sides:
-            found.append((lo, hi, sides))
-    return found
+            pieces.append((lo, hi, sides))
+    return pieces
 
 
 # ---------------------------------------------------------------- Goals as sentences
 
 
-# So many times as many cells are proposed where starts are undecided, up to the last.
+# Factor on the number of cells that is proposed if starts are undecided, and the largest number of cells.
 FINER, MOST_CELLS = 4, 1_000_000
 
-# Of a sum of shares.
+# Rounding error of a sum of shares.
 ROUNDING = 1e-9
 
 
 def goal_sentence(goal: Goal, unit: str) -> str:
-    """Say what a goal asks, and of what.
+    """State a goal as a sentence.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def goal_sentence(goal: Goal, unit: str) -> str:
 
 
 def verdict_of(outcome: GoalOutcome, share: float) -> str:
-    """Say what became of a goal: where it holds, of what, and which share of the starts comes there.
+    """Say whether a goal holds, on which limit sets, and for which share of the starts.
 
     Examples
     --------
@@ -197,7 +197,7 @@ def verdict_of(outcome: GoalOutcome, share: float) -> str:
 
 
 def verdict_words(goal: Goal, holds: bool | None, share: float, sets: int, *, vacuous: bool) -> str:
-    """Say the same of a goal that was judged otherwise, on so many limit sets."""
+    """Say the same of a verdict that comes from elsewhere, on a given number of limit sets."""
     if vacuous:
         return "holds vacuously"
     if holds and not (goal.from_anywhere or goal.of_every_start):
@@ -220,7 +220,7 @@ def starts_words(starts: object, share: float | None) -> str:
 
 
 def next_command(analysis: Analysis) -> str:
-    """Name the command that goes on from an analysis with a goal: prove it, find what can deviate, or a design.
+    """Name the next command after an analysis with a goal: a proof, a margin, or a design.
 
     Examples
     --------
@@ -231,7 +231,7 @@ def next_command(analysis: Analysis) -> str:
     outcome, scene = analysis.goal, analysis.scene
     source = _source(scene)
     assert outcome is not None
-    if analysis.choice.tipping:  # which no other command switches on
+    if analysis.choice.tipping:  # no other command switches `auto` on
         lines = " and ".join(f"{effect} = true" for effect in analysis.choice.tipping)
         return f"write {lines} under [effects] of {source}; {proposed('check', source)} says whether it is in order"
     audited = f"{proposed('audit', source)} (which assumptions it breaks)"
@@ -250,7 +250,7 @@ def next_command(analysis: Analysis) -> str:
 
 
 def can_be_proved(scene: Scene) -> bool:
-    """Whether there are proofs about a scene: not with effects that nothing encloses."""
+    """Whether proofs about a scene are possible: not with effects without an enclosure."""
     try:
         simulated(scene)
     except AnswerError:
@@ -259,7 +259,7 @@ def can_be_proved(scene: Scene) -> bool:
 
 
 def _speeds(scene: Scene) -> tuple[str, ...]:
-    """Write an axis of an atlas from half to twice the speed that a scene gives; empty where it gives none."""
+    """Write an axis of an atlas from half to twice the speed of a scene; empty if the scene gives none."""
     given = scene.text["throw"].get("speed")
     if given is None:
         return ()
@@ -268,7 +268,7 @@ def _speeds(scene: Scene) -> tuple[str, ...]:
 
 
 def after_undecided(analysis: Analysis) -> str:
-    """Name the command that decides more starts; empty where none is undecided, or more cells do not help.
+    """Name the command that decides more starts; empty if none is undecided, or more cells do not help.
 
     Examples
     --------
@@ -284,7 +284,7 @@ def after_undecided(analysis: Analysis) -> str:
 
 
 def after_unproved(proof: Proof) -> str:
-    """Name the command that goes on from a proof in which a claim is not proved."""
+    """Name the next command after a proof in which a claim is not proved."""
     scene, goal = proof.scene, proof.scene.goal
     verdicts = {claim.verdict for claim in proof.claims if claim.claim == "goal"}
     if (proof.noise or proof.tolerance) and "proved-on-cells" not in verdicts:
@@ -297,7 +297,7 @@ def after_unproved(proof: Proof) -> str:
 
 
 def without_margin(scene: Scene, goals: Sequence[Goal], *, fails: bool) -> str:
-    """Name the command that goes on from a scene without margins: its goal fails, or is not proved of it."""
+    """Name the next command for a scene without margins, whose goal fails or is not proved."""
     analysed = proposed("analyse", _source(scene))
     starts = f"{analysed} (which starts leave the arm: margins need a scene in which none does)"
     if can_be_proved(scene):
@@ -306,7 +306,7 @@ def without_margin(scene: Scene, goals: Sequence[Goal], *, fails: bool) -> str:
 
 
 def design_command(scene: Scene, goals: Sequence[Goal]) -> str:
-    """Name the command that looks for a scene that meets a goal; empty where there is none for it."""
+    """Name the command that designs a scene for a goal; empty if there is no such command."""
     if scene.effects.on() or not any(isinstance(goal, OrientedBeyond | Reaches) for goal in goals):
         return ""
     words = "a scene that meets it: centre of mass, throw and surface moved"
@@ -318,9 +318,9 @@ def _source(scene: Scene) -> str:
 
 
 def void_of(outcome: GoalOutcome, unit: str, spread: str | None) -> str:
-    """Say where a goal that holds speaks of nothing; empty where it does not.
+    """Say in which way a goal holds only vacuously; empty if it does not.
 
-    With `spread` the scene scatters its throws, and the limit set is that without scatter.
+    With `spread` the scene scatters its throws; the limit set is then that of throws without scatter.
 
     Examples
     --------
@@ -349,22 +349,22 @@ def void_of(outcome: GoalOutcome, unit: str, spread: str | None) -> str:
 # The pages: an answer in the words of someone who builds a feeder.
 
 
-# Blocks of these signs keep their lines: headings, tables, lists, commands.
+# Blocks that begin with these signs keep their line breaks: headings, tables, lists, commands.
 LINES = ("#", "|", "* ", "    ")
 
 
 @cache
 def environment() -> Environment:
-    """Give the templates, with what they call."""
+    """Give the environment of the templates, with their filters and functions."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    found = Environment(
+    templates = Environment(
         loader=PackageLoader("limitsets.face.report"),
         trim_blocks=True,
         undefined=StrictUndefined,
         autoescape=False,  # Markdown, no HTML
     )
-    found.filters |= {
+    templates.filters |= {
         "bands": bands,
         "count_of": lambda pair: count(*pair),
         "degrees": math.degrees,
@@ -373,7 +373,7 @@ def environment() -> Environment:
         "intervals": intervals,
         "percent": percent,
     }
-    found.globals |= {
+    templates.globals |= {
         "next_command": next_command,
         "order_of": order_of,
         "proposed": proposed,
@@ -382,20 +382,20 @@ def environment() -> Environment:
         "verdict_of": verdict_of,
         "void_of": void_of,
     }
-    return found
+    return templates
 
 
 def words(template: str, figures: Mapping[str, str] | None = None, **answers: Any) -> str:
-    """Fill in a template of `templates`: paragraphs with an empty line between, without a break at the end.
+    """Fill in a template of `templates`: paragraphs are separated by an empty line, without a line break at the end.
 
     Parameters
     ----------
     template : str
         Its name, without endings.
     figures : mapping of str to str, optional
-        File names of the pictures by kind; a picture that is not there is left out.
+        File names of the pictures by kind; missing pictures are left out.
     **answers
-        What the template speaks of.
+        Variables of the template.
     """
 
     def figure(kind: str, caption: str) -> str:
@@ -433,11 +433,11 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
     >>> page(ls.analyse("paper-designed"), {}).splitlines()[0]
     '# paper-designed: where the throws lead'
     """
-    from limitsets.feeder.thrower.effects import EFFECTS  # lazily: it loads numba
+    from limitsets.feeder.thrower.effects import EFFECTS  # imported here, because it loads numba
 
     effects = analysis.scene.effects
     assumed = [each.lifts for name, each in EFFECTS.items() if name not in effects.words]
-    # of the throw; no effect lifts this
+    # an assumption about the throw; no effect lifts it
     assumed.insert(0 if effects.drive else 1, "it does not tip the part")
     broken = in_limit_sets(analysis.other_vertex_first, analysis.extents)
     return words("report", figures, analysis=analysis, broken=broken, assumed=assumed) + "\n"
@@ -469,7 +469,7 @@ def as_html(text: str, images: Mapping[str, str]) -> str:
     >>> "<h1>Throws &amp; flips</h1>" in as_html("# Throws & flips", {})
     True
     """
-    from markdown_it import MarkdownIt  # lazily: only this page needs it
+    from markdown_it import MarkdownIt  # imported here, because only this page needs it
 
     reader = MarkdownIt("commonmark", {"html": False}).enable("table")
     blocks = reader.parse(text)
@@ -482,36 +482,36 @@ def as_html(text: str, images: Mapping[str, str]) -> str:
 
 
 # ----------------------------------------------------------------
-# What a fit says in words: what the throws do not tell, rows to look at, whether the model fits, what to film
-# next.
+# A fit in words: quantities that the throws do not determine, rows to look at, whether the model fits, and what
+# to film next.
 
 
-def lines_of(found: Fit) -> list[str]:
+def lines_of(fit: Fit) -> list[str]:
     """Write the sentences, one a line."""
-    unit = found.scene.unit
-    lines = [f"{name} is kept as it was: {why}" for name, why in found.held.items()]
+    unit = fit.scene.unit
+    lines = [f"{name} is kept as it was: {why}" for name, why in fit.held.items()]
     lines += [
         f"{name} is not determined by these throws: its value goes with that of {others}, which they do not tell"
-        for name, others in found.undetermined.items()
+        for name, others in fit.undetermined.items()
     ]
-    if found.error is None:
+    if fit.error is None:
         lines.append(
             "no measurement error is given: the scatter is an upper bound (give --error or a column error)"
         )
     else:
-        lines.append(f"measurement error: {found.error:.3g} {unit} (standard deviation of a measured place)")
-    for row, column, recorded, fits in found.misread:
+        lines.append(f"measurement error: {fit.error:.3g} {unit} (standard deviation of a measured place)")
+    for row, column, recorded, fits in fit.misread:
         lines.append(f"row {row}: {column} is recorded as {recorded}, but the part landed as on side {fits}")
-    if found.misread_rate[0] > MOST_MISREAD:
+    if fit.misread_rate[0] > MOST_MISREAD:
         lines.append(
-            f"{100.0 * found.misread_rate[0]:.0f} % of the sides do not fit where parts landed, and no other reading of"
+            f"{100.0 * fit.misread_rate[0]:.0f} % of the sides do not fit where parts landed, and no other reading of"
             " the columns explains it: the sides are recorded wrong, or the part is another one"
         )
-    test = found.misfit
+    test = fit.misfit
     if test.lacking:
         why = "the throws do something that it leaves out, like rolling or slipping, or a number is wrong"
         lines.append(
-            f"the model does not fit (p = {test.p:.2g}): {found.explained or why}; do not trust the values"
+            f"the model does not fit (p = {test.p:.2g}): {fit.explained or why}; do not trust the values"
         )
     else:
         lines.append(f"the model fits: such residuals or larger ones have probability {test.p:.2g}")
@@ -519,11 +519,11 @@ def lines_of(found: Fit) -> list[str]:
         lines.append(
             f"far off: the landings of row{'s' * (len(test.strange) > 1)} {', '.join(map(str, test.strange))}"
         )
-    for each in found.further[:1]:
+    for each in fit.further[:1]:
         name, factor = max(each.shrinks.items(), key=lambda pair: pair[1])
         gain = f"ten of them shorten the interval of {name} {factor:.2g} times"
-        if not found[name].bounded:
+        if not fit[name].bounded:
             gain = f"they tell most of {name}, which these throws do not bound"
-        where = "the left corner at" if found.rows.throws.corner else "x ="
+        where = "the left corner at" if fit.rows.throws.corner else "x ="
         lines.append(f"film next: throws from {where} {each.x:.3g} {unit} on side {each.side}; {gain}")
     return lines

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 HEADS = ("quantity", "value", "deviates", "proved safe up to", "shown to fail from", "in % of the value")
 READINGS = {"fixed": "fixed, but unknown", "per-throw": "at every throw", "tolerance": "together"}
 
-# States of an orbit that are written: the last of them.
+# Number of states of an orbit that are written: the last ones.
 LAST = 8
 
-# What the numbers of the noise are called, and whether they are shares, throws, or a rate per throw.
+# Names of the numbers of the noise, and whether they are shares, throws, or a rate per throw.
 NUMBERS = {
     "time beyond": ("rests beyond X, of all", "share"),
     "wrong beyond": ("of these on a wrong side", "share"),
@@ -43,21 +43,21 @@ NUMBERS = {
     "escape": ("chance to leave the limit set, per throw", "rate"),
 }
 
-# Numbers whose change with the noise is shown.
+# Numbers whose changes with the noise are shown.
 MOVING = ("wrong beyond", "mean throws", "95 % throws", "escape")
 
-# Less than this is what rounding leaves.
+# Smaller numbers are rounding errors.
 NOTHING = 1e-9
 
 Table = tuple[Sequence[str], list[list[str]]]
 
 
-def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
+def robustness_page(sheet: Robustness, figures: Mapping[str, str]) -> str:
     """Write the page.
 
     Parameters
     ----------
-    found : Robustness
+    sheet : Robustness
         From `limitsets.robustness`.
     figures : mapping of str to str
         File names of the pictures by kind: "part", "margins", "joint", "curve", "counterexample", and of noise.
@@ -67,46 +67,46 @@ def robustness_page(found: Robustness, figures: Mapping[str, str]) -> str:
     str
         Markdown.
     """
-    first, noise = shown(found), found.noise
-    own = next((goal for goal in found.goals if isinstance(goal, OrientedBeyond | Reaches)), None)
-    proofs = [name for entry in found.entries for name in (*entry.certificates, entry.against) if name]
+    first, noise = shown(sheet), sheet.noise
+    own = next((goal for goal in sheet.goals if isinstance(goal, OrientedBeyond | Reaches)), None)
+    proofs = [name for entry in sheet.entries for name in (*entry.certificates, entry.against) if name]
     return (
         words(
             "robustness",
             figures,
-            **_told(found),
-            scene=found.scene,
+            **_told(sheet),
+            scene=sheet.scene,
             heads=HEADS,
-            rows=lines_of(found),
+            rows=lines_of(sheet),
             none_holds=none_holds,
             first=first,
-            states=first and _states(first, found),
+            states=first and _states(first, sheet),
             violated_of=violated_of,
             deviation_of=deviation_of,
             parsed_deviation=parsed_deviation,
             own=own,
             beyond=own and OrientedBeyond(own.x, own.side),
-            places=found.curve and _places(found.curve),
+            places=sheet.curve and _places(sheet.curve),
             laws=noise
             and [law_words(name, getattr(noise.scatter, name), noise.unit) for name in noise.scatter.given()],
-            numbers=noise and _numbers(noise, len(found.scene.sides), found.scene.world.throw_rate),
+            numbers=noise and _numbers(noise, len(sheet.scene.sides), sheet.scene.world.throw_rate),
             changes=noise and _changes(noise),
             files=list(dict.fromkeys(proofs)),
-            proved_some=any(entry.holds for entry in found.entries),
+            proved_some=any(entry.holds for entry in sheet.entries),
         )
         + "\n"
     )
 
 
-def answer(found: Robustness) -> str:
-    """Say in a few sentences what was asked, whether it holds, and what has the least room."""
-    return words("robust_answer", **_told(found))
+def answer(sheet: Robustness) -> str:
+    """Say in a few sentences which goals were asked, whether they hold, and which quantity has the least room."""
+    return words("robust_answer", **_told(sheet))
 
 
-def _told(found: Robustness) -> dict[str, Any]:
+def _told(sheet: Robustness) -> dict[str, Any]:
     return {
-        "found": found,
-        "void": void_of(found.goals, found.reach, found.scene.unit),
+        "sheet": sheet,
+        "void": void_of(sheet.goals, sheet.reach, sheet.scene.unit),
         "readings": READINGS,
         "bound": bound,
         "failing": failing,
@@ -115,24 +115,24 @@ def _told(found: Robustness) -> dict[str, Any]:
     }
 
 
-def tightest(found: Robustness) -> Entry | None:
-    """Return the margin that is smallest: against its tolerance where there are several, else against its value.
+def tightest(sheet: Robustness) -> Entry | None:
+    """Return the smallest margin: in units of its tolerance if two or more quantities have one, else of its value.
 
-    A landing place has no value: it is compared with the shortest side.
+    A landing place has no value: its margin is compared with the shortest side.
     """
-    if _by_tolerance(found):
-        return min(found.singles, key=lambda entry: _room(entry, found))
-    return min(found.singles, key=lambda entry: _share(entry, found), default=None)
+    if _by_tolerance(sheet):
+        return min(sheet.singles, key=lambda entry: _room(entry, sheet))
+    return min(sheet.singles, key=lambda entry: _share(entry, sheet), default=None)
 
 
-def _by_tolerance(found: Robustness) -> bool:
-    """Whether margins are compared by their tolerances: where two or more have one."""
-    return sum(_room(entry, found)[0] == 0 for entry in found.singles) > 1
+def _by_tolerance(sheet: Robustness) -> bool:
+    """Whether margins are compared by their tolerances: if two or more quantities have one."""
+    return sum(_room(entry, sheet)[0] == 0 for entry in sheet.singles) > 1
 
 
-def _room(entry: Entry, found: Robustness) -> tuple[int, float]:
-    text = found.tolerance.get(entry.quantity)
-    # the landing place is noise in a tolerance, all else fixed but unknown
+def _room(entry: Entry, sheet: Robustness) -> tuple[int, float]:
+    text = sheet.tolerance.get(entry.quantity)
+    # in a tolerance the landing place is noise, all other quantities are fixed but unknown
     if text is None or (entry.reading == "per-throw") != (entry.quantity == "landing.x"):
         return 1, math.inf
     given = parsed_deviation(text, entry.quantity)
@@ -140,17 +140,17 @@ def _room(entry: Entry, found: Robustness) -> tuple[int, float]:
     return 0, math.inf if low is None else low / float(given.number)
 
 
-def _share(entry: Entry, found: Robustness) -> float:
+def _share(entry: Entry, sheet: Robustness) -> float:
     share = percent_of(entry, entry.proved)
     if share is None:
-        return 100.0 * entry.proved / float(found.scene.sides.length.min())
+        return 100.0 * entry.proved / float(sheet.scene.sides.length.min())
     return share
 
 
-def lines_of(found: Robustness) -> list[list[str]]:
+def lines_of(sheet: Robustness) -> list[list[str]]:
     """Give the table, one line per margin of a single quantity; columns as in `HEADS`."""
     rows = []
-    for entry in found.singles:
+    for entry in sheet.singles:
         value = "-" if entry.nominal is None else f"{entry.nominal:.7g} {entry.nominal_unit}"
         low, high = (percent_of(entry, size) for size in (entry.proved, entry.refuted))
         share = "-" if low is None else f"{bound(low)} / {bound(high, up=True)}"
@@ -167,24 +167,24 @@ def lines_of(found: Robustness) -> list[list[str]]:
     return rows
 
 
-def none_holds(found: Robustness) -> str:
-    """Say of margins that are all nothing what a table of zeros would."""
-    count = len({entry.quantity for entry in found.singles})
+def none_holds(sheet: Robustness) -> str:
+    """Say in a sentence that all margins are 0, instead of a table of zeros."""
+    count = len({entry.quantity for entry in sheet.singles})
     whose = "1 quantity has" if count == 1 else f"{count} quantities have"
-    why = "the goal fails already" if found.decided == "refuted" else "the goal is not proved of it"
-    reason = next((entry.reason for entry in found.singles if entry.reason), why)
+    why = "the goal fails already" if sheet.decided == "refuted" else "the goal is not proved of it"
+    reason = next((entry.reason for entry in sheet.singles if entry.reason), why)
     return f"{whose} no margin about the scene as it is: {reason}."
 
 
-def shown(found: Robustness) -> Entry | None:
-    """Return the margin whose orbit is shown: the tightest that has one."""
-    first = tightest(found)
+def shown(sheet: Robustness) -> Entry | None:
+    """Return the margin whose orbit is shown: the tightest one, or the first with an orbit."""
+    first = tightest(sheet)
     candidates = [] if first is None else [first]
-    return next((entry for entry in [*candidates, *found.entries] if entry.counterexample), None)
+    return next((entry for entry in [*candidates, *sheet.entries] if entry.counterexample), None)
 
 
 def deviation_of(entry: Entry) -> str:
-    """Say by how much a quantity is off at the upper end of its margin, for use within a sentence."""
+    """Give the deviation of a quantity at the upper end of its margin, for use within a sentence."""
     if entry.quantity == "joint":
         return f"every quantity {bound(entry.refuted, up=True)} times its tolerance off at most"
     at = bound(entry.refuted, entry.unit, up=True)
@@ -194,7 +194,7 @@ def deviation_of(entry: Entry) -> str:
 
 
 def _value_at(entry: Entry) -> str:
-    """Give the value itself at which the orbit violates the goal: it says to which side."""
+    """Give the value at which the orbit violates the goal, which shows the direction of the deviation."""
     thrown = (entry.counterexample[0]["parameters"] if entry.counterexample else None) or {}
     for name, told in ((entry.quantity, "at"), ("throw.kappa", "kappa =")):
         given = thrown.get(name)
@@ -204,9 +204,9 @@ def _value_at(entry: Entry) -> str:
     return ""
 
 
-def _states(entry: Entry, found: Robustness) -> Table:
+def _states(entry: Entry, sheet: Robustness) -> Table:
     """Give the last states of an orbit as a table."""
-    orbit, unit = entry.counterexample, found.scene.unit
+    orbit, unit = entry.counterexample, sheet.scene.unit
     scattered = entry.reading == "per-throw" and entry.quantity != "landing.x"
     lands = any("landing.x" in (state["parameters"] or {}) for state in orbit)
     heads = ["throws", f"x [{unit}]", "side"]
@@ -217,19 +217,19 @@ def _states(entry: Entry, found: Robustness) -> Table:
         thrown: Mapping[str, Any] = state["parameters"] or {}
         row = [str(number), f"{state['x']:.6f}", str(state["side"])]
         if scattered:
-            row.append(_kappa_off(thrown, found))
+            row.append(_kappa_off(thrown, sheet))
         if lands:
             row.append(f"{float(thrown['landing.x'].split()[0]):+.6f}" if "landing.x" in thrown else "")
         rows.append(row)
     return heads, rows
 
 
-def _kappa_off(thrown: Mapping[str, Any], found: Robustness) -> str:
+def _kappa_off(thrown: Mapping[str, Any], sheet: Robustness) -> str:
     given = thrown.get("throw.kappa")
     if given is None:
         return ""
     text = given if isinstance(given, str) else given[0]
-    return f"{100.0 * (float(text.split()[0]) / found.scene.kappa - 1.0):+.4f}"
+    return f"{100.0 * (float(text.split()[0]) / sheet.scene.kappa - 1.0):+.4f}"
 
 
 def _places(curve: MarginsBeyond) -> Table:
@@ -256,7 +256,7 @@ def _value(value: float | None, kind: str) -> str:
 
 
 def _error(value: float | None, kind: str) -> str:
-    """Write an error with the two digits that it has."""
+    """Write an error with two digits."""
     if value is None or not math.isfinite(value) or value < NOTHING:
         return _value(value, "share")
     return f"{value:.2g}" if kind != "share" else f"{100.0 * value:.2g} %"
@@ -273,7 +273,7 @@ def _change(value: float, kind: str) -> str:
 
 
 def law_words(name: str, law: Law, unit: str) -> str:
-    """Say a law as people give it.
+    """Describe a law of noise.
 
     Examples
     --------
@@ -314,7 +314,7 @@ def _numbers(noise: NoiseStatistics, sides: int, rate: float | None) -> Table:
 
 
 def _changes(noise: NoiseStatistics) -> Table:
-    """Say what 10 % more noise of each quantity changes."""
+    """Give the changes of the numbers with 10 % more noise of each quantity."""
     rows = []
     for quantity, slopes in noise.sensitivity.items():
         changes = [0.1 * slopes[name].slope if name in slopes else math.nan for name in MOVING]
@@ -333,39 +333,39 @@ def violated_of(entry: Entry, goals: Sequence[Goal]) -> Goal | None:
 # Write the tolerance sheet: page, JSON and pictures, all or none; certificates exist already.
 
 
-def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
-    """Draw what there is to draw."""
-    yield "part", plot.part(found.scene)
-    single = [each for each in found.margins() if each.quantity != "joint"]
-    if found.decided == "proved" and single:
+def _drawn(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
+    """Draw all figures of the sheet."""
+    yield "part", plot.part(sheet.scene)
+    single = [each for each in sheet.margins() if each.quantity != "joint"]
+    if sheet.decided == "proved" and single:
         yield "margins", plot.tornado(single)
-    if found.joint is not None and found.joint.holds:
-        yield "joint", plot.tolerance_box(found.margins()[-1])
-    if found.curve is not None:
-        yield "curve", plot.margin_curve(found.curve)
-    yield from _noise(found)
-    first = shown(found)
+    if sheet.joint is not None and sheet.joint.holds:
+        yield "joint", plot.tolerance_box(sheet.margins()[-1])
+    if sheet.curve is not None:
+        yield "curve", plot.margin_curve(sheet.curve)
+    yield from _noise(sheet)
+    first = shown(sheet)
     if first is not None:
         name = deviation_of(first).rstrip(",") if first.holds else "the scene as it is"
         yield (
             "counterexample",
-            plot.counterexample(found.scene, first.counterexample, violated_of(first, found.goals), name),
+            plot.counterexample(sheet.scene, first.counterexample, violated_of(first, sheet.goals), name),
         )
 
 
-def _noise(found: Robustness) -> Iterator[tuple[str, Figure]]:
-    """Draw the noise: where nothing stays there is no density, and where nothing is fed no throws until then."""
-    if found.noise is None or found.levels is None:
+def _noise(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
+    """Draw the noise: there is no density if no part stays, and no number of throws if no part is fed."""
+    if sheet.noise is None or sheet.levels is None:
         return
-    if found.noise.classes:
-        yield "density", plot.noise_density(found.noise)
-    if found.noise.feeding.mean is not None:
-        yield "throws", plot.noise_arrivals(found.noise)
-    yield "levels", plot.noise_levels(found.levels, {"level of the noise, as given = 1": 1.0})
+    if sheet.noise.classes:
+        yield "density", plot.noise_density(sheet.noise)
+    if sheet.noise.feeding.mean is not None:
+        yield "throws", plot.noise_arrivals(sheet.noise)
+    yield "levels", plot.noise_levels(sheet.levels, {"level of the noise, as given = 1": 1.0})
 
 
 def write_robustness(
-    found: Robustness, folder: str | Path, form: str = "png", *, html: bool = False
+    sheet: Robustness, folder: str | Path, form: str = "png", *, html: bool = False
 ) -> list[Path]:
     """Write report.md, robustness.json and the figures into a folder, all of them or none; report.html where asked for.
 
@@ -376,8 +376,8 @@ def write_robustness(
     """
     return laid(
         folder,
-        _drawn(found),
-        lambda figures: {"report.md": robustness_page(found, figures), "robustness.json": as_json(found)},
+        _drawn(sheet),
+        lambda figures: {"report.md": robustness_page(sheet, figures), "robustness.json": as_json(sheet)},
         form,
         html=html,
     )

@@ -54,7 +54,7 @@ def figure(analysis: Analysis, kind: str, throw: tuple[float, int] | None = None
     kind : str
         One of `FIGURES`.
     throw : (float, int), optional
-        For "flight": x and side of the throw to draw; one is chosen otherwise.
+        For "flight": x and side of the throw to draw; chosen if left out.
 
     Returns
     -------
@@ -82,12 +82,12 @@ def figure(analysis: Analysis, kind: str, throw: tuple[float, int] | None = None
 
 
 def require_place(folder: str | Path) -> None:
-    """Refuse a folder that plainly cannot be written, before anything is computed for it.
+    """Refuse a folder that clearly cannot be written, before the computation begins.
 
     Raises
     ------
     LimitsetsError
-        It, or the nearest of its parents that is there, is no folder or may not be written.
+        The folder, or its nearest existing parent, is no folder or is not writable.
     """
     nearest = next(path for path in (Path(folder), *Path(folder).absolute().parents) if path.exists())
     if not nearest.is_dir():
@@ -133,7 +133,7 @@ def laid(
     drawn : iterable of (str, Figure)
         Figures by kind: KIND.png, or of the form asked for.
     texts : callable
-        Takes the figures' files by kind, gives texts by file.
+        From the figures' files by kind to texts by file.
     form : str
         Of the figures: "png", "svg" or "pdf".
     html : bool
@@ -175,7 +175,7 @@ def write(
 ) -> list[Path]:
     """Write report.md, analysis.json and the figures into a folder.
 
-    Files that are there are replaced once all new ones are written, each in one step.
+    Existing files are replaced after all new ones are written, each in one step.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def write(
 
 
 # ----------------------------------------------------------------
-# An audit in words: the lines of its table, a page, and its files.
+# An audit as text: the lines of its table, its page, and its files.
 
 
 HEADS = ("effect", "assumed", "on the limit set", "worst there", "on the whole arm")
@@ -265,7 +265,7 @@ def _verdict(finding: Finding) -> str:
 
 
 def _worst(finding: Finding, unit: str) -> str:
-    """Say what was found where it is worst; without a fact, which value of it would matter."""
+    """Give the worst measured value; if a fact is missing, the value of the fact from which it would matter."""
     if finding.x is None:
         return "-"
     place = f"side {finding.side}, x = {finding.x:.2f}"
@@ -294,9 +294,9 @@ def _needed(finding: Finding, unit: str) -> str:
     return f"matters {'below' if finding.missing == 'bounce_threshold' else 'from'} {at:.2g}"
 
 
-def lines_of(found: Audit) -> list[list[str]]:
+def lines_of(audit: Audit) -> list[list[str]]:
     """Give the table, one line per assumption; columns as in `HEADS`."""
-    unit = found.scene.unit
+    unit = audit.scene.unit
     return [
         [
             f"{here.effect} (on)" if here.simulated else here.effect,
@@ -305,21 +305,21 @@ def lines_of(found: Audit) -> list[list[str]]:
             _worst(here, unit),
             _verdict(everywhere),
         ]
-        for here, everywhere in zip(found.on("limit-set"), found.on("domain"), strict=True)
+        for here, everywhere in zip(audit.on("limit-set"), audit.on("domain"), strict=True)
     ]
 
 
-def summary(found: Audit) -> list[str]:
-    """Say in a few sentences what the scene calls for."""
-    return words("audit_summary", found=found).split("\n\n")
+def summary(audit: Audit) -> list[str]:
+    """Say in a few sentences which effects the scene calls for."""
+    return words("audit_summary", audit=audit).split("\n\n")
 
 
-def audit_page(found: Audit, figures: Mapping[str, str] | None = None) -> str:
+def audit_page(audit: Audit, figures: Mapping[str, str] | None = None) -> str:
     """Write the page.
 
     Parameters
     ----------
-    found : Audit
+    audit : Audit
         From `limitsets.audit`.
     figures : mapping of str to str, optional
         File names of the pictures by kind: "part", "audit".
@@ -335,11 +335,11 @@ def audit_page(found: Audit, figures: Mapping[str, str] | None = None) -> str:
     >>> audit_page(ls.audit("paper-designed")).splitlines()[0]
     '# paper-designed: what the model leaves out'
     """
-    told = {"summary": summary(found), "heads": HEADS, "rows": lines_of(found)}
-    return words("audit", figures or {}, found=found, **told) + "\n"
+    told = {"summary": summary(audit), "heads": HEADS, "rows": lines_of(audit)}
+    return words("audit", figures or {}, audit=audit, **told) + "\n"
 
 
-def write_audit(found: Audit, folder: str | Path, form: str = "png") -> list[Path]:
+def write_audit(audit: Audit, folder: str | Path, form: str = "png") -> list[Path]:
     """Write audit.md, audit.json and the figures into a folder, all of them or none.
 
     Raises
@@ -349,7 +349,7 @@ def write_audit(found: Audit, folder: str | Path, form: str = "png") -> list[Pat
     """
     return laid(
         folder,
-        [("part", plot.part(found.scene)), ("audit", plot.audit(found))],
-        lambda figures: {"audit.md": audit_page(found, figures), "audit.json": as_json(found)},
+        [("part", plot.part(audit.scene)), ("audit", plot.audit(audit))],
+        lambda figures: {"audit.md": audit_page(audit, figures), "audit.json": as_json(audit)},
         form,
     )
