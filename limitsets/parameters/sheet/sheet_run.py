@@ -104,15 +104,15 @@ class _SheetRun:
         todo = [one for one, entry in zip(self.todo, known, strict=True) if entry is None]
         first = next((entry for entry in known if entry is not None), None)
         answers = iter(self._answers(todo, width, verdict, first))
-        found: list[Entry] = []
+        entries: list[Entry] = []
         for one, entry in zip(self.todo, known, strict=True):
             with self.step(f"margin of {one.quantity}, {one.reading}"):
                 answer = entry or next(answers)
                 if isinstance(answer, str):
                     self.left_out[f"margin of {one.quantity}, {one.reading}"] = answer
                 else:
-                    found.append(entry or self.checkpoint.keep(answer))
-        return found
+                    entries.append(entry or self.checkpoint.keep(answer))
+        return entries
 
     def _answers(
         self, todo: Sequence[DeviationScale], width: float, verdict: str, first: Entry | None
@@ -156,14 +156,14 @@ class _SheetRun:
         told["laid"] = {int(on): pairs for on, pairs in by_side(self.goals[0].laid).items()} or None
         with self.step("margins against X"):
             try:
-                found, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
+                margins, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
             except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
                 self.left_out["curve"] = str(error) if isinstance(error, AnswerError) else failure(error)
                 return None
         if left:
             words = f"there was no time for {left} more places; the same command goes on with them"
             self.left_out["rest of the curve"] = words
-        return found
+        return margins
 
     def audit(self) -> Audit:
         """Ask which assumptions of the model the scene breaks."""
@@ -181,10 +181,10 @@ class _SheetRun:
             self.tell("noise", done / of)
 
         with self.step("noise"):
-            found = noise_statistics(scene, noise, goal=place, cells=cells, progress=told)
+            statistics = noise_statistics(scene, noise, goal=place, cells=cells, progress=told)
         with self.step("noise at other levels"):
             levels = noise_levels(scene, noise, goal=place, cells=max(cells // 2, 1))
-        return found, levels
+        return statistics, levels
 
 
 def _single(
@@ -198,8 +198,8 @@ def _single(
 ) -> Entry:
     """Find the margin of one quantity and write its files; called in other processes, too."""
     told = None if tell is None else lambda step, _, __: tell(step)
-    (found,) = margin(scene, one.quantity, reading=one.reading, goal=goals, width=width, progress=told)
-    return written(found, folder, recheck)
+    (answer,) = margin(scene, one.quantity, reading=one.reading, goal=goals, width=width, progress=told)
+    return written(answer, folder, recheck)
 
 
 def _tried(ask: Callable[..., Entry], *about: Any) -> Entry | str:
@@ -383,9 +383,9 @@ def _filled(
     joint = None if "joint" in missing else sheet.joint(width)
     entries += [] if joint is None else [joint]
     against = None if "curve" in missing or place is None else sheet.curve(place[1])
-    found, levels = None, None
+    statistics, levels = None, None
     if "noise" not in missing and noise is not None and place is not None:
-        found, levels = sheet.chance(given, noise, place, cells)
+        statistics, levels = sheet.chance(given, noise, place, cells)
     flagged = None if "audit" in missing else sheet.audit()
     return Robustness(
         scene,
@@ -395,7 +395,7 @@ def _filled(
         tuple(entries),
         sheet.tolerance,
         against,
-        found,
+        statistics,
         levels,
         law,
         flagged,

@@ -127,8 +127,8 @@ def curve(
     words = {"tolerance": tolerance, "laid": laid, "width": COARSE}
     places = places_beyond(scene, side, PLACES)
     places = places[np.argsort(np.abs(places - places.mean()), kind="stable")]
-    found = None if known is None or known["side"] != side else curve_read(known, scene)
-    done = set() if found is None else {round(x, 9) for x in found.x.tolist()}
+    margins = None if known is None or known["side"] != side else curve_read(known, scene)
+    done = set() if margins is None else {round(x, 9) for x in margins.x.tolist()}
     waiting = [x for x in places.tolist() if round(x, 9) not in done]
     pool = executor or _Here()
     # concurrent.futures has no public word for it; of an executor of another kind it is not known
@@ -140,7 +140,7 @@ def curve(
             now = time.perf_counter()
             dearest = max([dearest, *(now - since for since in begun.values())])
             # what would not end in time is left to a later run
-            if (found is not None or begun) and end - now < dearest:
+            if (margins is not None or begun) and end - now < dearest:
                 break
             x, each = waiting[0], at_once * (end - now) / len(waiting)
             tell(f"margin beyond x = {x:.4g}", 1.0 - len(waiting) / PLACES)
@@ -151,10 +151,10 @@ def curve(
             break
         for one in wait(begun, return_when=FIRST_COMPLETED).done:
             dearest = max(dearest, time.perf_counter() - begun.pop(one))
-            found = _joined(found, one.result())
-            keep(found.to_json())
-    assert found is not None
-    return found, len(waiting)
+            margins = _joined(margins, one.result())
+            keep(margins.to_json())
+    assert margins is not None
+    return margins, len(waiting)
 
 
 # ----------------------------------------------------------------
@@ -211,7 +211,7 @@ def scattering_from(scene: Scene, texts: Mapping[str, str], law: str = "gaussian
     """
     if law not in LAWS:
         raise AnswerError("the law of the noise", law, " or ".join(LAWS), "correct the word")
-    found: dict[str, Any] = {}
+    fields: dict[str, Any] = {}
     for name, text in texts.items():
         find(name)
         if name not in FIELDS:
@@ -223,8 +223,8 @@ def scattering_from(scene: Scene, texts: Mapping[str, str], law: str = "gaussian
             size /= scene.value(name)
         if name == "gravity.tilt" and given.relative:
             size *= scene.value(name)
-        found[FIELDS[name]] = LAWS[law](size)
-    return Scattering(**found)
+        fields[FIELDS[name]] = LAWS[law](size)
+    return Scattering(**fields)
 
 
 # ----------------------------------------------------------------
@@ -304,8 +304,8 @@ class Robustness(Tabled):
         of = Model.of(self.scene)
         if self.audit is None:
             return of
-        found = (each for each in self.audit.on("limit-set") if each.called_for and not each.simulated)
-        return replace(of, broken=tuple(each.effect for each in found))
+        broken = (each for each in self.audit.on("limit-set") if each.called_for and not each.simulated)
+        return replace(of, broken=tuple(each.effect for each in broken))
 
     @property
     def singles(self) -> tuple[Entry, ...]:
