@@ -187,7 +187,7 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
 
 
 def _front(axes: Axes, found: RobustDesign) -> list[Line2D]:
-    margins = [option.candidate.found.margin for option in found.front]
+    margins = [option.candidate.estimate.margin for option in found.front]
     means = np.array([option.feeding.mean for option in found.front])
     late = np.array([option.feeding.quantile_95 for option in found.front])
     axes.vlines(margins, means, late, color=AFTER, lw=0.8, alpha=0.6)

@@ -187,14 +187,14 @@ def resolved(name: str) -> Callable[..., Any]:
     """
     module, _, function = name.partition(":")
     try:
-        found: Any = importlib.import_module(module)
+        target: Any = importlib.import_module(module)
         for word in function.split("."):
-            found = getattr(found, word)
+            target = getattr(target, word)
     except (ImportError, AttributeError) as error:
         raise LimitsetsError("the task", name, "module:function that can be imported", f"{error}") from None
-    if not callable(found):
+    if not callable(target):
         raise LimitsetsError("the task", name, "a function", "it is none")
-    return found  # type: ignore[no-any-return]  # of a task that is known by name
+    return target  # type: ignore[no-any-return]  # of a task that is known by name
 
 
 # ----------------------------------------------------------------
@@ -291,10 +291,10 @@ class Plan:
         """Return the numbers of the points of a region."""
         index = np.indices(tuple(part.stop - part.start for part in region))
         shifted = [index[k] + part.start for k, part in enumerate(region)]
-        found: npt.NDArray[np.int64] = (
+        flat: npt.NDArray[np.int64] = (
             np.ravel_multi_index(tuple(shifted), self.shape).ravel().astype(np.int64)
         )
-        return found
+        return flat
 
     @cached_property
     def base(self) -> dict[str, npt.NDArray[np.float64]]:

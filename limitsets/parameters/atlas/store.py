@@ -156,7 +156,7 @@ class Store:
 
     def _is_done(self, number: int) -> bool:
         """Whether the data of a chunk are those that were written."""
-        region, found = self.plan.region(number), {}
+        region, arrays = self.plan.region(number), {}
         try:
             mark = int(self.marks[self.plan.place(number)])
             if mark == 0:
@@ -164,20 +164,20 @@ class Store:
             for name, array in self.arrays.items():
                 values = np.asarray(array[region])
                 if not _is(values, array.fill_value):
-                    found[name] = values
+                    arrays[name] = values
         except (OSError, ValueError, RuntimeError):  # what codecs make of bytes that were cut off
             return False
-        return checksum(found) == mark
+        return checksum(arrays) == mark
 
     def write(self, answer: Answer) -> None:
         """Write the answers of a chunk, and then that it is done."""
-        region, found = self.plan.region(answer.number), {}
+        region, arrays = self.plan.region(answer.number), {}
         with self._written():
-            for name, (variable, values) in answer.found.items():
+            for name, (variable, values) in answer.arrays.items():
                 self._array(name, variable)[region] = values
                 if not variable.is_empty(values):
-                    found[name] = values
-            self.marks[self.plan.place(answer.number)] = checksum(found)
+                    arrays[name] = values
+            self.marks[self.plan.place(answer.number)] = checksum(arrays)
         self.done.add(answer.number)
 
     def _array(self, name: str, variable: Variable) -> Any:
@@ -232,11 +232,11 @@ def _damaged(path: Path | None, what: str) -> LimitsetsError:
     )
 
 
-def checksum(found: Mapping[str, npt.NDArray[Any]]) -> int:
+def checksum(arrays: Mapping[str, npt.NDArray[Any]]) -> int:
     """Return a checksum of arrays by name, never 0."""
     total = 0
-    for name in sorted(found):
-        values = found[name]
+    for name in sorted(arrays):
+        values = arrays[name]
         total = zlib.crc32(name.encode(), total)
         total = zlib.crc32(
             np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes(), total
@@ -277,11 +277,11 @@ def _is_sealed(array: Any) -> bool:
 def _holds(array: Any, values: npt.NDArray[Any], attributes: dict[str, Any]) -> bool:
     """Whether an array holds these coordinates, with these attributes."""
     try:
-        found = np.asarray(array[...])
+        coordinates = np.asarray(array[...])
     except (OSError, ValueError, RuntimeError):  # what codecs make of bytes that were damaged
         return False
     said = {key: value for key, value in dict(array.attrs).items() if key != SEAL}
-    return _is_sealed(array) and said == attributes and found.tobytes() == values.tobytes()
+    return _is_sealed(array) and said == attributes and coordinates.tobytes() == values.tobytes()
 
 
 def _unit(unit: str) -> dict[str, Any]:
@@ -306,11 +306,11 @@ def _short(value: Any) -> str:
 
 def _described(variable: Variable, length: str) -> dict[str, Any]:
     """Return the attributes of a variable; codes as the CF conventions have them."""
-    found: dict[str, Any] = {"long_name": variable.about} if variable.about else {}
+    attributes: dict[str, Any] = {"long_name": variable.about} if variable.about else {}
     unit = length if variable.unit == "length" else variable.unit
     if unit:
-        found["units"] = unit
-    return found | (_flags(variable.codes) if variable.codes else {})
+        attributes["units"] = unit
+    return attributes | (_flags(variable.codes) if variable.codes else {})
 
 
 def _flags(codes: Mapping[str, int]) -> dict[str, Any]:
@@ -323,7 +323,7 @@ def _flags(codes: Mapping[str, int]) -> dict[str, Any]:
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     """Return the attributes of a store."""
-    found: dict[str, Any] = {
+    attributes: dict[str, Any] = {
         "title": f"atlas of {plan.subject.title}",
         "plan_hash": plan.digest,
         "plan": plan.record,
@@ -331,5 +331,5 @@ def _attributes(plan: Plan) -> dict[str, Any]:
     if isinstance(plan.subject, SceneSubject):
         from limitsets.feeder.scene import dump
 
-        found |= {"scene": dump(plan.subject.scene), "unit_of_length": plan.subject.unit}
-    return found | {"versions": dict(plan.code["versions"])}
+        attributes |= {"scene": dump(plan.subject.scene), "unit_of_length": plan.subject.unit}
+    return attributes | {"versions": dict(plan.code["versions"])}

@@ -137,8 +137,8 @@ class GoalDesign(Tabled):
             )
             for name in self.varied
         ]
-        found = "design" if self.room > 0.0 else "nearest miss"
-        numbers = [Column("before", show=".6g"), Column(found, show=".6g")]
+        heading = "design" if self.room > 0.0 else "nearest miss"
+        numbers = [Column("before", show=".6g"), Column(heading, show=".6g")]
         numbers += [Column(head, show=".4g") for head in ("lowest", "highest")]
         caption = f"{self.scene.name}: {self.message}"
         return (Table(("quantity", *numbers, "unit"), rows, caption, self.model.sentence),)
@@ -312,16 +312,16 @@ def design_for_goal(
         search.run(bounds_of(start, vary, bounds), evaluations - search.evaluations, seed)
     ends, (_, room, made) = search.bounds, search.best
     name = start.name if start.name.endswith("-design") else f"{start.name}-design"
-    found = load(made.as_dict() | {"name": name})
+    design = load(made.as_dict() | {"name": name})
     asked = (
         start.goal,
         *([Reaches(start.goal.x, start.goal.side)] if isinstance(start.goal, OrientedBeyond) else []),
     )
     goals = tuple(laid_goal(goal, start.goal.laid) for goal in asked)
-    verdict = Query.of(found, goals).prove().verdict if room > 0.0 else "undecided"
+    verdict = Query.of(design, goals).prove().verdict if room > 0.0 else "undecided"
     lost = why in (LOST, NO_PART)
     return GoalDesign(
-        found, start, ends, room, None if lost else room_before, why, _leaving(found, start.goal.laid), verdict,
+        design, start, ends, room, None if lost else room_before, why, _leaving(design, start.goal.laid), verdict,
         dict(search.ruled_out), search.evaluations, time.perf_counter() - begin,
     )  # fmt: skip
 

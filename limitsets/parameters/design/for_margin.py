@@ -62,7 +62,7 @@ class _Best:
         self.hard: list[Signs] = list(search.hard)
         self.unknowns: list[float] = []
         self.scene: Scene | None = None
-        self.found: Estimate | None = None
+        self.estimate: Estimate | None = None
         self.tried = 0
 
     def rate(self, unknowns: Sequence[float]) -> float:
@@ -71,20 +71,20 @@ class _Best:
         self.tell("designs near the best", min(self.tried, self.of), self.of)
         scene = self.search.scene_of(unknowns)
         scene = None if scene is None else self.made(scene)
-        rating, found = self.search.rated(scene, self._estimate)
-        if found is not None and (self.found is None or found.margin > self.found.margin):
-            self.unknowns, self.scene, self.found = [float(u) for u in unknowns], scene, found
+        rating, estimate = self.search.rated(scene, self._estimate)
+        if estimate is not None and (self.estimate is None or estimate.margin > self.estimate.margin):
+            self.unknowns, self.scene, self.estimate = [float(u) for u in unknowns], scene, estimate
         return rating
 
     def _estimate(self, scene: Scene) -> Estimate | None:
         """Estimate a margin; where it may be the best, on all corners."""
         about = scene, self.search.tolerance, self.search.side
-        found = estimated(*about, hard=self.hard, steps=FINE, close=FINELY)
-        if found is None or not found.margin > (0.0 if self.found is None else self.found.margin):
-            return found
-        new = [signs for signs in failing(*about, found, found.margin) if signs not in self.hard]
+        estimate = estimated(*about, hard=self.hard, steps=FINE, close=FINELY)
+        if estimate is None or not estimate.margin > (0.0 if self.estimate is None else self.estimate.margin):
+            return estimate
+        new = [signs for signs in failing(*about, estimate, estimate.margin) if signs not in self.hard]
         self.hard[:0] = new
-        return on_all_corners(*about, self.hard) if new else found
+        return on_all_corners(*about, self.hard) if new else estimate
 
 
 def polished(
@@ -121,7 +121,7 @@ def polished(
         best.rate(row)
     for number, edge in enumerate(EDGES):
         share = (evaluations - best.tried) // (len(EDGES) - number)
-        if best.found is None or share < 1:
+        if best.estimate is None or share < 1:
             break
         minimize(
             lambda row: -best.rate(row),
@@ -131,9 +131,9 @@ def polished(
             options={"initial_simplex": _simplex(best.unknowns, edge), "maxfev": share, "adaptive": True},
         )
     search.evaluations += best.tried
-    if best.scene is None or best.found is None:
+    if best.scene is None or best.estimate is None:
         return None
-    return best.scene, best.found
+    return best.scene, best.estimate
 
 
 def _simplex(corner: Sequence[float], edge: float) -> NDArray[np.float64]:
@@ -193,7 +193,7 @@ def orders_of(scene: Scene) -> list[Scene]:
     sides = scene.text["part"].get("sides")
     if sides is None or len(sides) != 3:
         return [scene]
-    found = []
+    scenes = []
     for order in permutations(range(3)):
         tree = scene.as_dict()
         tree["part"]["sides"] = [sides[k] for k in order]
@@ -210,8 +210,8 @@ def orders_of(scene: Scene) -> list[Scene]:
                 own = np.array([scene.value(f"part.mass.points[{k}].{word}") for word in "xy"])
                 x, y = (own - scene.vertices[0]) @ moved
                 point["x"], point["y"] = f"{x:.6f} {scene.unit}", f"{y:.6f} {scene.unit}"
-        found.append(load(tree))
-    return found
+        scenes.append(load(tree))
+    return scenes
 
 
 def _edges(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -274,8 +274,8 @@ class NoDesignError(AnswerError):
         self, evaluations: int, ruled_out: Mapping[str, int], miss: Scene | None, varied: Iterable[str]
     ) -> None:
         remedy = "widen the bounds, look at more designs, or ask the goal of another side"
-        found = f"none that feeds among {evaluations}"
-        super().__init__("the design", found, "one at least", f"{said(ruled_out)}; {remedy}")
+        none_feeds = f"none that feeds among {evaluations}"
+        super().__init__("the design", none_feeds, "one at least", f"{said(ruled_out)}; {remedy}")
         self.evaluations, self.ruled_out, self.miss, self.varied = evaluations, ruled_out, miss, tuple(varied)
 
 
@@ -366,10 +366,10 @@ def robust_design(
     if keep is not None:
         best_yet = [0.0]
 
-        def better(scene: Scene, found: Estimate) -> None:
-            if found.margin > best_yet[0] and math.isfinite(found.x):
-                best_yet[0] = found.margin
-                keep(_with_purpose(scene, found.x, on, texts, f"{start.name}-robust"))
+        def better(scene: Scene, estimate: Estimate) -> None:
+            if estimate.margin > best_yet[0] and math.isfinite(estimate.x):
+                best_yet[0] = estimate.margin
+                keep(_with_purpose(scene, estimate.x, on, texts, f"{start.name}-robust"))
 
         for one in searches:
             one.better = better
@@ -382,14 +382,14 @@ def robust_design(
         if miss is not None:
             miss = load(_rounded(miss, search).as_dict() | {"name": f"{start.name}-robust"})
         raise NoDesignError(count, ruled_out, miss, search.bounds)
-    made, found = best
-    x = round(found.x, DECIMALS_OF_X)
+    made, estimate = best
+    x = round(estimate.x, DECIMALS_OF_X)
     design = _with_purpose(made, x, on, texts, f"{start.name}-robust")
     before = on_all_corners(start, vector, on)
     history = tuple(candidate for each in searches for candidate in each.history)
     feeding = throws_to_feed(design, x, on, seed=seed)
     values = {name: design.value(name) for name in search.bounds}
-    own_option = Option(Candidate(values, found, search.order), feeding)
+    own_option = Option(Candidate(values, estimate, search.order), feeding)
     front = front_of(searches, history, own_option, on, seed, tell)
     seconds = time.perf_counter() - begin
     known = before is not None and before.margin > 0.0
@@ -408,7 +408,7 @@ def robust_design(
         side=on,
         varied=tuple(search.bounds),
         tolerance=texts,
-        sampled=found,
+        sampled=estimate,
         margins=margins,
         lead=counterweight_of(design),
         feeding=feeding,
@@ -427,15 +427,15 @@ def _proved(
     scene: Scene, goals: Sequence[Goal], texts: Mapping[str, str], seconds: float, tell: Tell, whose: str
 ) -> tuple[Margin, ...]:
     """Bracket the joint margin of each goal by itself: one may be proved much farther than the other."""
-    found = []
+    margins = []
     for goal in goals:
         what = f"margin of {whose}, {goal.kind}"
 
         def told(share: float, what: str = what) -> None:
             tell(what, math.floor(100 * share), 100)
 
-        found.append(joint_margin(scene, (goal,), texts, seconds=seconds / len(goals), tell=told))
-    return tuple(found)
+        margins.append(joint_margin(scene, (goal,), texts, seconds=seconds / len(goals), tell=told))
+    return tuple(margins)
 
 
 def _side(scene: Scene, side: int | None) -> int:

@@ -189,9 +189,9 @@ def _answer(
         if math.isinf(lo) and values[j] < NOTHING * hi:
             values[j] = 0.0
         scatters.append(Scatter(float(values[j]), max(lo, 0.0), hi, not own.rows.known))
-    found = tuple(quantities)
+    fitted = tuple(quantities)
     speed, landing = scatters
-    new = fitted_scene(scene, found, speed, landing)
+    new = fitted_scene(scene, fitted, speed, landing)
     told = own.told(values[None])
     loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
     misses = own.rows.throws.x_after - told.after[0]
@@ -200,7 +200,7 @@ def _answer(
         + (told.per_log_speed[0] * values[-2]) ** 2
         + loose[0, 0] ** 2
     )
-    names = tuple(each.name for each in found)
+    names = tuple(each.name for each in fitted)
     error = own.rows.error
     if not own.rows.known:  # what the answer may be sharpened to is then told with all scatter as one
         error = np.full(len(error), landing.value / math.sqrt(2.0))
@@ -211,7 +211,7 @@ def _answer(
         new,
         scene,
         own.rows,
-        found,
+        fitted,
         held,
         undetermined,
         speed,

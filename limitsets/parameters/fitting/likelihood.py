@@ -295,9 +295,9 @@ class Likelihood:
 
     def values(self, at: Array) -> Array:
         """Return quantities and scatters, of shape (m, p + 2); the sign of a scatter means nothing."""
-        found = self.centre + self.scale * np.atleast_2d(at)
-        found[:, -SCATTERS:] = np.abs(found[:, -SCATTERS:])
-        return found
+        numbers = self.centre + self.scale * np.atleast_2d(at)
+        numbers[:, -SCATTERS:] = np.abs(numbers[:, -SCATTERS:])
+        return numbers
 
     def at(self, values: Array) -> Array:
         """Return the numbers at which quantities and scatters have these values."""
@@ -416,7 +416,7 @@ def further_throws(asked: Question, x: Array, side: NDArray[np.int64], error: Ar
     scene, names = asked.scene, asked.names
     known = information(asked, x, side, error).sum(axis=0)
     known += np.eye(len(names)) / BEFORE**2
-    found = []
+    further = []
     size = float(np.mean(error)) if np.mean(error) > 0 else asked.scatter[1]
     for own in range(len(scene.sides)):
         near, far = scene.sides.a[own], scene.arm_length
@@ -426,5 +426,5 @@ def further_throws(asked: Question, x: Array, side: NDArray[np.int64], error: Ar
         best = int(np.argmax(gains))
         ratio = np.diag(np.linalg.inv(known)) / np.diag(np.linalg.inv(known + MORE * there[best]))
         shrinks = {name: float(np.sqrt(each)) for name, each in zip(names, ratio, strict=True)}
-        found.append(Further(float(places[best]), own, 0.5 * float(gains[best]), shrinks))
-    return tuple(sorted(found, key=lambda each: -each.gain))
+        further.append(Further(float(places[best]), own, 0.5 * float(gains[best]), shrinks))
+    return tuple(sorted(further, key=lambda each: -each.gain))

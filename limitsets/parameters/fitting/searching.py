@@ -92,8 +92,8 @@ def jacobian(scene: Scene, rows: Rows, names: tuple[str, ...], values: Array, un
     # a step that leads out of what can be is not made: the difference is one-sided there
     after = np.where(told.possible, told.after, told.after[-1])
     steps = STEP * (told.possible[:count] * 1.0 + told.possible[count:-1])
-    found: Array = ((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T
-    return found
+    derivatives: Array = ((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T
+    return derivatives
 
 
 def _least_squares(
@@ -110,8 +110,8 @@ def _least_squares(
         return np.where(np.isfinite(miss), miss, 1e6) if told.possible[0, 0] else refused
 
     def slopes(at: Array) -> Array:
-        found = -jacobian(scene, rows, names, values + units * at, units) / scale
-        return np.where(np.isfinite(found), found, 0.0)
+        slope = -jacobian(scene, rows, names, values + units * at, units) / scale
+        return np.where(np.isfinite(slope), slope, 0.0)
 
     # a hundredth of a unit of change is a step; nothing leads farther than half of one
     done = least_squares(
@@ -172,7 +172,7 @@ def _undetermined(
     scene: Scene, rows: Rows, names: tuple[str, ...], held: dict[str, list[str]], slopes: Array, errors: Array
 ) -> dict[str, str]:
     """Find what goes with a quantity that is held, or moves when that one moves within what the landings leave open."""
-    found: dict[str, list[str]] = {}
+    movers: dict[str, list[str]] = {}
     for one, others in held.items():
         own = np.array([scene.value(one)])
         moved = jacobian(scene, rows, (one,), own, units_of_change(scene, (one,)))[:, 0]
@@ -180,8 +180,8 @@ def _undetermined(
         # a decision depends on all quantities, so that the radius of gyration goes with each
         for name, size in zip((*names, RADIUS), (*np.abs(follows) * TOLD / errors, np.inf), strict=True):
             if size > MOVED or name in others:
-                found.setdefault(name, []).append(one)
-    return {name: ", ".join(others) for name, others in found.items()}
+                movers.setdefault(name, []).append(one)
+    return {name: ", ".join(others) for name, others in movers.items()}
 
 
 def _require_flight(scene: Scene, rows: Rows) -> None:
@@ -275,15 +275,15 @@ def maximised(f: Function, start: Array, held: int | None = None, gain: float = 
             break
         there = at.copy()
         there[free] += step
-        found = _expanded(f, there, free)
-        if not found[0] > value:
+        expansion = _expanded(f, there, free)
+        if not expansion[0] > value:
             tries = np.repeat(at[None], SHARES.size, axis=0)
             tries[:, free] += SHARES[:, None] * step
             there = tries[int(np.argmax(f(tries)))]
-            found = _expanded(f, there, free)
-            if not found[0] > value:
+            expansion = _expanded(f, there, free)
+            if not expansion[0] > value:
                 break
-        at, (value, gradient, hessian) = there, found
+        at, (value, gradient, hessian) = there, expansion
     whole = np.zeros((at.size, at.size))
     whole[np.ix_(free, free)] = hessian
     return Maximum(at, value, whole)
@@ -341,16 +341,16 @@ def end_of_profile(
         starts = last + SHARES_BACK[:, None] * (best.at + distance * along - last)
         starts[:, k] = best.at[k] + way * distance
         start = starts[int(np.argmax(f(starts) > WORST))]
-        found = maximised(f, start, held=k, gain=ROUGHLY)
-        nothing = found.value <= WORST
+        maximum = maximised(f, start, held=k, gain=ROUGHLY)
+        nothing = maximum.value <= WORST
         if not nothing:
-            along = (found.at - best.at) / distance
-        loss = 2.0 * (best.value - found.value)
+            along = (maximum.at - best.at) / distance
+        loss = 2.0 * (best.value - maximum.value)
         if loss < -0.01:
-            return End(start[k], maximised(f, found.at))
+            return End(start[k], maximised(f, maximum.at))
         root = math.sqrt(max(loss, 0.0))
         if root < wanted:
-            near, near_root, last = distance, root, found.at
+            near, near_root, last = distance, root, maximum.at
             if distance >= limit:
                 return End(way * math.inf)
         else:
@@ -411,8 +411,8 @@ def largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     at = np.append(np.zeros(len(names)), [1.0, 1.0])
     best = maximised(own, _best_radius(own, at))
     for _ in range(ROUNDS):
-        found = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
-        again = assigned(own.rows, scene, found, start.spread)
+        best_values = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
+        again = assigned(own.rows, scene, best_values, start.spread)
         same = (again.side == own.rows.side).all() and (again.branch == own.rows.branch).all()
         if same:
             break
@@ -438,8 +438,8 @@ def largest_radius(scene: Scene) -> float:
 
     arms = scene.vertices - np.array(scene.centre)
     shares = np.vstack([arms.T, np.ones(len(arms))])
-    found = linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0])
-    return math.sqrt(max(-float(found.fun), 0.0))
+    program = linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0])
+    return math.sqrt(max(-float(program.fun), 0.0))
 
 
 def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:

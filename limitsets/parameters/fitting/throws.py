@@ -84,8 +84,8 @@ class Throws:
         """Differences of two readings of one place: a row that follows another with a reading of its own [length]."""
         again = np.flatnonzero(self.follows & ~self.shared)
         again = again[self.side_before[again] == self.side_after[again - 1]]
-        found: Array = self.x_before[again] - self.x_after[again - 1]
-        return found
+        differences: Array = self.x_before[again] - self.x_after[again - 1]
+        return differences
 
 
 def read_throws(file: str | Path, scene: Scene) -> Throws:
