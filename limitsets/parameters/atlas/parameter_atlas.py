@@ -367,7 +367,17 @@ def plan_of(
         raise LimitsetsError("the step of the coarse grid", coarse, "2 or more", "correct it")
     by = None if refine is False else ("class" if refine is True else refine, int(coarse))
     wanted = None if variables is None else tuple(dict.fromkeys((*variables, *(by or ())[:1])))
-    plan = Plan(chosen, axes, name, dict(options or {}), wanted, parts, code_of(chosen, name), seed, by)
+    plan = Plan(
+        subject=chosen,
+        axes=axes,
+        task=name,
+        options=dict(options or {}),
+        variables=wanted,
+        chunk=parts,
+        code=code_of(chosen, name),
+        seed=seed,
+        refine=by,
+    )
     plan.require()
     return plan
 
@@ -398,7 +408,16 @@ def _work(plan: Plan) -> Work:
         return plan.words(plan.region(number))
 
     chunks = math.prod(plan.chunks)
-    return Work(chunks, answer, (plan,), size, place, f"the task {plan.task}", "atlas", "points")
+    return Work(
+        chunks=chunks,
+        function=answer,
+        given=(plan,),
+        size=size,
+        place=place,
+        task=f"the task {plan.task}",
+        name="atlas",
+        points="points",
+    )
 
 
 def _require_importable(plan: Plan) -> None:

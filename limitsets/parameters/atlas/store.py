@@ -83,12 +83,26 @@ class Store:
         for axis in plan.axes:
             values = axis.values
             array = self._made(
-                axis.name, values.shape, values.shape, values.dtype, 0.0, (axis.name,), _unit(axis.unit)
+                axis.name,
+                values.shape,
+                values.shape,
+                dtype=values.dtype,
+                fill=0.0,
+                dims=(axis.name,),
+                attributes=_unit(axis.unit),
             )
             array[...] = values
         dims = tuple(f"chunk of {axis.name}" for axis in plan.axes)
         about = {"long_name": "CRC-32 of the chunk's data; 0 where the chunk is not done"}
-        self._made(CHECKSUM, plan.chunks, (1,) * len(dims), np.dtype("uint32"), 0, dims, about)
+        self._made(
+            CHECKSUM,
+            plan.chunks,
+            (1,) * len(dims),
+            dtype=np.dtype("uint32"),
+            fill=0,
+            dims=dims,
+            attributes=about,
+        )
 
     def _made(
         self,
@@ -101,7 +115,9 @@ class Store:
         attributes: dict[str, Any],
     ) -> Any:
         """Make an array, sealed."""
-        sealed = attributes | {SEAL: _seal(name, shape, chunks, dtype, fill, dims, attributes)}
+        sealed = attributes | {
+            SEAL: _seal(name, shape, chunks, dtype=dtype, fill=fill, dims=dims, attributes=attributes)
+        }
         return self.group.create_array(
             name, shape=shape, chunks=chunks, dtype=dtype, fill_value=fill, dimension_names=dims,
             attributes=sealed,
@@ -188,7 +204,9 @@ class Store:
             dims = (*(axis.name for axis in self.plan.axes), *(dim for dim, _ in variable.dims))
             about = _described(variable, self.plan.subject.unit)
             dtype = np.dtype(variable.dtype)
-            self.arrays[name] = self._made(name, shape, chunks, dtype, variable.empty, dims, about)
+            self.arrays[name] = self._made(
+                name, shape, chunks, dtype=dtype, fill=variable.empty, dims=dims, attributes=about
+            )
         if self.arrays[name].shape != shape:
             raise LimitsetsError(
                 f"the variable {name}", shape, f"{self.arrays[name].shape}, as at other points",
@@ -262,7 +280,15 @@ def _seal_of(array: Any, attributes: Mapping[str, Any]) -> int:
     """Return the checksum of what an array in a store says of itself, with these attributes."""
     dims = tuple(array.metadata.dimension_names or ())
     name = array.path.rpartition("/")[2]
-    return _seal(name, array.shape, array.chunks, array.dtype, array.fill_value, dims, attributes)
+    return _seal(
+        name,
+        array.shape,
+        array.chunks,
+        dtype=array.dtype,
+        fill=array.fill_value,
+        dims=dims,
+        attributes=attributes,
+    )
 
 
 def _is_sealed(array: Any) -> bool:

@@ -176,7 +176,16 @@ class Approach(NamedTuple):
         limit = "cycle" if self.start is None else ("c+" if self.from_above else "c-")
         start = None if self.start is None else begin[0] * (abs(begin[0]) >= TINY)
         at = border.x_above if abs(border.x_above) >= TINY else 0.0
-        return Collision(at, border.side, change, len(self.word), start, begin[1], limit, itinerary)
+        return Collision(
+            x=at,
+            side=border.side,
+            change=change,
+            k=len(self.word),
+            start=start,
+            start_side=begin[1],
+            limit=limit,
+            itinerary=itinerary,
+        )
 
 
 class _Tracked(NamedTuple):
@@ -243,8 +252,17 @@ def approaches(path: Path, lo: Snapshot, hi: Snapshot) -> Iterator[Approach]:
                 key = (point.word, point.from_above, where, pair[0])
                 if target.side == point.to_side and key not in seen:
                     seen.add(key)
-                    x = (point.x, point.x)
-                    yield Approach(path, (lo.t, hi.t), start, point.from_above, x, *point[3:], pair)
+                    yield Approach(
+                        path,
+                        (lo.t, hi.t),
+                        start,
+                        from_above=point.from_above,
+                        x=(point.x, point.x),
+                        side=point.side,
+                        word=point.word,
+                        to_side=point.to_side,
+                        target=pair,
+                    )
 
 
 def _solved(gap: Callable[[float], float], lo: float, hi: float) -> float | None:

@@ -358,7 +358,17 @@ class _Between(NamedTuple):
         after = tuple(self.new[position] for position in group.after)
         collision = None if met is None else met.collision
         words = between(self.before.place, self.after.place)
-        return Event(kind, t, values, before, after, change, jump, collision, words)
+        return Event(
+            kind=kind,
+            t=t,
+            values=values,
+            before=before,
+            after=after,
+            change=change,
+            jump=jump,
+            collision=collision,
+            words=words,
+        )
 
     def of_group(self, group: Group, met: Met | None) -> Event | None:
         """Tell what happens to one group of attractors, None for nothing."""
@@ -408,7 +418,19 @@ def events_of(follower: Follower, numbers: list[list[int]]) -> tuple[Event, ...]
             number = numbers[place_of[met.owner[0]]][met.owner[1]]
             one, other = (follower.at(t).place for t in met.t)
             values, words = (one.values, other.values), between(one, other)
-            events.append(Event(met.kind, met.t, values, (number,), (number,), "", 0.0, met.collision, words))
+            events.append(
+                Event(
+                    kind=met.kind,
+                    t=met.t,
+                    values=values,
+                    before=(number,),
+                    after=(number,),
+                    change="",
+                    jump=0.0,
+                    collision=met.collision,
+                    words=words,
+                )
+            )
     return tuple(sorted(events, key=lambda event: event.t))
 
 
@@ -504,20 +526,20 @@ def _answer(curve: Path, follower: Follower) -> Continuation:
     visited = [follower.at(t) for t in sorted(follower.snapshots)]
     names = visited[0].place.values
     return Continuation(
-        curve.name,
-        curve.unit,
-        np.array([each.t for each in visited]),
-        {name: np.array([each.place.values[name] for each in visited]) for name in names},
-        tuple(
+        name=curve.name,
+        unit=curve.unit,
+        t=np.array([each.t for each in visited]),
+        values={name: np.array([each.place.values[name] for each in visited]) for name in names},
+        attractors=tuple(
             {
                 number: State.of(attractor)
                 for number, attractor in sorted(zip(row, each.attractors, strict=True), key=itemgetter(0))
             }
             for row, each in zip(numbers, visited, strict=True)
         ),
-        tuple(_critical(each) for each in visited),
-        events_of(follower, numbers),
-        len(visited),
+        critical=tuple(_critical(each) for each in visited),
+        events=events_of(follower, numbers),
+        evaluations=len(visited),
     )
 
 

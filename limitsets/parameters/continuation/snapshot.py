@@ -529,7 +529,8 @@ class Continuation(Tabled):
             for k, t in enumerate(self.t.tolist())
         ]
         events = [
-            picked(e, "kind", "t", "values", "before", "after", "change", "jump")
+            picked(e, "kind", "t", "values")
+            | picked(e, "before", "after", "change", "jump")
             | {"collision": _table(e.collision)}
             for e in self.events
         ]

@@ -560,15 +560,15 @@ def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
     rows = [_Row(chosen, numbers, side, point) for side, point in enumerate(first_points(chosen))]
     slack = [number for side in zip(*_slacks(numbers), strict=True) for number in side]
     return CriticalJacobian(
-        chosen,
-        names,
-        np.array([present(chosen, name) for name in names]),
-        np.array([row.x for row in rows]),
-        tuple(row.kind for row in rows),
-        np.array([row.slope for row in rows]).reshape(len(rows), len(names)),
-        tuple(row.reason for row in rows),
-        np.array([float(number) for number in slack]),
-        np.array([number.slope[1:] for number in slack]).reshape(len(slack), len(names)),
+        scene=chosen,
+        names=names,
+        values=np.array([present(chosen, name) for name in names]),
+        x=np.array([row.x for row in rows]),
+        kinds=tuple(row.kind for row in rows),
+        matrix=np.array([row.slope for row in rows]).reshape(len(rows), len(names)),
+        reasons=tuple(row.reason for row in rows),
+        slack=np.array([float(number) for number in slack]),
+        slack_matrix=np.array([number.slope[1:] for number in slack]).reshape(len(slack), len(names)),
     )
 
 

@@ -142,7 +142,8 @@ class Design(Tabled):
         """Give it as plain tables for JSON."""
         return as_table(
             scene=self.scene.as_dict(),
-            **picked(self, "reached", "message", "how", "evaluations", "targets", "residual"),
+            **picked(self, "reached", "message", "how", "evaluations"),
+            **picked(self, "targets", "residual"),
             quantities=[
                 {"quantity": name, "before": before, "after": after, "unit": unit}
                 for name, (before, after, unit) in self.quantities().items()

@@ -147,17 +147,8 @@ class GoalDesign(Tabled):
         """Give it as plain tables for JSON."""
         return as_table(
             scene=self.scene.as_dict(),
-            **picked(
-                self,
-                "message",
-                "room",
-                "room_before",
-                "lacking_before",
-                "leaving",
-                "verdict",
-                "ruled_out",
-                "evaluations",
-            ),
+            **picked(self, "message", "room", "room_before", "lacking_before"),
+            **picked(self, "leaving", "verdict", "ruled_out", "evaluations"),
             quantities={
                 name: {"before": self.before.value(name), "after": self.scene.value(name), "bounds": ends}
                 for name, ends in self.varied.items()
@@ -321,9 +312,18 @@ def design_for_goal(
     verdict = Query.of(design, goals).prove().verdict if room > 0.0 else "undecided"
     lost = why in (LOST, NO_PART)
     return GoalDesign(
-        design, start, ends, room, None if lost else room_before, why, _leaving(design, start.goal.laid), verdict,
-        dict(search.ruled_out), search.evaluations, time.perf_counter() - begin,
-    )  # fmt: skip
+        scene=design,
+        before=start,
+        varied=ends,
+        room=room,
+        room_before=None if lost else room_before,
+        lacking_before=why,
+        leaving=_leaving(design, start.goal.laid),
+        verdict=verdict,
+        ruled_out=dict(search.ruled_out),
+        evaluations=search.evaluations,
+        seconds=time.perf_counter() - begin,
+    )
 
 
 def _leaving(scene: Scene, laid: Laid) -> float | None:

@@ -360,7 +360,15 @@ def robust_design(
     # a part whose masses are given is made as it is written
     lead = "center" in start.text["part"]["mass"]
     searches = [
-        DesignSearch(one, vector, on, bounds_of(one, names, given), number, lead, everywhere)
+        DesignSearch(
+            scene=one,
+            tolerance=vector,
+            side=on,
+            bounds=bounds_of(one, names, given),
+            order=number,
+            lead=lead,
+            everywhere=everywhere,
+        )
         for number, one in enumerate(orders_of(start) if orders else [start])
     ]
     if keep is not None:

@@ -90,13 +90,13 @@ def predicted(
     if corner:
         after = after - params.a[:, (side + branch) % len(scene.sides)]
     return Predicted(
-        after,
-        slope,
-        (fast - slow) / (2 * STEP),
-        decides,
-        (beyond - short) / (2 * move),
-        (fast_decides - slow_decides) / (2 * STEP),
-        stack.possible[:, None],
+        after=after,
+        slope=slope,
+        per_log_speed=(fast - slow) / (2 * STEP),
+        decides=decides,
+        decides_slope=(beyond - short) / (2 * move),
+        decides_per_log_speed=(fast_decides - slow_decides) / (2 * STEP),
+        possible=stack.possible[:, None],
     )
 
 

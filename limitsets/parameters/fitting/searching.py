@@ -134,7 +134,7 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
     while True:
         spread = ROUGH * float(np.mean(scene.sides.length))
         for loss in LOSSES:
-            values = _least_squares(scene, rows, names, values, units, spread, loss)
+            values = _least_squares(scene, rows, names, values=values, units=units, scale=spread, loss=loss)
             here = dict(zip(names, values.tolist(), strict=True))
             told = rows.told(scene, {k: np.array([v]) for k, v in here.items()})
             spread = max(spread_of(rows.throws.x_after - told.after[0]), 1e-9 * scene.arm_length)
@@ -165,7 +165,15 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
     errors = np.sqrt(np.diag(covariance))
     known = scene.with_values(dict(zip(names, values.tolist(), strict=True)))
     undetermined = _undetermined(known, rows, names, together, slopes, errors)
-    return Start(rows, names, values, errors * units, held, undetermined, spread)
+    return Start(
+        rows=rows,
+        names=names,
+        values=values,
+        errors=errors * units,
+        held=held,
+        undetermined=undetermined,
+        spread=spread,
+    )
 
 
 def _undetermined(
@@ -475,7 +483,7 @@ def profiles(
                 if limit < (1e-9 if quantity else 1e-3):
                     pair.append(End(way * math.inf))
                     continue
-                end = end_of_profile(own, best, k, way, threshold, first, limit)
+                end = end_of_profile(own, best, k, way=way, threshold=threshold, first=first, limit=limit)
                 if (math.isinf(end.at) or end.wall) and quantity and own.names[k] == RADIUS:
                     end = End(float(best.at[k]) + way * limit, wall=True)
                 pair.append(end)

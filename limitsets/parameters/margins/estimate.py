@@ -358,7 +358,9 @@ def estimated(
     loaded = list(hard or [])
     loaded += [worst_corner(row) for row in falls.T]
     spare, top = reach - threshold, min(linear, 1e3)
-    margin, x = _sought(fed, list(dict.fromkeys(loaded)), top, above, spare, steps, close)
+    margin, x = _sought(
+        fed, list(dict.fromkeys(loaded)), top, above=above, spare=spare, steps=steps, close=close
+    )
     return Estimate(margin, x, threshold, reach, nominal, effects)
 
 

@@ -442,22 +442,22 @@ def joint_margin(
     closed = bad is not None and bad - proved <= share * bad
     reason = reason or "no orbit is found that violates it nearer to what is proved"
     return Margin(
-        "joint",
-        "tolerance",
-        goals,
-        float(proved),
-        None if bad is None else float(bad),
-        "",
-        None,
-        "" if closed else reason,
-        closed,
-        time.perf_counter() - begin,
-        query.scene,
-        dict(texts),
-        vector.texts(proved) if proved else {},
-        noise if proved else {},
-        tuple(pieces),
-        at_corners.against,
+        quantity="joint",
+        reading="tolerance",
+        goals=goals,
+        proved=float(proved),
+        refuted=None if bad is None else float(bad),
+        unit="",
+        nominal=None,
+        reason="" if closed else reason,
+        closed=closed,
+        seconds=time.perf_counter() - begin,
+        scene=query.scene,
+        tolerance=dict(texts),
+        deviations=vector.texts(proved) if proved else {},
+        noise=noise if proved else {},
+        pieces=tuple(pieces),
+        against=at_corners.against,
     )
 
 

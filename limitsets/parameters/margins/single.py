@@ -164,8 +164,24 @@ def _failed(query: Query, one: DeviationScale | str, tolerance: dict[str, str], 
     """Return what is left of a margin whose search ended with an error."""
     if isinstance(one, DeviationScale):
         return _of_bracket(query, one, Bracket(reason=reason), Fraction(1), 0.0)
-    about = "joint", "tolerance", query.goals, 0.0, None, "", None, reason, False, 0.0
-    return Margin(*about, query.scene, tolerance, {}, {}, (), None)
+    return Margin(
+        quantity="joint",
+        reading="tolerance",
+        goals=query.goals,
+        proved=0.0,
+        refuted=None,
+        unit="",
+        nominal=None,
+        reason=reason,
+        closed=False,
+        seconds=0.0,
+        scene=query.scene,
+        tolerance=tolerance,
+        deviations={},
+        noise={},
+        pieces=(),
+        against=None,
+    )
 
 
 def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[float], None]) -> Margin:
@@ -182,23 +198,26 @@ def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[
 def _of_bracket(
     query: Query, one: DeviationScale, bracket: Bracket, width: Fraction, seconds: float
 ) -> Margin:
+    deviations, noise = _texts(one, bracket.proved)
+    more_or_less = "more" if bracket.sign > 0 else "less"
     return Margin(
-        one.quantity,
-        one.reading,
-        query.goals,
-        float(bracket.proved),
-        None if bracket.refuted is None else float(bracket.refuted),
-        one.unit,
-        _nominal(one),
-        bracket.reason,
-        bracket.closed(width),
-        seconds,
-        query.scene,
-        {},
-        *_texts(one, bracket.proved),
-        tuple(bracket.pieces),
-        bracket.against,
-        None if one.reading != "fixed" or not bracket.refuted else "more" if bracket.sign > 0 else "less",
+        quantity=one.quantity,
+        reading=one.reading,
+        goals=query.goals,
+        proved=float(bracket.proved),
+        refuted=None if bracket.refuted is None else float(bracket.refuted),
+        unit=one.unit,
+        nominal=_nominal(one),
+        reason=bracket.reason,
+        closed=bracket.closed(width),
+        seconds=seconds,
+        scene=query.scene,
+        tolerance={},
+        deviations=deviations,
+        noise=noise,
+        pieces=tuple(bracket.pieces),
+        against=bracket.against,
+        direction=more_or_less if one.reading == "fixed" and bracket.refuted else None,
     )
 
 
@@ -352,7 +371,14 @@ def margins_beyond(
     proved = np.array([[one.proved for one in row] for row in rows])
     refuted = np.array([[np.nan if one.refuted is None else one.refuted for one in row] for row in rows])
     return MarginsBeyond(
-        loaded, side, at, names, tuple(one.unit for one in rows[0]), proved, refuted, tuple(rows)
+        scene=loaded,
+        side=side,
+        x=at,
+        names=names,
+        units=tuple(one.unit for one in rows[0]),
+        proved=proved,
+        refuted=refuted,
+        margins=tuple(rows),
     )
 
 

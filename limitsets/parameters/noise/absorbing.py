@@ -238,15 +238,15 @@ def _described(chain: Transfer, cells: Cells, closed: bool) -> NoisyClass:
     shares = part @ chain.branches[cells]
     shares = shares / max(float(shares.sum()), 1e-300)
     return NoisyClass(
-        CellSet.of(chain.grid, cells),
-        closed,
-        weight,
-        0.0 if closed else sum(leads_to.values()),
-        leads_to,
-        sides,
-        {name: float(share) for name, share in zip(names, shares, strict=True)},
-        residual,
-        steps,
+        cells=CellSet.of(chain.grid, cells),
+        closed=closed,
+        weight=weight,
+        escape=0.0 if closed else sum(leads_to.values()),
+        leads_to=leads_to,
+        sides=sides,
+        branches={name: float(share) for name, share in zip(names, shares, strict=True)},
+        residual=residual,
+        steps=steps,
     )
 
 

@@ -414,7 +414,9 @@ def rows_of_points(
     image = images(map_of(mean), points, side)
     width = np.zeros(image.code.size)
     if dimension == 1:
-        width = _spread_of_points(map_of, mean, math.sqrt(3.0) * sd, points, side, image, samples)
+        width = _spread_of_points(
+            map_of, mean, math.sqrt(3.0) * sd, points=points, side=side, image=image, samples=samples
+        )
     source = np.repeat(cells, samples**dimension)
     share = np.full(source.size, weight * samples ** -float(dimension))
     return source, image.x, image.side, image.code, share, width

@@ -181,7 +181,15 @@ def throw_many(
     fed, arrived = _to_goal(ManyParts(scattering_map(scene, scatter, seed + 1), x, side), goal)
     answers = {**long_run, **fed}
     numbers, errors = ({name: pair[k] for name, pair in answers.items()} for k in (0, 1))
-    return SampledStatistics(rounds * parts, numbers, errors, density, borders, arrived, parts)
+    return SampledStatistics(
+        throws=rounds * parts,
+        numbers=numbers,
+        errors=errors,
+        density=density,
+        bins=borders,
+        arrived=arrived,
+        parts=parts,
+    )
 
 
 def uniform_starts(

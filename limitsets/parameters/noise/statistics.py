@@ -143,7 +143,9 @@ def solve(problem: ChainProblem, scatter: Scattering) -> ChainSolution:
     first = absorption(chain, goal, other=beyond & ~goal).probability["other"]
     numbers = {**_long_run(chain, parts, settles, beyond, goal), **_from_starts(chain, fed)}
     numbers["first beyond is wrong"] = float(starts @ first)
-    return ChainSolution(cover, chain.cut, parts, settles, ends, fed, numbers)
+    return ChainSolution(
+        grid=cover, cut=chain.cut, classes=parts, settles=settles, ends=ends, feeding=fed, numbers=numbers
+    )
 
 
 def _main(parts: Sequence[NoisyClass], settles: dict[str, float]) -> NoisyClass | None:

@@ -390,4 +390,13 @@ def transfer(
         ]
         sinks = sinks + np.stack(columns, axis=1)
         cut += added.cut
-    return Transfer(params, grid, throw, second, sinks, branches, reach, cut)
+    return Transfer(
+        map=params,
+        grid=grid,
+        throw=throw,
+        landing=second,
+        sinks=sinks,
+        branches=branches,
+        reach=reach,
+        cut=cut,
+    )

@@ -437,14 +437,14 @@ def _record(
     if basin.near:
         counts["joint"] = [(near.q, *(near.fixed_point or (0.0, 0.0))) for near in attracting.joint]
     return Record(
-        spans,
-        verdict,
-        reason,
-        basin.starts,
-        basin.shares,
-        blocks_of(attracting),
-        section | counts,
-        arrays_of(attracting, ""),
+        spans=spans,
+        goal=verdict,
+        reason=reason,
+        starts=basin.starts,
+        shares=basin.shares,
+        blocks=blocks_of(attracting),
+        section=section | counts,
+        arrays=arrays_of(attracting, ""),
     )
 
 

@@ -342,9 +342,27 @@ def robustness(
         recheck=recheck,
     )
     told = progress or (lambda step, done, of: None)
-    sheet = _SheetRun(quiet, goals, todo, vector, checkpoint, told, seconds, executor)
+    sheet = _SheetRun(
+        quiet,
+        goals,
+        todo,
+        tolerance=vector,
+        checkpoint=checkpoint,
+        progress=told,
+        seconds=seconds,
+        executor=executor,
+    )
     try:
-        return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
+        return _filled(
+            sheet,
+            given,
+            noise,
+            law=law,
+            width=width,
+            cells=cells,
+            leave_out=frozenset(leave_out),
+            begin=begin,
+        )
     except KeyboardInterrupt as error:
         if folder is not None:
             error.add_note(GOES_ON)
@@ -388,20 +406,20 @@ def _filled(
         statistics, levels = sheet.chance(given, noise, place, cells)
     flagged = None if "audit" in missing else sheet.audit()
     return Robustness(
-        scene,
-        goals,
-        verdict if scene == given else f"{verdict} {WITHOUT_SCATTER}",
-        reach_of([nominal]) if verdict == "proved" else None,
-        tuple(entries),
-        sheet.tolerance,
-        against,
-        statistics,
-        levels,
-        law,
-        flagged,
-        missing,
-        width,
-        sheet.checkpoint.digests,
-        sheet.checkpoint.again,
-        time.perf_counter() - begin,
+        scene=scene,
+        goals=goals,
+        verdict=verdict if scene == given else f"{verdict} {WITHOUT_SCATTER}",
+        reach=reach_of([nominal]) if verdict == "proved" else None,
+        entries=tuple(entries),
+        tolerance=sheet.tolerance,
+        curve=against,
+        noise=statistics,
+        levels=levels,
+        law=law,
+        audit=flagged,
+        left_out=missing,
+        width=width,
+        digests=sheet.checkpoint.digests,
+        again=sheet.checkpoint.again,
+        seconds=time.perf_counter() - begin,
     )

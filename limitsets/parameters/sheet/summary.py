@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,7 +45,16 @@ def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
     names, units = tuple(table["quantities"]), tuple(table["units"])
     # null becomes nan
     x, proved, refuted = (np.array(table[key], dtype=np.float64) for key in ("x", "proved", "refuted"))
-    return MarginsBeyond(scene, table["side"], x, names, units, proved, refuted, ())
+    return MarginsBeyond(
+        scene=scene,
+        side=table["side"],
+        x=x,
+        names=names,
+        units=units,
+        proved=proved,
+        refuted=refuted,
+        margins=(),
+    )
 
 
 def _joined(one: MarginsBeyond | None, other: MarginsBeyond) -> MarginsBeyond:
@@ -131,6 +141,7 @@ def curve(
     done = set() if margins is None else {round(x, 9) for x in margins.x.tolist()}
     waiting = [x for x in places.tolist() if round(x, 9) not in done]
     pool = executor or _Here()
+    margin_there = partial(_place, scene, side, names, words)
     # concurrent.futures has no public word for it; of an executor of another kind it is not known
     at_once = getattr(pool, "_max_workers", 1)
     begun: dict[Future[MarginsBeyond], float] = {}
@@ -144,7 +155,7 @@ def curve(
                 break
             x, each = waiting[0], at_once * (end - now) / len(waiting)
             tell(f"margin beyond x = {x:.4g}", 1.0 - len(waiting) / PLACES)
-            one = pool.submit(_place, scene, side, names, words, x, min(EACH, max(each, LEAST)))
+            one = pool.submit(margin_there, x, min(EACH, max(each, LEAST)))
             begun[one] = now
             del waiting[0]
         if not begun:
@@ -333,23 +344,23 @@ class Robustness(Tabled):
         if nominal is not None and entry.unit not in ("%", entry.nominal_unit):
             nominal = float(Fraction(repr(nominal)) * exact_factor(entry.nominal_unit, entry.unit))
         return Margin(
-            entry.quantity,
-            entry.reading,
-            self.goals,
-            entry.proved,
-            entry.refuted,
-            entry.unit,
-            nominal,
-            entry.reason,
-            entry.closed,
-            entry.seconds,
-            self.scene,
-            self.tolerance if joint else {},
-            {},
-            {},
-            (),
-            None,
-            entry.direction,
+            quantity=entry.quantity,
+            reading=entry.reading,
+            goals=self.goals,
+            proved=entry.proved,
+            refuted=entry.refuted,
+            unit=entry.unit,
+            nominal=nominal,
+            reason=entry.reason,
+            closed=entry.closed,
+            seconds=entry.seconds,
+            scene=self.scene,
+            tolerance=self.tolerance if joint else {},
+            deviations={},
+            noise={},
+            pieces=(),
+            against=None,
+            direction=entry.direction,
         )
 
     def tables(self) -> tuple[Table, ...]:
