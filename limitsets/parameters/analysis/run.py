@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,6 +38,7 @@ from limitsets.parameters.analysis.checks import (
 if TYPE_CHECKING:
     import networkx as nx
 
+    from limitsets.feeder.goals import Goal
     from limitsets.feeder.scene import Scene
     from limitsets.proofs.auditing import EffectChoice
     from limitsets.systems.cells import CellSet, Grid
@@ -285,8 +286,32 @@ def _on_grid(scene: Scene, cells: int, throws: int, steps: _Steps) -> _GridAnswe
     return _GridAnswer(graph, sets, shares, starts)
 
 
+def _on_grids(scene: Scene, cells: int, most_cells: int, throws: int, steps: _Steps) -> _GridAnswer:
+    """Look at one grid, and at finer ones as long as random starts show that these miss less."""
+    grid_answer = _on_grid(scene, cells, throws, steps)
+    while _missed(grid_answer) > 0.0 and (cells := FINER * cells) <= most_cells:
+        finer = _on_grid(scene, cells, throws, steps)
+        if _missed(finer) >= _missed(grid_answer):
+            break
+        grid_answer = finer
+    return grid_answer
+
+
 def _missed(grid_answer: _GridAnswer) -> float:
     return 0.0 if grid_answer.starts is None else grid_answer.starts.missed
+
+
+def _goal_outcome(goal: Goal, grid_answer: _GridAnswer, limits: Sequence[LimitSet]) -> GoalOutcome:
+    """Say whether a goal holds; open where some random starts stay where no attractor is known."""
+    outcome = goal_outcome(
+        goal,
+        grid_answer.graph,
+        grid_answer.attractors,
+        basins=grid_answer.basins,
+        extents=best_extents(grid_answer.attractors, limits),
+    )
+    astray = grid_answer.starts is not None and grid_answer.starts.elsewhere
+    return replace(outcome, holds=None) if outcome.holds and astray else outcome
 
 
 class _Steps:
@@ -384,13 +409,8 @@ def analyse(
         if announce is not None:
             announce(plan)
     count = plan.chosen.cells if plan is not None else CELLS if cells is None else cells
-    seen = _on_grid(chosen, count, throws, steps)
-    while cells is None and _missed(seen) > 0.0 and (count := FINER * count) <= MOST_CELLS:
-        finer = _on_grid(chosen, count, throws, steps)
-        if _missed(finer) >= _missed(seen):
-            break
-        seen = finer
-    graph, sets, shares, starts = seen
+    seen = _on_grids(chosen, count, MOST_CELLS if cells is None else count, throws, steps)
+    graph, sets = seen.graph, seen.attractors
     with steps.step("limit sets"):
         skip = plan is not None and plan.chosen.method == BY_CELLS
         limits = tuple(left_to_cells() if skip else limit_of(graph, each) for each in sets)
@@ -404,10 +424,7 @@ def analyse(
         morse = morse_graph(graph)
         false_sets = spurious(graph)
     with steps.step("goal"):
-        extents = best_extents(sets, limits)
-        outcome = None if chosen.goal is None else goal_outcome(chosen.goal, graph, sets, shares, extents)
-        if outcome is not None and outcome.holds and starts is not None and starts.elsewhere:
-            outcome = replace(outcome, holds=None)  # some starts stay where nothing is known
+        outcome = None if chosen.goal is None else _goal_outcome(chosen.goal, seen, limits)
     with steps.step("assumptions"):
         flags = other_vertex_first(chosen)
     accuracy = None
@@ -421,8 +438,8 @@ def analyse(
         grid=graph.grid,
         graph=graph,
         attractors=sets,
-        basins=shares,
-        starts=starts,
+        basins=seen.basins,
+        starts=seen.starts,
         limit_sets=limits,
         critical_points=critical,
         cycles=orbits,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -351,9 +351,6 @@ def arrivals(attractor: AttractorAtPlace, there: Snapshot, reach: float) -> set[
 # ----------------------------------------------------------------
 # What continuation gives: the attractors at each step, numbered, and the events between.
 
-
-if TYPE_CHECKING:
-    pass
 
 # Of the bands that a resolution shows.
 LEAST = "at least "

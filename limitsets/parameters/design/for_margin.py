@@ -274,9 +274,24 @@ class NoDesignError(AnswerError):
         self, evaluations: int, ruled_out: Mapping[str, int], miss: Scene | None, varied: Iterable[str]
     ) -> None:
         remedy = "widen the bounds, look at more designs, or ask the goal of another side"
-        none_feeds = f"none that feeds among {evaluations}"
-        super().__init__("the design", none_feeds, "one at least", f"{said(ruled_out)}; {remedy}")
+        super().__init__(
+            "the design",
+            f"none that feeds among {evaluations}",
+            "one at least",
+            f"{said(ruled_out)}; {remedy}",
+        )
         self.evaluations, self.ruled_out, self.miss, self.varied = evaluations, ruled_out, miss, tuple(varied)
+
+
+def _none_feeds(
+    searches: Sequence[DesignSearch], search: DesignSearch, nearest: Sequence[float], name: str
+) -> NoDesignError:
+    """Give the error of searches without a design, with the nearest miss if its part can be built."""
+    ruled_out = sum((each.ruled_out for each in searches), Counter[str]())
+    count, miss = sum(each.evaluations for each in searches), search.scene_of(nearest)
+    if miss is not None:
+        miss = load(_rounded(miss, search).as_dict() | {"name": name})
+    return NoDesignError(count, ruled_out, miss, search.bounds)
 
 
 @shown_in_notebooks
@@ -385,11 +400,7 @@ def robust_design(
     polish = max(evaluations // POLISH, 1)
     best = polished(search, population[:POLISHED], lambda made: _rounded(made, search), polish, tell)
     if best is None:
-        ruled_out = sum((each.ruled_out for each in searches), Counter[str]())
-        count, miss = sum(each.evaluations for each in searches), search.scene_of(population[0])
-        if miss is not None:
-            miss = load(_rounded(miss, search).as_dict() | {"name": f"{start.name}-robust"})
-        raise NoDesignError(count, ruled_out, miss, search.bounds)
+        raise _none_feeds(searches, search, population[0], f"{start.name}-robust")
     made, estimate = best
     x = round(estimate.x, DECIMALS_OF_X)
     design = _with_purpose(made, x, on, texts, f"{start.name}-robust")
@@ -400,15 +411,12 @@ def robust_design(
     own_option = Option(Candidate(values, estimate, search.order), feeding)
     front = front_of(searches, history, own_option, on, seed, tell)
     seconds = time.perf_counter() - begin
-    known = before is not None and before.margin > 0.0
-    fed = throws_to_feed(start, before.x, on, seed=seed) if before is not None and known else None
-    margins: tuple[Margin, ...] = ()
-    own: tuple[Margin, ...] = ()
-    if prove > 0.0:
-        margins = _proved(design, fed_at(x, on, ranges), texts, prove, tell, "the design")
-        if before is not None and known:
-            goals = fed_at(round(before.x, DECIMALS_OF_X), on, ranges)
-            own = _proved(start, goals, texts, prove, tell, "the scene before")
+    margins = _proved(design, fed_at(x, on, ranges), texts, prove, tell, "the design")
+    fed, own = None, tuple[Margin, ...]()
+    if before is not None and before.margin > 0.0:
+        fed = throws_to_feed(start, before.x, on, seed=seed)
+        goals = fed_at(round(before.x, DECIMALS_OF_X), on, ranges)
+        own = _proved(start, goals, texts, prove, tell, "the scene before")
     return RobustDesign(
         scene=design,
         goals=fed_at(x, on, ranges),
@@ -434,9 +442,12 @@ def robust_design(
 def _proved(
     scene: Scene, goals: Sequence[Goal], texts: Mapping[str, str], seconds: float, tell: Tell, whose: str
 ) -> tuple[Margin, ...]:
-    """Bracket the joint margin of each goal by itself: one may be proved much farther than the other."""
+    """Bracket the joint margin of each goal by itself: one may be proved much farther than the other.
+
+    Without time for it there are no margins.
+    """
     margins = []
-    for goal in goals:
+    for goal in goals if seconds > 0.0 else ():
         what = f"margin of {whose}, {goal.kind}"
 
         def told(share: float, what: str = what) -> None:

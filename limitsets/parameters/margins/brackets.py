@@ -291,8 +291,16 @@ def bracket_per_throw(query: Query, scale: DeviationScale, width: Fraction, tell
     tell(0.5)
     if bracket.refuted is not None and not bracket.closed(width):
         ray.proves(short(bracket.refuted * (1 - width * Fraction(9, 10))), 3)
+    _close_per_throw(ray, width, NONE * scale.least)
+    bracket.reason = "" if bracket.closed(width) else bracket.reason
+    return bracket
+
+
+def _close_per_throw(ray: Ray, width: Fraction, least: Fraction) -> None:
+    """Move both ends of a bracket towards each other, until it is closed or no size between them is decided."""
+    bracket = ray.bracket
     low = high = None  # nothing is known between them
-    while bracket.refuted is not None and not bracket.closed(width) and bracket.refuted > NONE * scale.least:
+    while bracket.refuted is not None and not bracket.closed(width) and bracket.refuted > least:
         middle = short(((high or bracket.proved) + bracket.refuted) / 2)
         if bracket.refuted - (high or bracket.proved) > width / 4 * bracket.refuted:
             if ray.refutes(middle) or ray.proves(middle, 3):
@@ -303,5 +311,3 @@ def bracket_per_throw(query: Query, scale: DeviationScale, width: Fraction, tell
             low = low if ray.proves(middle, 3) else middle
         else:
             break
-    bracket.reason = "" if bracket.closed(width) else bracket.reason
-    return bracket

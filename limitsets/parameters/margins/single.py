@@ -199,7 +199,6 @@ def _of_bracket(
     query: Query, one: DeviationScale, bracket: Bracket, width: Fraction, seconds: float
 ) -> Margin:
     deviations, noise = _texts(one, bracket.proved)
-    more_or_less = "more" if bracket.sign > 0 else "less"
     return Margin(
         quantity=one.quantity,
         reading=one.reading,
@@ -217,7 +216,9 @@ def _of_bracket(
         noise=noise,
         pieces=tuple(bracket.pieces),
         against=bracket.against,
-        direction=more_or_less if one.reading == "fixed" and bracket.refuted else None,
+        direction=("more" if bracket.sign > 0 else "less")
+        if one.reading == "fixed" and bracket.refuted
+        else None,
     )
 
 
