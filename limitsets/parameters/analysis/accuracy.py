@@ -346,7 +346,7 @@ def _proved(scene: Scene, limits: Sequence[LimitSet]) -> float:
 
 
 class _Visited:
-    """What of an interval an orbit has seen, to within a bin."""
+    """Give the parts of an interval that an orbit has visited, to within a bin."""
 
     def __init__(self, side: int, lo: float, hi: float, width: float) -> None:
         self.side, self.lo, self.hi = side, lo, hi

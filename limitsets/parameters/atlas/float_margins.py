@@ -39,7 +39,7 @@ SMALL = 0.05
 
 
 def threshold_of(goal: OrientedBeyond | Reaches, reach: Floats) -> Floats:
-    """Return what of `reach`, shape (n, S), the goal bounds: the largest on other sides, or that on its own side."""
+    """Return the reach that the goal bounds, from `reach` of shape (n, S): the largest on other sides, or its own."""
     if isinstance(goal, OrientedBeyond):
         threshold: Floats = np.fmax.reduce(np.delete(reach, goal.side, axis=1), axis=1)
         return threshold

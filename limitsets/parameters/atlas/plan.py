@@ -64,7 +64,7 @@ class Variable:
 
     @property
     def empty(self) -> float | int:
-        """What stands where there is nothing."""
+        """The value that marks a point without an answer."""
         return np.nan if np.dtype(self.dtype).kind == "f" else self.fill
 
     def is_empty(self, values: npt.NDArray[Any]) -> bool:
@@ -101,7 +101,7 @@ class Block(NamedTuple):
 
 
 class Coded(NamedTuple):
-    """Codes at n points whose names are known only when they are met, and these names."""
+    """Codes at n points, and the names of those that occur.  The task learns these names only while it runs."""
 
     values: npt.NDArray[Any]
     codes: Mapping[str, int]

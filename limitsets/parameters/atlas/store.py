@@ -233,7 +233,7 @@ class Store:
 
     @contextmanager
     def _written(self) -> Iterator[None]:
-        """Say of a failed write what it means."""
+        """Explain a failed write."""
         try:
             yield
         except OSError as error:
@@ -244,7 +244,7 @@ class Store:
 
 
 def _damaged(path: Path | None, what: str) -> LimitsetsError:
-    """Say what of a store is not as it was written."""
+    """Name the part of a store that has changed since it was written."""
     return LimitsetsError(
         f"the store {path}", "damaged", "a store as it was written", f"{what} changed since; {_REMEDY}"
     )

@@ -221,7 +221,7 @@ def _tracked(
 
 
 def _at_both(border: Border, others: list[Border], which: int) -> tuple[Border, Border] | None:
-    """Pair a border of the first or second place with the same at the other; None where that is not there."""
+    """Pair a border at one place with the same border at the other place; None without one there."""
     other = _nearest(others, border, border.x_above)
     if other is None:
         return None

@@ -224,7 +224,7 @@ class Follower:
         return self.sure[t]
 
     def _middle(self, lo: Snapshot, hi: Snapshot) -> float | None:
-        """Place that cuts a step; on cells one that finer ones confirm, None where there is none."""
+        """Place at which to cut a step; on cells, finer cells have to confirm the place.  None without such a place."""
         if lo.place.on_line:
             return 0.5 * (lo.t + hi.t)
         for share in (0.5, 0.25, 0.75):

@@ -50,7 +50,7 @@ class _Pieces:
         """F of some intervals; what leaves the domain is dropped."""
         lo = np.maximum(given.lo[:, None], self.bottom)
         hi = np.minimum(given.hi[:, None], self.top)
-        # A part that only rounding makes would be thrown elsewhere, far from everything.
+        # Rounding may leave a sliver, whose image would lie far from all others.
         row, k = np.nonzero((given.side[:, None] == self.side) & (hi - lo > NONE * self.extent))
         count = row.size
         if count == 0:
@@ -233,7 +233,7 @@ def _as_cycle(place: Place, x: float, side: int, word: Ints) -> Cycle | None:
 
 
 def _shortest(place: Place, cycle: Cycle) -> Cycle:
-    """Cycle that this one runs through several times, if that one attracts."""
+    """Return the shorter cycle that a cycle repeats, if the shorter one attracts; else the cycle itself."""
     for period in range(1, cycle.period):
         if cycle.period % period == 0 and cycle.side[period] == cycle.side[0]:
             if abs(cycle.x[period] - cycle.x[0]) > 1e-3 * place.extent:
@@ -272,7 +272,7 @@ def attracting_cycles(place: Place, orbits: Recorded) -> tuple[list[Cycle], Flag
 
 
 def _told_apart(place: Place, cycles: list[Cycle]) -> list[Cycle]:
-    """Cycles of which rounding lets one be told from another: near slope 1 all numbers between two are roots."""
+    """Keep the cycles that rounding can tell apart: near slope 1 every number between two cycles is a root."""
     kept: list[Cycle] = []
     for cycle in sorted(cycles, key=lambda each: each.period):
         twin = False

@@ -186,7 +186,7 @@ def _holds(outer: AttractorAtPlace, inner: AttractorAtPlace, slack: float) -> bo
 
 
 def _least(attractors: list[AttractorAtPlace], slack: float) -> tuple[AttractorAtPlace, ...]:
-    """Keep the sets that hold no other one; of two that are the same the first."""
+    """Keep the sets that contain no other set; of two equal sets keep the first."""
     return tuple(
         each
         for k, each in enumerate(attractors)
@@ -218,7 +218,7 @@ def snapshot_at(place: Place, cells: int) -> Snapshot:
 
 
 def _on_cells(place: Place, cells: int) -> Snapshot:
-    """Find the attracting cells, on finer ones where orbits stay elsewhere; on the finest add the cells they visit."""
+    """Find the attracting cells.  If orbits stay elsewhere, use finer cells; on the finest, add the visited cells."""
     cover = grid(place.domain, cells)
     sets = _cell_sets(transitions(place.params, cover))
     snapshot = Snapshot(
@@ -262,7 +262,7 @@ def _rested(snapshot: Snapshot) -> tuple[Array, Ints, Ints]:
 
 
 def _visited(place: Place, cover: Grid, x: Array, side: Ints, sets: list[CellSet]) -> list[CellSet]:
-    """Cells that orbits visit, those together that share one; without the orbits that come to a set after all."""
+    """Join the cells of orbits that share one; orbits that reach a cell of `sets` are left out."""
     rows = []
     for _ in range(TRANSIENT):
         x, side, code, _ = advance(place.params, x, side, 1)
@@ -286,7 +286,7 @@ def _visited(place: Place, cover: Grid, x: Array, side: Ints, sets: list[CellSet
 
 
 def confirmed(snapshot: Snapshot) -> Snapshot | None:
-    """Find the attractors that two sizes of cells agree on, by the orbits that come to them; None where none do."""
+    """Find the attractors on which two sizes of cells agree, by the orbits that reach them; None if none agree."""
     place, cells = snapshot.place, _finer(snapshot.place, snapshot.cells)
     if cells is None or not all(each.decided for each in snapshot.attractors):
         return None
@@ -378,7 +378,7 @@ class State:
 
     @classmethod
     def of(cls, attractor: AttractorAtPlace) -> State:
-        """Give what a snapshot found."""
+        """Give the state of an attractor of a snapshot."""
         return cls(attractor.extents, attractor.period, attractor.decided)
 
     @property

@@ -208,7 +208,7 @@ def _sure(
     seed: int,
     tell: Callable[[str, int, int], None],
 ) -> tuple[Option, ...]:
-    """Rate again on all corners whatever stands on the front, until all that does has been; the first one has been.
+    """Rate the designs on the front again on all corners, until all of them are rated so; the first one already is.
 
     The search knew some corners only: a rating from then may be too high, and hides designs that are better on all.
     """

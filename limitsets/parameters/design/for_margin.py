@@ -197,14 +197,14 @@ def orders_of(scene: Scene) -> list[Scene]:
     for order in permutations(range(3)):
         tree = scene.as_dict()
         tree["part"]["sides"] = [sides[k] for k in order]
-        # the old centre of mass need not lie in it: the search begins elsewhere
+        # the old centre of mass may lie outside the new triangle: the search begins at another one
         left, right = (float(scene.sides.length[order[k]]) for k in (2, 0))
         mass = tree["part"]["mass"]
         if order != (0, 1, 2) and "center" in mass:
             mass["center"]["along"] = f"{0.6 * left:.4f} {scene.unit}"
             mass["center"]["above"] = f"{0.15 * min(left, right):.4f} {scene.unit}"
         elif order != (0, 1, 2):
-            # as far along each edge: what lies on the part lies on it
+            # the same shares along each edge: a point on the part stays on the part
             moved = np.linalg.solve(_edges(scene.vertices), _edges(triangle(scene.sides.length[list(order)])))
             for k, point in enumerate(mass.get("points", ())):
                 own = np.array([scene.value(f"part.mass.points[{k}].{word}") for word in "xy"])

@@ -163,7 +163,7 @@ def validity_slack(scene: Scene, invariant: InvariantIntervals) -> float:
             numbers = assumed(params, params, side, ends, ends)
             shares = [row.spare(numbers, side).min() / sizes[row.about.dimension][side] for row in rows]
             spare = min(spare, *shares)
-    # a number that is not known is no number to rely on
+    # an unknown number cannot be relied on
     return float(spare) if np.isfinite(spare) else -9.0
 
 
@@ -243,7 +243,7 @@ def _usual(scene: Scene) -> list[str]:
 
 
 def _own(scene: Scene, name: str) -> tuple[float, float]:
-    """Give bounds of one quantity which hold its value; beyond the usual ones a throw may have half or twice of it."""
+    """Give bounds of one quantity that contain its value; outside the usual ones a throw may have half or twice it."""
     dimension, value = find(name).dimension, scene.value(name)
     corners, size = scene.vertices, float(scene.sides.length.mean())
     half, twice = sorted((0.5 * value, 2.0 * value))

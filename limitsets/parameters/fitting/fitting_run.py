@@ -202,7 +202,7 @@ def _answer(
     )
     names = tuple(each.name for each in fitted)
     error = own.rows.error
-    if not own.rows.known:  # what the answer may be sharpened to is then told with all scatter as one
+    if not own.rows.known:  # the gain of further throws is then computed with all scatter as one
         error = np.full(len(error), landing.value / math.sqrt(2.0))
     throws = own.rows.throws
     asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value), throws.corner)

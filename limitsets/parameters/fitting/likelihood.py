@@ -165,7 +165,7 @@ class Rows:
 
 
 def as_recorded(throws: Throws, error: Array, known: bool, sides: int) -> Rows:
-    """Take every row at its word; one that ends on neither of the two sides it could counts as a jog."""
+    """Take every row as recorded; a row that ends on neither possible side counts as a jog."""
     flipped = throws.side_after == (throws.side_before + 1) % sides
     return Rows(throws, throws.side_before, flipped.astype(np.int64), error, known)
 
@@ -208,7 +208,7 @@ def assigned(rows: Rows, scene: Scene, values: Mapping[str, float], spread: floa
     for k in range(count):
         # one reading for both rows: it is as right or wrong as it was in the row before
         recorded = (before[k - 1] + own[k - 1]) % sides if shared[k] else throws.side_before[k]
-        # wrong before and after at once would be a way out for whatever lands where no throw can
+        # with both sides wrong, a row could explain a landing that no throw can make
         single = (after[:, 0] == throws.side_after[k]) & ~shared[k]
         price = np.where(side == recorded, right, np.where(single, wrong, -np.inf))
         best = int(np.argmax(fits[:, k] + price))

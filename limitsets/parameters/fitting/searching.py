@@ -89,7 +89,7 @@ def jacobian(scene: Scene, rows: Rows, names: tuple[str, ...], values: Array, un
     count = len(names)
     moves = np.concatenate([np.diag(units), -np.diag(units), np.zeros((1, count))]) * STEP
     told = rows.told(scene, dict(zip(names, (values + moves).T, strict=True)))
-    # a step that leads out of what can be is not made: the difference is one-sided there
+    # a step to an impossible scene is left out: the difference is one-sided there
     after = np.where(told.possible, told.after, told.after[-1])
     steps = STEP * (told.possible[:count] * 1.0 + told.possible[count:-1])
     derivatives: Array = ((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T
@@ -345,7 +345,7 @@ def end_of_profile(
     near, near_root, far, far_root = 0.0, 0.0, math.inf, math.inf
     last, distance, wall = best.at, min(first, limit), False
     for _ in range(40):
-        # where the others went along so far that there is nothing they stay nearer to where they were
+        # if the other numbers moved so far that the function is undefined, they move less
         starts = last + SHARES_BACK[:, None] * (best.at + distance * along - last)
         starts[:, k] = best.at[k] + way * distance
         start = starts[int(np.argmax(f(starts) > WORST))]
@@ -413,7 +413,7 @@ def largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     known = rows.error**2 * (1.0 + told.slope[0] ** 2)
     left = math.sqrt(max(start.spread**2 - float(known.mean()), 0.01 * start.spread**2) / 2.0)
     share = left / max(float(np.median(np.abs(told.per_log_speed[0]))), 1e-12)
-    # landings that happen to agree better than their errors of measurement tell no more than these let them
+    # landings that agree better than their errors of measurement by chance tell no more than these errors allow
     sizes[: len(start.names)] *= max(1.0, math.sqrt(float(known.mean())) / start.spread)
     own = replace(own, scale=np.append(sizes, [share, left]))
     at = np.append(np.zeros(len(names)), [1.0, 1.0])

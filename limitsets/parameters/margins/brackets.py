@@ -133,7 +133,7 @@ def _reach(query: Query, scale: DeviationScale, sign: int, width: Fraction, know
     else:
         return ray
     least = NONE * scale.least
-    # beyond a gap what is refuted is nearly as near as can be
+    # beyond a gap the refuted size is nearly the smallest that can be refuted
     halved(bracket.proved, size, lambda s: ray.ask(s) == "proved", width, least, stop=lambda: ray.gap)
     if bracket.refuted is not None and ray.end is not None:
         # lower what is refuted towards what is undecided, and raise what is proved
@@ -154,7 +154,7 @@ def _grow(
             return low, pieces, ""
         step = step if scale.widest is None else min(step, scale.widest)
         high = min(target, short(low + step, up=True))
-        # far from the wall narrower pieces do as well as finer cells, and to fail with these is what takes time
+        # far from the wall narrower pieces do as well as finer cells, and a failed proof on fine cells takes long
         finest = 3 if low > NEAR * wall else 1
         outcome = query.prove(scale.piece(scale.between(sign * low, sign * high)), finest=finest)
         if outcome.verdict == "proved":
@@ -275,7 +275,7 @@ def _fails_beyond(ray: Ray, sign: int, far: Fraction, bracket: Bracket) -> None:
 
 
 def bracket_per_throw(query: Query, scale: DeviationScale, width: Fraction, tell: Tell) -> Bracket:
-    """Bracket the margin of a quantity that is another one at every throw."""
+    """Bracket the margin of a quantity that has another value at every throw."""
     ray, size, most = Ray(query, Tolerance.alone(scale), ()), scale.least, scale.most
     bracket = ray.bracket
     for _ in range(STEPS):

@@ -158,7 +158,7 @@ def _slack_of(goal: Goal, highest: Sequence[float]) -> list[float]:
 
 
 def _proved_slack(query: Query, piece: SceneBox | None) -> Array:
-    """Say what slack is proved; of a place to be reached, nothing of the kind is."""
+    """Give the proved slack of each goal; 0 for a place to be reached, whose slack these cells do not prove."""
     extents = query.cells(piece, STEP).cells.extents()
     sides = range(query.scene.sides.a.size)
     highest = [max((hi for _, hi in extents.get(side, ())), default=-math.inf) for side in sides]

@@ -76,7 +76,7 @@ def bound_above(value: float) -> str:
 
 
 def reach_of(pieces: Sequence[Outcome]) -> float | None:
-    """Say how far out the cells reach that attract in all of what was proved together; None where nothing was."""
+    """Give the farthest x of the attracting cells of all proved pieces; None if no piece is proved."""
     cells = [piece.found.cells.extents() for piece in pieces if piece.found is not None]
     return max((hi for each in cells for parts in each.values() for _, hi in parts), default=None)
 

@@ -59,7 +59,7 @@ def beyond(grid: Grid, reach: tuple[float, float]) -> tuple[Array, ...]:
 
 
 def _sink_numbers(exits: dict[str, int]) -> tuple[int, int, int]:
-    """Columns of what lands below, above, and of what has no image."""
+    """Columns of the masses that land below, that land above, and that have no image."""
     number = {code: k for k, code in enumerate(exits.values())}
     outside = number.get(codes.OUTSIDE_MODEL, number.get(codes.OUTSIDE, 0))
     return number.get(codes.INWARD, number.get(codes.OUTSIDE, 0)), number.get(codes.OUTWARD, 0), outside

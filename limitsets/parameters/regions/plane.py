@@ -323,7 +323,7 @@ class Pick(NamedTuple):
 def largest_square(
     scene: Scene, centre: Mapping[str, str], scales: Mapping[str, str], *, width: float = 0.01
 ) -> Margin:
-    """Bracket the largest square around a point for all parameters of which the scene's goal is proved.
+    """Bracket the largest square around a point such that the scene's goal is proved for all parameters in it.
 
     Parameters
     ----------

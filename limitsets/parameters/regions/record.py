@@ -370,7 +370,7 @@ def certify_cell(
             attracting = _finer(coarse, scene, number)
             doubtful = _may_violate(attracting, scene)
             against = _refuting(attracting, scene, middle) if doubtful and first is None else Violation()
-            # where these cells do not prove it finer ones are asked before two throws at once, which cost more
+            # if these cells prove nothing, finer cells come before two throws at once, which cost more
             record = _record(
                 attracting, scene, ends, ask=not against.seen and (not doubtful or number == cells[-1])
             )
@@ -383,7 +383,7 @@ def certify_cell(
             first = record if first is None or not first.blocks else first
     except AnswerError as error:  # no such part or throw somewhere in the cell
         return Record(ends, "undecided" if scene.goal else "", str(error).splitlines()[0])
-    # of a cell that stays undecided the coarse cells say as much as the fine ones
+    # where a cell stays undecided, its coarse cells say as much as its fine ones
     return replace(first if first is not None and first.blocks else record, reason=record.reason)
 
 
@@ -398,7 +398,7 @@ def _coarse(box: ParameterBox, scene: Scene) -> tuple[Attraction, int]:
 
 
 def _finer(coarse: tuple[Attraction, int], scene: Scene, number: int) -> Attraction:
-    """Cut what attracts at multiples of a number-th of the arm, so that neighbours in the plane have such in common."""
+    """Cut the attracting cells at multiples of arm length / number, so that neighbours in the plane share borders."""
     attracting, base = coarse
     extents, step = attracting.cells.extents(), float(attracting.cover.box.lo.arm_length) / number
     if not extents:
@@ -408,7 +408,7 @@ def _finer(coarse: tuple[Attraction, int], scene: Scene, number: int) -> Attract
         for lo, hi in extents.get(side, ()):
             at = np.arange(math.ceil(lo / step), math.floor(hi / step) + 1) * step
             k = np.clip(np.searchsorted(edges, at), 1, edges.size - 1)
-            # none so near to another border that the images of a cell had no room in the digits of x
+            # a cut too near to another border would leave the images of a cell no room in the digits of x
             apart = np.minimum(np.abs(at - edges[k - 1]), np.abs(edges[k] - at)) > APART * step
             wanted[side] += at[apart].tolist()
     return attraction(cover(attracting.cover.box, base, wanted, PIECES))
@@ -449,7 +449,7 @@ def _record(
 
 
 def _may_violate(attracting: Attraction, scene: Scene) -> bool:
-    """Whether a goal of single places is violated somewhere in the attracting cells, as far as these tell."""
+    """Whether the attracting cells reach a place that violates the goal."""
     wrong = None if scene.goal is None else scene.goal.wrong()
     if wrong is None:
         return False

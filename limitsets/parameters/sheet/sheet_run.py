@@ -119,7 +119,7 @@ class _SheetRun:
     ) -> Iterator[Entry | str]:
         """Ask for margins, one after the other, or on the executor; it is not handed goals that are code.
 
-        Of one whose search ends with an error, say which.
+        A search that ends with an error answers with the text of the error.
         """
         folder, recheck = self.checkpoint.folder, self.checkpoint.recheck
         ask = partial(_single, self.scene, self.goals, width, folder, recheck)
@@ -379,7 +379,7 @@ def _filled(
     leave_out: frozenset[str],
     begin: float,
 ) -> Robustness:
-    """Ask part by part; of those that there is nothing of, say why."""
+    """Compute the sheet part by part; for each part left out, say why."""
     scene, goals, place = sheet.scene, sheet.goals, _place(sheet.goals)
     missing = sheet.left_out
     missing |= {part: "it was not asked for" for part in PARTS if part in leave_out}
