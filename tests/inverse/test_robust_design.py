@@ -200,7 +200,7 @@ def test_the_margin_of_the_design_is_that_of_its_worst_corner(small):
 def test_what_stands_on_the_front_holds_on_all_corners(small):
     box = Tolerance.of(small.scene, small.tolerance)
     for option in small.front[:3]:
-        scene, found = small.before.with_values(option.candidate.values), option.candidate.found
+        scene, found = small.before.with_values(option.candidate.values), option.candidate.estimate
         assert failing(scene, box, 2, found, found.margin) == []
 
 
@@ -226,13 +226,13 @@ def test_a_small_search_says_how_it_was_found(small):
     assert small.lead.inside >= 0.0
     # nothing on the front is worse than the design in both
     assert all(
-        option.candidate.found.margin >= small.sampled.margin or option.feeding.mean <= small.feeding.mean
+        option.candidate.estimate.margin >= small.sampled.margin or option.feeding.mean <= small.feeding.mean
         for option in small.front
     )
-    assert small.front[0].candidate.found.margin >= small.sampled.margin
+    assert small.front[0].candidate.estimate.margin >= small.sampled.margin
     assert small.scene.goal == ls.load(small.scene.as_dict()).goal
-    assert [option.candidate.found.margin for option in small.front] == sorted(
-        (option.candidate.found.margin for option in small.front), reverse=True
+    assert [option.candidate.estimate.margin for option in small.front] == sorted(
+        (option.candidate.estimate.margin for option in small.front), reverse=True
     )
 
 

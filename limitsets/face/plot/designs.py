@@ -191,7 +191,7 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
 
 
 def _front(axes: Axes, optimum: RobustDesign) -> list[Line2D]:
-    margins = [option.candidate.found.margin for option in optimum.front]
+    margins = [option.candidate.estimate.margin for option in optimum.front]
     means = np.array([option.feeding.mean for option in optimum.front])
     late = np.array([option.feeding.quantile_95 for option in optimum.front])
     axes.vlines(margins, means, late, color=AFTER, lw=0.8, alpha=0.6)

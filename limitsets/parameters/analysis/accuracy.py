@@ -180,12 +180,12 @@ def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
     graph = transitions(scene.map, grid(scene.domain, cells=cells))
     _ = graph.condensation().attracting
     stops.append(time.perf_counter())
-    found = attractors(graph, throws)
+    sets = attractors(graph, throws)
     stops.append(time.perf_counter())
-    limits = [limit_of(graph, each) for each in found]
+    limits = [limit_of(graph, each) for each in sets]
     stops.append(time.perf_counter())
     graph_took, orbits, ends = np.diff(stops).tolist()
-    return _Trial(graph_took, orbits, ends, found, limits)
+    return _Trial(graph_took, orbits, ends, sets, limits)
 
 
 def _seconds_of_graph(scene: Scene, cells: int) -> float:
@@ -346,7 +346,7 @@ def _proved(scene: Scene, limits: Sequence[LimitSet]) -> float:
 
 
 class _Visited:
-    """What of an interval an orbit has seen, to within a bin."""
+    """Give the parts of an interval that an orbit has visited, to within a bin."""
 
     def __init__(self, side: int, lo: float, hi: float, width: float) -> None:
         self.side, self.lo, self.hi = side, lo, hi

@@ -64,7 +64,7 @@ def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
 
     if scene.effects.landing:
         return {side: [] for side in range(len(scene.sides))}
-    found = {}
+    by_side = {}
     for side in range(len(scene.sides)):
         corner = float(scene.sides.corner[side])
         x = np.linspace(float(scene.domain.lo[side, 0]), float(scene.domain.hi[side, 0]), SAMPLES)
@@ -72,8 +72,8 @@ def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
         def beyond(at: Array, side: int = side, corner: float = corner) -> NDArray[np.bool_]:
             return impact_angles(scene.map, at, side) > corner
 
-        found[side] = where(beyond, x)
-    return found
+        by_side[side] = where(beyond, x)
+    return by_side
 
 
 def in_limit_sets(flags: Extents, sets: Iterable[Extents]) -> dict[int, list[Interval]]:
@@ -85,16 +85,16 @@ def in_limit_sets(flags: Extents, sets: Iterable[Extents]) -> dict[int, list[Int
     >>> in_limit_sets({0: [(1.0, 3.0)]}, [{0: [(2.0, 5.0)]}, {1: [(0.0, 1.0)]}])
     {0: [(2.0, 3.0)]}
     """
-    found: dict[int, list[Interval]] = {}
+    by_side: dict[int, list[Interval]] = {}
     for extents in sets:
         for side, parts in extents.items():
-            found.setdefault(side, []).extend(
+            by_side.setdefault(side, []).extend(
                 (max(a, lo), min(b, hi))
                 for a, b in flags.get(side, ())
                 for lo, hi in parts
                 if max(a, lo) <= min(b, hi)
             )
-    return {side: sorted(parts) for side, parts in sorted(found.items()) if parts}
+    return {side: sorted(parts) for side, parts in sorted(by_side.items()) if parts}
 
 
 # ----------------------------------------------------------------
@@ -149,7 +149,7 @@ def _after_any_throw(graph: TransitionGraph) -> Extents:
     if not has_slope(graph.map):
         return _seen_after_a_throw(graph)
     domain = graph.grid.domain
-    found: dict[int, list[tuple[float, float]]] = {}
+    by_side: dict[int, list[tuple[float, float]]] = {}
     for side, pieces in monotone_pieces(graph.map, domain).items():
         for piece in pieces:
             ends, sides, _ = along(graph.map, [piece.lo, piece.hi], side, [piece.branch])
@@ -157,21 +157,21 @@ def _after_any_throw(graph: TransitionGraph) -> Extents:
             lo = max(float(ends.min()), float(domain.lo[to, 0]))
             hi = min(float(ends.max()), float(domain.hi[to, 0]))
             if lo <= hi:
-                found.setdefault(to, []).append((lo, hi))
-    return found
+                by_side.setdefault(to, []).append((lo, hi))
+    return by_side
 
 
 def _seen_after_a_throw(graph: TransitionGraph) -> Extents:
     """Find the same from images of the cells' ends, where the map's branches cannot be followed one by one."""
     from limitsets.systems.maps import images
 
-    found: dict[int, list[tuple[float, float]]] = {}
+    by_side: dict[int, list[tuple[float, float]]] = {}
     for side, (edges,) in enumerate(graph.grid.edges):
         there = images(graph.map, edges, side)
         for to in np.unique(there.side[there.code >= 0]).tolist():
             x = there.x[(there.code >= 0) & (there.side == to)]
-            found.setdefault(to, []).append((float(x.min()), float(x.max())))
-    return found
+            by_side.setdefault(to, []).append((float(x.min()), float(x.max())))
+    return by_side
 
 
 def goal_outcome(
@@ -308,7 +308,7 @@ def against_starts(graph: TransitionGraph, attractors: Sequence[Attractor], basi
 
 
 def _cells(grid: Any, x: Any, side: Any) -> Any:
-    found = np.full(x.size, -1)
+    numbers = np.full(x.size, -1)
     for s in range(grid.sides):
-        found[side == s] = grid.index(x[side == s], s)
-    return found
+        numbers[side == s] = grid.index(x[side == s], s)
+    return numbers

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,6 +38,7 @@ from limitsets.parameters.analysis.checks import (
 if TYPE_CHECKING:
     import networkx as nx
 
+    from limitsets.feeder.goals import Goal
     from limitsets.feeder.scene import Scene
     from limitsets.proofs.auditing import EffectChoice
     from limitsets.systems.cells import CellSet, Grid
@@ -124,9 +125,9 @@ class Analysis(Tabled):
 
     def __repr__(self) -> str:
         """Name its scene, with what was found."""
-        found = f"{self.grid.n_cells} cells, limit sets: {len(self.attractors)}"
+        size = f"{self.grid.n_cells} cells, limit sets: {len(self.attractors)}"
         goal = "" if self.goal is None else f", {self.goal.goal.kind} holds: {self.goal.holds}"
-        return f"Analysis({self.scene.name}: {found}{goal}; sampled, not proved)"
+        return f"Analysis({self.scene.name}: {size}{goal}; sampled, not proved)"
 
     @property
     def second_pass(self) -> float:
@@ -147,8 +148,8 @@ class Analysis(Tabled):
     def advice(self) -> tuple[str, ...]:
         """What cells have not settled, and what to do."""
         said = (self.basins.advice, None if self.starts is None else self.starts.advice)
-        found = tuple(text for text in said if text is not None)
-        return (ABOVE,) if found and self.scene.surface_height > 0.0 else found
+        texts = tuple(text for text in said if text is not None)
+        return (ABOVE,) if texts and self.scene.surface_height > 0.0 else texts
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -160,8 +161,8 @@ class Analysis(Tabled):
             Column("jogs per visit", ends=True),
         )
         rows = [
-            (k, side, span, found.jogs_per_visit.get(side, (0, 0)))
-            for k, (found, extents) in enumerate(zip(self.attractors, self.extents, strict=True))
+            (k, side, span, attractor.jogs_per_visit.get(side, (0, 0)))
+            for k, (attractor, extents) in enumerate(zip(self.attractors, self.extents, strict=True))
             for side, span in bands_of(extents)
         ]
         shares = [
@@ -171,8 +172,8 @@ class Analysis(Tabled):
         ]
         points = [
             (side, point.x, point.kind)
-            for side, found in sorted(self.critical_points.items())
-            for point in found
+            for side, on_side in sorted(self.critical_points.items())
+            for point in on_side
         ]
         shown = [
             Table(columns, rows, f"{self.scene.name}: limit sets", how),
@@ -244,13 +245,13 @@ class Analysis(Tabled):
         return sorted(self.spurious, key=len, reverse=True)
 
     def _attractor(self, k: int) -> dict[str, Any]:
-        found = self.attractors[k]
+        attractor = self.attractors[k]
         return {
             "extents": _ordered(self.extents[k]),
             "extents_from": self.extents_from[k],
-            "flip_order": found.flip_order,
-            "jogs_per_visit": _ordered(found.jogs_per_visit),
-            **picked(found, "flips_per_throw", "lyapunov", "throws", "in_cells", "stopped"),
+            "flip_order": attractor.flip_order,
+            "jogs_per_visit": _ordered(attractor.jogs_per_visit),
+            **picked(attractor, "flips_per_throw", "lyapunov", "throws", "in_cells", "stopped"),
             "advice": self.limit_sets[k].advice,
         }
 
@@ -259,7 +260,7 @@ def _ordered(by_side: Mapping[int, Any]) -> dict[int, Any]:
     return dict(sorted(by_side.items()))
 
 
-class _Found(NamedTuple):
+class _GridAnswer(NamedTuple):
     """What one grid gives."""
 
     graph: TransitionGraph
@@ -268,7 +269,7 @@ class _Found(NamedTuple):
     starts: Starts | None
 
 
-def _found(scene: Scene, cells: int, throws: int, steps: _Steps) -> _Found:
+def _on_grid(scene: Scene, cells: int, throws: int, steps: _Steps) -> _GridAnswer:
     """Look at one grid."""
     from limitsets.systems.cells import grid
     from limitsets.systems.graph import transitions
@@ -277,16 +278,40 @@ def _found(scene: Scene, cells: int, throws: int, steps: _Steps) -> _Found:
     with steps.step("transitions"):
         graph = transitions(scene.map, grid(scene.domain, cells=cells))
     with steps.step("attractors"):
-        found = attractors(graph, throws=throws)
+        sets = attractors(graph, throws=throws)
     with steps.step("basins"):
-        shares = basins(graph, found)
+        shares = basins(graph, sets)
     with steps.step("random starts"):
-        starts = None if scene.effects.spread else against_starts(graph, found, shares)
-    return _Found(graph, found, shares, starts)
+        starts = None if scene.effects.spread else against_starts(graph, sets, shares)
+    return _GridAnswer(graph, sets, shares, starts)
 
 
-def _missed(found: _Found) -> float:
-    return 0.0 if found.starts is None else found.starts.missed
+def _on_grids(scene: Scene, cells: int, most_cells: int, throws: int, steps: _Steps) -> _GridAnswer:
+    """Look at one grid, and at finer ones as long as random starts show that these miss less."""
+    grid_answer = _on_grid(scene, cells, throws, steps)
+    while _missed(grid_answer) > 0.0 and (cells := FINER * cells) <= most_cells:
+        finer = _on_grid(scene, cells, throws, steps)
+        if _missed(finer) >= _missed(grid_answer):
+            break
+        grid_answer = finer
+    return grid_answer
+
+
+def _missed(grid_answer: _GridAnswer) -> float:
+    return 0.0 if grid_answer.starts is None else grid_answer.starts.missed
+
+
+def _goal_outcome(goal: Goal, grid_answer: _GridAnswer, limits: Sequence[LimitSet]) -> GoalOutcome:
+    """Say whether a goal holds; open where some random starts stay where no attractor is known."""
+    outcome = goal_outcome(
+        goal,
+        grid_answer.graph,
+        grid_answer.attractors,
+        basins=grid_answer.basins,
+        extents=best_extents(grid_answer.attractors, limits),
+    )
+    astray = grid_answer.starts is not None and grid_answer.starts.elsewhere
+    return replace(outcome, holds=None) if outcome.holds and astray else outcome
 
 
 class _Steps:
@@ -384,52 +409,44 @@ def analyse(
         if announce is not None:
             announce(plan)
     count = plan.chosen.cells if plan is not None else CELLS if cells is None else cells
-    seen = _found(chosen, count, throws, steps)
-    while cells is None and _missed(seen) > 0.0 and (count := FINER * count) <= MOST_CELLS:
-        finer = _found(chosen, count, throws, steps)
-        if _missed(finer) >= _missed(seen):
-            break
-        seen = finer
-    graph, found, shares, starts = seen
+    seen = _on_grids(chosen, count, MOST_CELLS if cells is None else count, throws, steps)
+    graph, sets = seen.graph, seen.attractors
     with steps.step("limit sets"):
         skip = plan is not None and plan.chosen.method == BY_CELLS
-        limits = tuple(left_to_cells() if skip else limit_of(graph, each) for each in found)
+        limits = tuple(left_to_cells() if skip else limit_of(graph, each) for each in sets)
     with steps.step("critical points"):
         critical = critical_points(chosen.map, chosen.domain)
     orbits: tuple[Cycle, ...] = ()
     if cycles:
         with steps.step("cycles"):
-            orbits = tuple(cycle for attractor in found for cycle in cycles_of(graph, cycles, attractor))
+            orbits = tuple(cycle for attractor in sets for cycle in cycles_of(graph, cycles, attractor))
     with steps.step("Morse graph"):
         morse = morse_graph(graph)
         false_sets = spurious(graph)
     with steps.step("goal"):
-        extents = best_extents(found, limits)
-        outcome = None if chosen.goal is None else goal_outcome(chosen.goal, graph, found, shares, extents)
-        if outcome is not None and outcome.holds and starts is not None and starts.elsewhere:
-            outcome = replace(outcome, holds=None)  # some starts stay where nothing is known
+        outcome = None if chosen.goal is None else _goal_outcome(chosen.goal, seen, limits)
     with steps.step("assumptions"):
         flags = other_vertex_first(chosen)
     accuracy = None
     if plan is not None:
         with steps.step("accuracy"):
             took = sum(steps.timings[step] for step in ("transitions", "attractors", "limit sets"))
-            accuracy = verified(chosen, plan, found, limits, took)
+            accuracy = verified(chosen, plan, sets, limits, took)
     return Analysis(
-        chosen,
-        choice,
-        graph.grid,
-        graph,
-        found,
-        shares,
-        starts,
-        limits,
-        critical,
-        orbits,
-        morse,
-        outcome,
-        flags,
-        false_sets,
-        steps.timings,
-        accuracy,
+        scene=chosen,
+        choice=choice,
+        grid=graph.grid,
+        graph=graph,
+        attractors=sets,
+        basins=seen.basins,
+        starts=seen.starts,
+        limit_sets=limits,
+        critical_points=critical,
+        cycles=orbits,
+        morse=morse,
+        goal=outcome,
+        other_vertex_first=flags,
+        spurious=false_sets,
+        timings=steps.timings,
+        accuracy=accuracy,
     )

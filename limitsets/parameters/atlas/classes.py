@@ -79,16 +79,16 @@ class AttractorKind(NamedTuple):
         met = [each for each in self.bands if each]
         parts = f" ({' + '.join(map(str, self.bands))})" if len(met) > 1 and max(met) > 1 else ""
         cycle = "a fixed point" if self.period == 1 else f"a cycle of {self.period}"
-        found = f"{cycle}{parts}" if self.period else f"{count} band{'s' * (count > 1)}{parts}"
+        phrase = f"{cycle}{parts}" if self.period else f"{count} band{'s' * (count > 1)}{parts}"
         if len(self.bands) == 1:
-            return found
+            return phrase
         if self.flip_order is None:
-            return f"{found}, the order changes"
+            return f"{phrase}, the order changes"
         one = len(self.flip_order) == 1
         return (
-            f"{found}, side {self.flip_order[0]} alone"
+            f"{phrase}, side {self.flip_order[0]} alone"
             if one
-            else f"{found}, {'-'.join(map(str, self.flip_order))}"
+            else f"{phrase}, {'-'.join(map(str, self.flip_order))}"
         )
 
 
@@ -139,18 +139,18 @@ class TopologyClass(NamedTuple):
         `both`: instead of these where no start stays and some go either way.
         """
         count = len(self.attractors)
-        found = f"{_COUNTS[count] if count < len(_COUNTS) else count} attractor{'s' * (count != 1)}"
+        sentence = f"{_COUNTS[count] if count < len(_COUNTS) else count} attractor{'s' * (count != 1)}"
         kinds = [each.words for each in self.attractors]
         if count == 1:
-            found += f", {kinds[0]}"
+            sentence += f", {kinds[0]}"
         elif count > 1:
-            found += f", each {kinds[0]}" if len(set(kinds)) == 1 else f": {'; '.join(kinds)}"
+            sentence += f", each {kinds[0]}" if len(set(kinds)) == 1 else f": {'; '.join(kinds)}"
         if both and not count and self.leaves == self.collapses == "some":
-            return f"{found}; {both}"
+            return f"{sentence}; {both}"
         ways = [(self.leaves, leave), (self.collapses, collapse)]
         said = [f"{share} starts {several}" for share, (several, _) in ways if share == "some"]
         said += [f"every start {one}" for share, (_, one) in ways if share == "all"]
-        return "; ".join((found, " and ".join(said))) if said else found
+        return "; ".join((sentence, " and ".join(said))) if said else sentence
 
 
 def named_class(name: str) -> TopologyClass:
@@ -163,13 +163,13 @@ def named_class(name: str) -> TopologyClass:
     """
     try:
         *kinds, leaves, collapses = name.split(";")
-        found = TopologyClass(
+        topology_class = TopologyClass(
             tuple(_kind(kind) for kind in kinds if kind != "no-attractor"),
             leaves.removeprefix("leaves:"),
             collapses.removeprefix("collapses:"),
         )
-        if found.name == name:
-            return found
+        if topology_class.name == name:
+            return topology_class
     except ValueError:
         pass
     raise AnswerError("the name of a class", name, "one of the attribute flag_meanings", "correct it")
@@ -232,8 +232,8 @@ def classes(found: Any) -> tuple[npt.NDArray[np.int64], dict[int, str]]:
     return numbers.reshape(shape), dict(sorted(names.items()))
 
 
-def _values(found: Any, name: str) -> npt.NDArray[Any]:
-    given = found.get(name) if hasattr(found, "data_vars") else getattr(found, name, None)
+def _values(points: Any, name: str) -> npt.NDArray[Any]:
+    given = points.get(name) if hasattr(points, "data_vars") else getattr(points, name, None)
     if given is None:
         raise AnswerError(f"the variable {name}", "missing", ", ".join(FIELDS), "compute these too")
     return np.asarray(given)
@@ -249,8 +249,8 @@ def _numbered(row: list[int], slots: int, sides: int) -> tuple[int, str]:
         return UNDECIDED, UNDECIDED_NAME
     if row[0] < 0:
         return NOWHERE, ""
-    found = _class_of(row, slots, sides)
-    return found.number, found.name
+    topology_class = _class_of(row, slots, sides)
+    return topology_class.number, topology_class.name
 
 
 def _class_of(row: list[int], slots: int, sides: int) -> TopologyClass:

@@ -18,5 +18,5 @@ def critical_points(scene: Scene) -> dict[str, Any]:
     >>> critical_points(load("paper-designed"))["critical_point"]
     [10.0000..., 9.9999..., 20.0000...]
     """
-    found = maps.critical_points(scene.map, scene.domain).values()
-    return {"critical_point": [points[0].x if points else math.nan for points in found]}
+    sides = maps.critical_points(scene.map, scene.domain).values()
+    return {"critical_point": [points[0].x if points else math.nan for points in sides]}

@@ -39,10 +39,10 @@ SMALL = 0.05
 
 
 def threshold_of(goal: OrientedBeyond | Reaches, reach: Floats) -> Floats:
-    """Return what of `reach`, shape (n, S), the goal bounds: the largest on other sides, or that on its own side."""
+    """Return the reach that the goal bounds, from `reach` of shape (n, S): the largest on other sides, or its own."""
     if isinstance(goal, OrientedBeyond):
-        found: Floats = np.fmax.reduce(np.delete(reach, goal.side, axis=1), axis=1)
-        return found
+        threshold: Floats = np.fmax.reduce(np.delete(reach, goal.side, axis=1), axis=1)
+        return threshold
     return reach[:, goal.side]
 
 
@@ -86,13 +86,13 @@ def float_margins(
             "the goal of a margin by floats", word, "oriented_beyond or reaches, of the limit set", remedy
         )
     there = np.flatnonzero((known.undecided == DECIDED) & (known.attractors > 0))
-    found = np.full(known.undecided.size, np.nan)
+    margins = np.full(known.undecided.size, np.nan)
     if there.size:
         search = _Search(scene, values, there, known, goal)
         search = _Search(scene, values, search.holding(), known, goal)
-        found[there] = 0.0
-        found[search.points] = search.joint() if quantity == "joint" else search.single(quantity, reading)
-    return found
+        margins[there] = 0.0
+        margins[search.points] = search.joint() if quantity == "joint" else search.single(quantity, reading)
+    return margins
 
 
 class _Search:
@@ -206,7 +206,7 @@ class _Search:
         else:
             most = MOST * np.maximum(np.abs(self._at(quantity)), float(self.scene.sides.length.min()))
         if reading == "per-throw":
-            found = self._least(
+            sizes = self._least(
                 lambda size, rows: self._holds(
                     rows, self._moved(quantity, whole, -size, rows), self._moved(quantity, whole, size, rows)
                 ),
@@ -214,13 +214,13 @@ class _Search:
                 growing=True,
             )
         else:
-            found = most
+            sizes = most
             for sign in (-1.0, 1.0):
                 one = self._least(
-                    partial(self._holds_at, quantity, whole, sign), np.minimum(found, most), growing=False
+                    partial(self._holds_at, quantity, whole, sign), np.minimum(sizes, most), growing=False
                 )
-                found = np.minimum(one, found if sign > 0 else np.inf)
-        return found / unit.value
+                sizes = np.minimum(one, sizes if sign > 0 else np.inf)
+        return sizes / unit.value
 
     def joint(self) -> Floats:
         """Factors on the scene's tolerance, along the corner that differences of the threshold point at."""

@@ -64,19 +64,19 @@ SCATTERED = np.uint64(2654435761)
 
 def checks(block: Block, told: Topologies) -> npt.NDArray[np.int8]:
     """Check a sample of the points that are decided."""
-    found = np.full(told.attractors.size, NOT_CHECKED, np.int8)
+    verdicts = np.full(told.attractors.size, NOT_CHECKED, np.int8)
     mixed = (block.numbers.astype(np.uint64) * SCATTERED) % np.uint64(2**32)
     at = np.flatnonzero((mixed % np.uint64(SAMPLED) == 0) & (told.undecided == DECIDED))
     if not at.size:
-        return found
+        return verdicts
     points = chosen(block.points, at)
     fine = topologies(points.params, points.lo, points.hi, points.anchor, levels=FINE)
     scale = (points.hi - points.lo).max(axis=1)
-    found[at] = np.where(_same(chosen(told, at), fine, scale), AGREES, DIFFERS)
+    verdicts[at] = np.where(_same(chosen(told, at), fine, scale), AGREES, DIFFERS)
     for k in at[(mixed[at] // np.uint64(SAMPLED)) % np.uint64(PROVED_OF) == 0]:
-        if found[k] == AGREES:
-            found[k] = _against_proof(block, told, int(k))
-    return found
+        if verdicts[k] == AGREES:
+            verdicts[k] = _against_proof(block, told, int(k))
+    return verdicts
 
 
 def _same(one: Topologies, other: Topologies, scale: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
@@ -137,7 +137,7 @@ def _variables(
     sides = (*each, ("side", subject.sides))
     doubts = "; ".join(f"{word}: {DOUBTS[number]}" for word, number in _CODES.items())
     back = "come back to the joint" if isinstance(subject, SceneSubject) else "leave over the lower end"
-    found = {
+    variables = {
         "attractors": Variable("int8", about="how many attractors"),
         "undecided": Variable("int8", codes=_CODES, about=doubts),
         "checked": Variable("int8", codes=CODES, about=ABOUT, fill=NOT_CHECKED, copied=False),
@@ -161,13 +161,13 @@ def _variables(
         ),
     }
     if _goal_of(subject) is not None:
-        found["threshold"] = Variable(unit="length", about="where the goal begins or ceases to hold")
+        variables["threshold"] = Variable(unit="length", about="where the goal begins or ceases to hold")
     if margin is not None:
         if not isinstance(subject, SceneSubject):
             raise AnswerError("the subject of a margin", subject.title, "a scene with a goal", "leave it out")
         about = f"of the goal, for {margin}, {reading}, by floats"
-        found["margin"] = Variable(unit=unit_of_margin(subject.scene, margin, reading), about=about)
-    return found
+        variables["margin"] = Variable(unit=unit_of_margin(subject.scene, margin, reading), about=about)
+    return variables
 
 
 @block_task(_variables)
@@ -183,22 +183,22 @@ def topology(
     points = block.points
     asked = throws if block.wanted & _AVERAGES else 0
     told = topologies(points.params, points.lo, points.hi, points.anchor, throws=asked)
-    found = told._asdict()
+    fields = told._asdict()
     goal = _goal_of(block.subject)
     if goal is not None:
-        found["threshold"] = _threshold(goal, told.reach)
+        fields["threshold"] = _threshold(goal, told.reach)
     if "margin" in block.wanted and margin is not None:
-        found["margin"] = float_margins(block.subject.scene, block.values, told, margin, reading)
+        fields["margin"] = float_margins(block.subject.scene, block.values, told, margin, reading)
     if "entropy" in block.wanted:
-        found["entropy"] = _entropies(block, told)
+        fields["entropy"] = _entropies(block, told)
     if "checked" in block.wanted:
-        found["checked"] = checks(block, told)
+        fields["checked"] = checks(block, told)
     decided = told.undecided == DECIDED
     variables = _variables(block.subject, throws, margin, reading)
     answers: dict[str, npt.NDArray[Any] | Coded] = {
-        name: found[name]
+        name: fields[name]
         if name in ("undecided", "checked")
-        else _kept(found[name], decided, variables[name].empty)
+        else _kept(fields[name], decided, variables[name].empty)
         for name in block.wanted - {"class"}
     }
     if "class" in block.wanted:
@@ -213,8 +213,8 @@ def _kept(values: npt.NDArray[Any], decided: npt.NDArray[np.bool_], empty: float
 
 def _entropies(block: Block, told: Topologies) -> npt.NDArray[np.float64]:
     """Topological entropy of every attractor; nan where its bands are not found again."""
-    found = np.full(told.period.shape, np.nan)
-    found[(told.period > 0) & (told.undecided == DECIDED)[:, None]] = 0.0
+    entropies = np.full(told.period.shape, np.nan)
+    entropies[(told.period > 0) & (told.undecided == DECIDED)[:, None]] = 0.0
     for k, a in zip(*np.nonzero((told.period == 0) & (told.undecided == DECIDED)[:, None]), strict=True):
         points = block.points
         anchor = None if points.anchor is None else points.anchor[k]
@@ -222,8 +222,8 @@ def _entropies(block: Block, told: Topologies) -> npt.NDArray[np.float64]:
         params = point_of(points.params, k)
         bands = _bands(params, domain, told.start[k, a], told.start_side[k, a])
         if [len(bands.get(side, ())) for side in range(domain.lo.size)] == told.bands[k, a].tolist():
-            found[k, a] = topological_entropy(params, bands, domain)
-    return found
+            entropies[k, a] = topological_entropy(params, bands, domain)
+    return entropies
 
 
 def _bands(params: Any, domain: Domain, x: float, side: int) -> dict[int, list[tuple[float, float]]]:

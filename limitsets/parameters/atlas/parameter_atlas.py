@@ -135,15 +135,15 @@ class Atlas(Tabled):
         ]
         variables = {str(name): _table(variable) for name, variable in data.data_vars.items()}
         subject = {key: plan[key] for key in ("scene", "map", "parameters", "domain") if key in plan}
-        found = {
+        document = {
             **subject,
             "unit": data.attrs.get("unit_of_length", ""),
             "axes": axes,
             "variables": variables,
         }
         if self.model is not None:
-            found["model"] = self.model.to_json()
-        return found | {
+            document["model"] = self.model.to_json()
+        return document | {
             "task": plan["task"],
             "plan_hash": data.attrs["plan_hash"],
             "versions": plan["versions"],
@@ -223,12 +223,12 @@ def _table(variable: xr.DataArray) -> dict[str, Any]:
             strict=True,
         )
     )
-    found = {
+    table = {
         "dims": list(variable.dims),
         "unit": attributes.get("units", ""),
         "values": as_plain(variable.values),
     }
-    return found | ({"codes": codes} if codes else {})
+    return table | ({"codes": codes} if codes else {})
 
 
 @shown_in_notebooks
@@ -333,10 +333,10 @@ def atlas(
 
 def opened(store: Any) -> xr.Dataset:
     """Open what a store holds, without the marks of its chunks."""
-    found = imported("xarray").open_zarr(store, chunks=None, consolidated=False, decode_timedelta=False)
-    for variable in found.variables.values():
+    dataset = imported("xarray").open_zarr(store, chunks=None, consolidated=False, decode_timedelta=False)
+    for variable in dataset.variables.values():
         variable.attrs.pop(SEAL, None)
-    return found.drop_vars(CHECKSUM)  # type: ignore[no-any-return]  # a Dataset
+    return dataset.drop_vars(CHECKSUM)  # type: ignore[no-any-return]  # a Dataset
 
 
 def plan_of(
@@ -367,7 +367,17 @@ def plan_of(
         raise LimitsetsError("the step of the coarse grid", coarse, "2 or more", "correct it")
     by = None if refine is False else ("class" if refine is True else refine, int(coarse))
     wanted = None if variables is None else tuple(dict.fromkeys((*variables, *(by or ())[:1])))
-    plan = Plan(chosen, axes, name, dict(options or {}), wanted, parts, code_of(chosen, name), seed, by)
+    plan = Plan(
+        subject=chosen,
+        axes=axes,
+        task=name,
+        options=dict(options or {}),
+        variables=wanted,
+        chunk=parts,
+        code=code_of(chosen, name),
+        seed=seed,
+        refine=by,
+    )
     plan.require()
     return plan
 
@@ -398,7 +408,16 @@ def _work(plan: Plan) -> Work:
         return plan.words(plan.region(number))
 
     chunks = math.prod(plan.chunks)
-    return Work(chunks, answer, (plan,), size, place, f"the task {plan.task}", "atlas", "points")
+    return Work(
+        chunks=chunks,
+        function=answer,
+        given=(plan,),
+        size=size,
+        place=place,
+        task=f"the task {plan.task}",
+        name="atlas",
+        points="points",
+    )
 
 
 def _require_importable(plan: Plan) -> None:

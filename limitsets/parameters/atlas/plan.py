@@ -64,7 +64,7 @@ class Variable:
 
     @property
     def empty(self) -> float | int:
-        """What stands where there is nothing."""
+        """The value that marks a point without an answer."""
         return np.nan if np.dtype(self.dtype).kind == "f" else self.fill
 
     def is_empty(self, values: npt.NDArray[Any]) -> bool:
@@ -101,7 +101,7 @@ class Block(NamedTuple):
 
 
 class Coded(NamedTuple):
-    """Codes at n points whose names are known only when they are met, and these names."""
+    """Codes at n points, and the names of those that occur.  The task learns these names only while it runs."""
 
     values: npt.NDArray[Any]
     codes: Mapping[str, int]
@@ -187,14 +187,14 @@ def resolved(name: str) -> Callable[..., Any]:
     """
     module, _, function = name.partition(":")
     try:
-        found: Any = importlib.import_module(module)
+        target: Any = importlib.import_module(module)
         for word in function.split("."):
-            found = getattr(found, word)
+            target = getattr(target, word)
     except (ImportError, AttributeError) as error:
         raise LimitsetsError("the task", name, "module:function that can be imported", f"{error}") from None
-    if not callable(found):
+    if not callable(target):
         raise LimitsetsError("the task", name, "a function", "it is none")
-    return found  # type: ignore[no-any-return]  # of a task that is known by name
+    return target  # type: ignore[no-any-return]  # of a task that is known by name
 
 
 # ----------------------------------------------------------------
@@ -291,10 +291,10 @@ class Plan:
         """Return the numbers of the points of a region."""
         index = np.indices(tuple(part.stop - part.start for part in region))
         shifted = [index[k] + part.start for k, part in enumerate(region)]
-        found: npt.NDArray[np.int64] = (
+        flat: npt.NDArray[np.int64] = (
             np.ravel_multi_index(tuple(shifted), self.shape).ravel().astype(np.int64)
         )
-        return found
+        return flat
 
     @cached_property
     def base(self) -> dict[str, npt.NDArray[np.float64]]:

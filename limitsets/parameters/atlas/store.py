@@ -83,12 +83,26 @@ class Store:
         for axis in plan.axes:
             values = axis.values
             array = self._made(
-                axis.name, values.shape, values.shape, values.dtype, 0.0, (axis.name,), _unit(axis.unit)
+                axis.name,
+                values.shape,
+                values.shape,
+                dtype=values.dtype,
+                fill=0.0,
+                dims=(axis.name,),
+                attributes=_unit(axis.unit),
             )
             array[...] = values
         dims = tuple(f"chunk of {axis.name}" for axis in plan.axes)
         about = {"long_name": "CRC-32 of the chunk's data; 0 where the chunk is not done"}
-        self._made(CHECKSUM, plan.chunks, (1,) * len(dims), np.dtype("uint32"), 0, dims, about)
+        self._made(
+            CHECKSUM,
+            plan.chunks,
+            (1,) * len(dims),
+            dtype=np.dtype("uint32"),
+            fill=0,
+            dims=dims,
+            attributes=about,
+        )
 
     def _made(
         self,
@@ -101,7 +115,9 @@ class Store:
         attributes: dict[str, Any],
     ) -> Any:
         """Make an array, sealed."""
-        sealed = attributes | {SEAL: _seal(name, shape, chunks, dtype, fill, dims, attributes)}
+        sealed = attributes | {
+            SEAL: _seal(name, shape, chunks, dtype=dtype, fill=fill, dims=dims, attributes=attributes)
+        }
         return self.group.create_array(
             name, shape=shape, chunks=chunks, dtype=dtype, fill_value=fill, dimension_names=dims,
             attributes=sealed,
@@ -156,7 +172,7 @@ class Store:
 
     def _is_done(self, number: int) -> bool:
         """Whether the data of a chunk are those that were written."""
-        region, found = self.plan.region(number), {}
+        region, arrays = self.plan.region(number), {}
         try:
             mark = int(self.marks[self.plan.place(number)])
             if mark == 0:
@@ -164,20 +180,20 @@ class Store:
             for name, array in self.arrays.items():
                 values = np.asarray(array[region])
                 if not _is(values, array.fill_value):
-                    found[name] = values
+                    arrays[name] = values
         except (OSError, ValueError, RuntimeError):  # what codecs make of bytes that were cut off
             return False
-        return checksum(found) == mark
+        return checksum(arrays) == mark
 
     def write(self, answer: Answer) -> None:
         """Write the answers of a chunk, and then that it is done."""
-        region, found = self.plan.region(answer.number), {}
+        region, arrays = self.plan.region(answer.number), {}
         with self._written():
-            for name, (variable, values) in answer.found.items():
+            for name, (variable, values) in answer.arrays.items():
                 self._array(name, variable)[region] = values
                 if not variable.is_empty(values):
-                    found[name] = values
-            self.marks[self.plan.place(answer.number)] = checksum(found)
+                    arrays[name] = values
+            self.marks[self.plan.place(answer.number)] = checksum(arrays)
         self.done.add(answer.number)
 
     def _array(self, name: str, variable: Variable) -> Any:
@@ -188,7 +204,9 @@ class Store:
             dims = (*(axis.name for axis in self.plan.axes), *(dim for dim, _ in variable.dims))
             about = _described(variable, self.plan.subject.unit)
             dtype = np.dtype(variable.dtype)
-            self.arrays[name] = self._made(name, shape, chunks, dtype, variable.empty, dims, about)
+            self.arrays[name] = self._made(
+                name, shape, chunks, dtype=dtype, fill=variable.empty, dims=dims, attributes=about
+            )
         if self.arrays[name].shape != shape:
             raise LimitsetsError(
                 f"the variable {name}", shape, f"{self.arrays[name].shape}, as at other points",
@@ -215,7 +233,7 @@ class Store:
 
     @contextmanager
     def _written(self) -> Iterator[None]:
-        """Say of a failed write what it means."""
+        """Explain a failed write."""
         try:
             yield
         except OSError as error:
@@ -226,17 +244,17 @@ class Store:
 
 
 def _damaged(path: Path | None, what: str) -> LimitsetsError:
-    """Say what of a store is not as it was written."""
+    """Name the part of a store that has changed since it was written."""
     return LimitsetsError(
         f"the store {path}", "damaged", "a store as it was written", f"{what} changed since; {_REMEDY}"
     )
 
 
-def checksum(found: Mapping[str, npt.NDArray[Any]]) -> int:
+def checksum(arrays: Mapping[str, npt.NDArray[Any]]) -> int:
     """Return a checksum of arrays by name, never 0."""
     total = 0
-    for name in sorted(found):
-        values = found[name]
+    for name in sorted(arrays):
+        values = arrays[name]
         total = zlib.crc32(name.encode(), total)
         total = zlib.crc32(
             np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes(), total
@@ -262,7 +280,15 @@ def _seal_of(array: Any, attributes: Mapping[str, Any]) -> int:
     """Return the checksum of what an array in a store says of itself, with these attributes."""
     dims = tuple(array.metadata.dimension_names or ())
     name = array.path.rpartition("/")[2]
-    return _seal(name, array.shape, array.chunks, array.dtype, array.fill_value, dims, attributes)
+    return _seal(
+        name,
+        array.shape,
+        array.chunks,
+        dtype=array.dtype,
+        fill=array.fill_value,
+        dims=dims,
+        attributes=attributes,
+    )
 
 
 def _is_sealed(array: Any) -> bool:
@@ -277,11 +303,11 @@ def _is_sealed(array: Any) -> bool:
 def _holds(array: Any, values: npt.NDArray[Any], attributes: dict[str, Any]) -> bool:
     """Whether an array holds these coordinates, with these attributes."""
     try:
-        found = np.asarray(array[...])
+        coordinates = np.asarray(array[...])
     except (OSError, ValueError, RuntimeError):  # what codecs make of bytes that were damaged
         return False
     said = {key: value for key, value in dict(array.attrs).items() if key != SEAL}
-    return _is_sealed(array) and said == attributes and found.tobytes() == values.tobytes()
+    return _is_sealed(array) and said == attributes and coordinates.tobytes() == values.tobytes()
 
 
 def _unit(unit: str) -> dict[str, Any]:
@@ -306,11 +332,11 @@ def _short(value: Any) -> str:
 
 def _described(variable: Variable, length: str) -> dict[str, Any]:
     """Return the attributes of a variable; codes as the CF conventions have them."""
-    found: dict[str, Any] = {"long_name": variable.about} if variable.about else {}
+    attributes: dict[str, Any] = {"long_name": variable.about} if variable.about else {}
     unit = length if variable.unit == "length" else variable.unit
     if unit:
-        found["units"] = unit
-    return found | (_flags(variable.codes) if variable.codes else {})
+        attributes["units"] = unit
+    return attributes | (_flags(variable.codes) if variable.codes else {})
 
 
 def _flags(codes: Mapping[str, int]) -> dict[str, Any]:
@@ -323,7 +349,7 @@ def _flags(codes: Mapping[str, int]) -> dict[str, Any]:
 
 def _attributes(plan: Plan) -> dict[str, Any]:
     """Return the attributes of a store."""
-    found: dict[str, Any] = {
+    attributes: dict[str, Any] = {
         "title": f"atlas of {plan.subject.title}",
         "plan_hash": plan.digest,
         "plan": plan.record,
@@ -331,5 +357,5 @@ def _attributes(plan: Plan) -> dict[str, Any]:
     if isinstance(plan.subject, SceneSubject):
         from limitsets.feeder.scene import dump
 
-        found |= {"scene": dump(plan.subject.scene), "unit_of_length": plan.subject.unit}
-    return found | {"versions": dict(plan.code["versions"])}
+        attributes |= {"scene": dump(plan.subject.scene), "unit_of_length": plan.subject.unit}
+    return attributes | {"versions": dict(plan.code["versions"])}

@@ -228,13 +228,13 @@ class MapSubject:
     def record(self) -> dict[str, Any]:
         """What a store keeps of it."""
         cls, domain = type(self.params), self.domain
-        found: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "map": f"{cls.__module__}:{cls.__qualname__}",
             "parameters": _plain(self.params),
         }
         if domain is not None:
-            found["domain"] = {"lo": domain.lo.tolist(), "hi": domain.hi.tolist()}
-        return found
+            fields["domain"] = {"lo": domain.lo.tolist(), "hi": domain.hi.tolist()}
+        return fields
 
     @property
     def title(self) -> str:
@@ -294,10 +294,10 @@ class MapSubject:
 
     def at(self, values: Mapping[str, float]) -> Any:
         """Return the map at one point."""
-        found = self.params
+        params = self.params
         for name, value in values.items():
-            found = _with(found, _path(name), float(value), name)
-        return found
+            params = _with(params, _path(name), float(value), name)
+        return params
 
     def require(self, axes: Mapping[str, Array], *, block: bool) -> None:
         """Refuse what a block task cannot do without."""
@@ -326,9 +326,9 @@ def _with(params: Any, path: list[str | int], value: Any, name: str) -> Any:
     if head in getattr(params, "_fields", ()):
         return params._replace(**{str(head): _with(getattr(params, str(head)), rest, value, name)})
     if isinstance(params, np.ndarray) and isinstance(head, int) and not rest and head < params.shape[-1]:
-        found = params.copy()
-        found[..., head] = value
-        return found
+        changed = params.copy()
+        changed[..., head] = value
+        return changed
     if not path and isinstance(params, float | int | np.ndarray) and np.ndim(params) == np.ndim(value):
         return value
     allowed = "a number of the map's parameters: field, field[i] or field.field"

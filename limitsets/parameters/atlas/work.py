@@ -174,14 +174,14 @@ LEVEL = Variable(
 )
 
 Values = Mapping[str, npt.NDArray[np.float64]]
-Found = dict[str, tuple[Variable, npt.NDArray[Any]]]
+VariableArrays = dict[str, tuple[Variable, npt.NDArray[Any]]]
 
 
 class Answer(NamedTuple):
     """The answers of one chunk: its number, and a variable and an array of the chunk's shape for each name."""
 
     number: int
-    found: Found
+    arrays: VariableArrays
 
 
 def answer(plan: Plan, number: int) -> Answer:
@@ -191,51 +191,53 @@ def answer(plan: Plan, number: int) -> Answer:
     shape = tuple(part.stop - part.start for part in region)
     values, numbers = plan.values(region), plan.numbers(region)
     if plan.refine is None:
-        found = _asked(plan, values, numbers)
+        arrays = _asked(plan, values, numbers)
     else:
-        found = _refined(plan, shape, values, numbers)
+        arrays = _refined(plan, shape, values, numbers)
     return Answer(
-        number, {name: (v, each.reshape(*shape, *each.shape[1:])) for name, (v, each) in found.items()}
+        number, {name: (v, each.reshape(*shape, *each.shape[1:])) for name, (v, each) in arrays.items()}
     )
 
 
-def _asked(plan: Plan, values: Values, numbers: npt.NDArray[np.int64]) -> Found:
+def _asked(plan: Plan, values: Values, numbers: npt.NDArray[np.int64]) -> VariableArrays:
     """Ask the task."""
     function = resolved(plan.task)
     task = registered(function)
     if task is None:
-        status, found = _single(plan, function, values, numbers)
+        status, arrays = _single(plan, function, values, numbers)
     else:
-        status, found = _block(plan, task, values, numbers)
-    return {"status": (STATUS, status), **found}
+        status, arrays = _block(plan, task, values, numbers)
+    return {"status": (STATUS, status), **arrays}
 
 
-def _refined(plan: Plan, shape: tuple[int, ...], values: Values, numbers: npt.NDArray[np.int64]) -> Found:
+def _refined(
+    plan: Plan, shape: tuple[int, ...], values: Values, numbers: npt.NDArray[np.int64]
+) -> VariableArrays:
     """Ask the task where its answer changes, and fill the rest."""
     name, step = plan.refine or ("", 1)
-    batches: list[Found] = []
+    batches: list[VariableArrays] = []
     seen: dict[bytes, int] = {}
 
     def ask(points: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-        found = _asked(plan, {axis: each[points] for axis, each in values.items()}, numbers[points])
-        batches.append(found)
-        rows = [found[each][1].reshape(points.size, -1) for each in ("status", name) if each in found]
+        arrays = _asked(plan, {axis: each[points] for axis, each in values.items()}, numbers[points])
+        batches.append(arrays)
+        rows = [arrays[each][1].reshape(points.size, -1) for each in ("status", name) if each in arrays]
         keys = zip(*([row.tobytes() for row in np.ascontiguousarray(part)] for part in rows), strict=True)
         return np.array([seen.setdefault(b"".join(key), len(seen)) for key in keys], np.int64)
 
     layout = refined(shape, step, ask)
-    found: Found = {"level": (LEVEL, layout.level)}
+    arrays: VariableArrays = {"level": (LEVEL, layout.level)}
     for each in dict.fromkeys(key for batch in batches for key in batch):
         variable, answers = _joined(plan, each, batches)
-        found[each] = (variable, answers[layout.source])
+        arrays[each] = (variable, answers[layout.source])
         if not variable.copied:
-            found[each][1][layout.level == FILLED] = variable.empty
-    if name not in found and (found["status"][1] == COMPUTED).any():
+            arrays[each][1][layout.level == FILLED] = variable.empty
+    if name not in arrays and (arrays["status"][1] == COMPUTED).any():
         raise _wrong(plan, name, "missing", "the variable by which the atlas is refined")
-    return found
+    return arrays
 
 
-def _joined(plan: Plan, name: str, batches: list[Found]) -> tuple[Variable, npt.NDArray[Any]]:
+def _joined(plan: Plan, name: str, batches: list[VariableArrays]) -> tuple[Variable, npt.NDArray[Any]]:
     """Put the answers of batches of points one behind the other."""
     variables = [batch[name][0] for batch in batches if name in batch]
     codes = {word: code for variable in variables for word, code in variable.codes.items()}
@@ -265,7 +267,7 @@ def variables_of(plan: Plan, task: BlockTask) -> dict[str, Variable]:
 
 def _block(
     plan: Plan, task: BlockTask, values: Values, numbers: npt.NDArray[np.int64]
-) -> tuple[npt.NDArray[np.int8], Found]:
+) -> tuple[npt.NDArray[np.int8], VariableArrays]:
     """Answer by a task that takes all possible points at once."""
     points, variables = plan.subject.points(values), variables_of(plan, task)
     good = np.flatnonzero(points.possible)
@@ -273,7 +275,7 @@ def _block(
     varied = {name: each[good] for name, each in values.items()}
     block = Block(kept, numbers[good], plan.seed, frozenset(variables), plan.subject, varied)
     given = task.function(block, **plan.options) if good.size else {}
-    found: Found = {}
+    arrays: VariableArrays = {}
     for name, variable in variables.items():
         whole = np.full((numbers.size, *(n for _, n in variable.dims)), variable.empty, dtype=variable.dtype)
         if good.size:
@@ -284,8 +286,8 @@ def _block(
                 shape = "missing" if told is None else np.shape(told)
                 raise _wrong(plan, name, shape, f"an array of shape {(good.size, *whole.shape[1:])}")
             whole[good] = told
-        found[name] = (variable, whole)
-    return np.where(points.possible, COMPUTED, IMPOSSIBLE).astype(np.int8), found
+        arrays[name] = (variable, whole)
+    return np.where(points.possible, COMPUTED, IMPOSSIBLE).astype(np.int8), arrays
 
 
 def _single(
@@ -293,10 +295,10 @@ def _single(
     function: Callable[..., Any],
     values: Values,
     numbers: npt.NDArray[np.int64],
-) -> tuple[npt.NDArray[np.int8], Found]:
+) -> tuple[npt.NDArray[np.int8], VariableArrays]:
     """Answer point by point; what a task refuses is a point without numbers, any other error ends the sweep."""
     seeded = "seed" in inspect.signature(function).parameters
-    status, found = np.zeros(numbers.size, dtype=np.int8), {}
+    status, arrays = np.zeros(numbers.size, dtype=np.int8), {}
     for k in range(numbers.size):
         one = plan.subject.at({name: float(each[k]) for name, each in values.items()})
         if one is None:
@@ -312,13 +314,13 @@ def _single(
             place = plan.words(plan.point(int(numbers[k])))
             raise _wrong(plan, "", f"{type(error).__name__}: {error}", f"an answer at {place}") from error
         for name, each in _numbers(plan, given).items():
-            if name not in found:
+            if name not in arrays:
                 dims = tuple((f"{name}_{axis}", n) for axis, n in enumerate(each.shape))
-                found[name] = (Variable(dims=dims), np.full((numbers.size, *each.shape), np.nan))
-            if found[name][1].shape[1:] != each.shape:
+                arrays[name] = (Variable(dims=dims), np.full((numbers.size, *each.shape), np.nan))
+            if arrays[name][1].shape[1:] != each.shape:
                 raise _wrong(plan, name, each.shape, "one shape at all points")
-            found[name][1][k] = each
-    return status, dict(sorted(found.items()))
+            arrays[name][1][k] = each
+    return status, dict(sorted(arrays.items()))
 
 
 def _wrong(plan: Plan, name: str, value: object, allowed: str) -> LimitsetsError:
@@ -337,12 +339,12 @@ def _numbers(plan: Plan, given: Any) -> dict[str, npt.NDArray[np.float64]]:
                 plan, missing[0], "missing", f"the variables asked for, of {', '.join(map(str, given))}"
             )
         given = {name: given[name] for name in plan.variables}
-    found = {}
+    arrays = {}
     for name, value in given.items():
         if not isinstance(name, str) or not name or "/" in name or name in (*plan.base, *_OURS):
             raise _wrong(plan, repr(name), name, "names without /, not that of an axis, status or level")
         try:
-            found[name] = np.array(np.nan if value is None else value, dtype=np.float64)
+            arrays[name] = np.array(np.nan if value is None else value, dtype=np.float64)
         except (TypeError, ValueError):
             raise _wrong(plan, name, type(value).__name__, "a number, or an array of numbers") from None
-    return found
+    return arrays

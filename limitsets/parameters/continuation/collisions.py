@@ -21,7 +21,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from limitsets.parameters.continuation.growth import on_itinerary
 from limitsets.parameters.continuation.path import LEAVING, Border, Path, Place
-from limitsets.parameters.continuation.snapshot import Collision, Found, Snapshot
+from limitsets.parameters.continuation.snapshot import AttractorAtPlace, Collision, Snapshot
 from limitsets.systems.cells import Domain
 from limitsets.systems.maps import along, images, kind_of
 from limitsets.systems.maps.critical import TINY, branches_of_side
@@ -156,9 +156,9 @@ class Approach(NamedTuple):
             return None
         x, side, _ = along(snapshot.place.params, [begin[0]], begin[1], self.word)
         near = 1e-9 * snapshot.place.extent
-        for position, found in enumerate(snapshot.found):
-            if (found.cycle is None) == (self.start is not None):
-                ends = [end for pair in found.extents.get(int(side[0]), ()) for end in pair]
+        for position, attractor in enumerate(snapshot.attractors):
+            if (attractor.cycle is None) == (self.start is not None):
+                ends = [end for pair in attractor.extents.get(int(side[0]), ()) for end in pair]
                 if any(abs(end - float(x[0])) <= near for end in ends):
                     return position
         return None
@@ -176,7 +176,16 @@ class Approach(NamedTuple):
         limit = "cycle" if self.start is None else ("c+" if self.from_above else "c-")
         start = None if self.start is None else begin[0] * (abs(begin[0]) >= TINY)
         at = border.x_above if abs(border.x_above) >= TINY else 0.0
-        return Collision(at, border.side, change, len(self.word), start, begin[1], limit, itinerary)
+        return Collision(
+            x=at,
+            side=border.side,
+            change=change,
+            k=len(self.word),
+            start=start,
+            start_side=begin[1],
+            limit=limit,
+            itinerary=itinerary,
+        )
 
 
 class _Tracked(NamedTuple):
@@ -190,13 +199,17 @@ class _Tracked(NamedTuple):
     to_side: int
 
 
-def _tracked(found: Found, borders: list[Border], names: tuple[str, ...]) -> Iterator[_Tracked]:
+def _tracked(
+    attractor: AttractorAtPlace, borders: list[Border], names: tuple[str, ...]
+) -> Iterator[_Tracked]:
     """Points to track of one attractor."""
-    if found.cycle is not None:
-        word = found.cycle.branches.tolist()
-        for k, (x, side) in enumerate(zip(found.cycle.x.tolist(), found.cycle.side.tolist(), strict=True)):
+    if attractor.cycle is not None:
+        word = attractor.cycle.branches.tolist()
+        for k, (x, side) in enumerate(
+            zip(attractor.cycle.x.tolist(), attractor.cycle.side.tolist(), strict=True)
+        ):
             yield _Tracked(None, False, x, side, tuple(word[k:] + word[:k]), side)
-    for end in found.ends:
+    for end in attractor.ends:
         x, side, word = (
             end.origin.x,
             end.origin.side,
@@ -208,7 +221,7 @@ def _tracked(found: Found, borders: list[Border], names: tuple[str, ...]) -> Ite
 
 
 def _at_both(border: Border, others: list[Border], which: int) -> tuple[Border, Border] | None:
-    """Pair a border of the first or second place with the same at the other; None where that is not there."""
+    """Pair a border at one place with the same border at the other place; None without one there."""
     other = _nearest(others, border, border.x_above)
     if other is None:
         return None
@@ -226,7 +239,9 @@ def approaches(path: Path, lo: Snapshot, hi: Snapshot) -> Iterator[Approach]:
             if target.kind in LEAVING or (target.kind != "turning" and not _is_smooth(snapshot.place, target))
             if (pair := _at_both(target, borders[1 - which], which)) is not None
         ]
-        points = [point for found in snapshot.found for point in _tracked(found, borders[which], names)]
+        points = [
+            point for attractor in snapshot.attractors for point in _tracked(attractor, borders[which], names)
+        ]
         for point in points if targets else ():
             start = None if point.start is None else _at_both(point.start, borders[1 - which], which)
             if point.start is not None and start is None:
@@ -237,18 +252,27 @@ def approaches(path: Path, lo: Snapshot, hi: Snapshot) -> Iterator[Approach]:
                 key = (point.word, point.from_above, where, pair[0])
                 if target.side == point.to_side and key not in seen:
                     seen.add(key)
-                    x = (point.x, point.x)
-                    yield Approach(path, (lo.t, hi.t), start, point.from_above, x, *point[3:], pair)
+                    yield Approach(
+                        path,
+                        (lo.t, hi.t),
+                        start,
+                        from_above=point.from_above,
+                        x=(point.x, point.x),
+                        side=point.side,
+                        word=point.word,
+                        to_side=point.to_side,
+                        target=pair,
+                    )
 
 
 def _solved(gap: Callable[[float], float], lo: float, hi: float) -> float | None:
     """Root of a gap; None where it ends on the way."""
 
     def value(t: float) -> float:
-        found = gap(t)
-        if not np.isfinite(found):
+        distance = gap(t)
+        if not np.isfinite(distance):
             raise ValueError
-        return found
+        return distance
 
     try:
         return float(brentq(value, lo, hi, xtol=1e-14, rtol=4.0 * EPS))
@@ -276,7 +300,7 @@ def nearest(approach: Approach, middle: float) -> tuple[float, float] | None:
     if not (0.0 < sign * between <= min(sign * first, sign * last)):
         return None
     options = {"xatol": 1e-12}
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         lambda t: sign * approach.at(t), bounds=(lo, hi), method="bounded", options=options
     )
-    return float(found.x), sign * float(found.fun)
+    return float(minimum.x), sign * float(minimum.fun)

@@ -18,10 +18,10 @@ from limitsets.parameters.continuation.collisions import Approach, approaches, c
 from limitsets.parameters.continuation.path import Curve, Path, between, read_path
 from limitsets.parameters.continuation.snapshot import (
     LEAST,
+    AttractorAtPlace,
     Collision,
     Continuation,
     Event,
-    Found,
     Snapshot,
     State,
     arrivals,
@@ -66,14 +66,14 @@ class Match(NamedTuple):
     smooth: bool
 
 
-def distance(one: Found, other: Found) -> float:
+def distance(one: AttractorAtPlace, other: AttractorAtPlace) -> float:
     """Hausdorff distance of two sets along the sides; infinite where one is not on a side of the other."""
     if set(one.extents) != set(other.extents):
         return float("inf")
     return max(_directed(one, other), _directed(other, one))
 
 
-def _directed(one: Found, other: Found) -> float:
+def _directed(one: AttractorAtPlace, other: AttractorAtPlace) -> float:
     """Largest distance of a point of one set from the other."""
     farthest = 0.0
     for side, parts in one.extents.items():
@@ -86,7 +86,7 @@ def _directed(one: Found, other: Found) -> float:
     return farthest
 
 
-def _overlap(one: Found, other: Found, reach: float) -> bool:
+def _overlap(one: AttractorAtPlace, other: AttractorAtPlace, reach: float) -> bool:
     if one.cells is not None and other.cells is not None:
         return _share(*sorted((one.cells, other.cells), key=lambda each: each.grid.n_cells))
     for side, parts in one.extents.items():
@@ -107,7 +107,7 @@ def _share(coarse: CellSet, fine: CellSet) -> bool:
     return False
 
 
-def _alike(one: Found, other: Found, reach: float) -> bool:
+def _alike(one: AttractorAtPlace, other: AttractorAtPlace, reach: float) -> bool:
     if one.cells is not None:
         return True
     return one.period == other.period and one.bands == other.bands and distance(one, other) <= reach
@@ -117,12 +117,12 @@ def matched(before: Snapshot, after: Snapshot) -> Match:
     """Match the attractors of two places."""
     reach = REACH * before.place.extent
     pairs: nx.Graph = nx.Graph()
-    pairs.add_nodes_from((0, i) for i in range(len(before.found)))
-    pairs.add_nodes_from((1, j) for j in range(len(after.found)))
-    ahead = [arrivals(each, after, reach) for each in before.found]
-    back = [arrivals(each, before, reach) for each in after.found]
-    for i, one in enumerate(before.found):
-        for j, other in enumerate(after.found):
+    pairs.add_nodes_from((0, i) for i in range(len(before.attractors)))
+    pairs.add_nodes_from((1, j) for j in range(len(after.attractors)))
+    ahead = [arrivals(each, after, reach) for each in before.attractors]
+    back = [arrivals(each, before, reach) for each in after.attractors]
+    for i, one in enumerate(before.attractors):
+        for j, other in enumerate(after.attractors):
             if (ahead[i] == {j} or back[j] == {i}) and _overlap(one, other, reach):
                 pairs.add_edge((0, i), (1, j))
     groups = tuple(
@@ -130,7 +130,8 @@ def matched(before: Snapshot, after: Snapshot) -> Match:
         for part in nx.connected_components(pairs)
     )
     smooth = all(
-        group.one_to_one and _alike(before.found[group.before[0]], after.found[group.after[0]], reach)
+        group.one_to_one
+        and _alike(before.attractors[group.before[0]], after.attractors[group.after[0]], reach)
         for group in groups
     )
     return Match(tuple(sorted(groups, key=lambda group: (group.before, group.after))), smooth)
@@ -216,14 +217,14 @@ class Follower:
     def _confirm(self, t: float) -> bool:
         """Look at a place again on finer cells, once; whether they agree."""
         if t not in self.sure:
-            found = confirmed(self.at(t))
-            self.sure[t] = found is not None
-            if found is not None:
-                self.snapshots[t] = found
+            snapshot = confirmed(self.at(t))
+            self.sure[t] = snapshot is not None
+            if snapshot is not None:
+                self.snapshots[t] = snapshot
         return self.sure[t]
 
     def _middle(self, lo: Snapshot, hi: Snapshot) -> float | None:
-        """Place that cuts a step; on cells one that finer ones confirm, None where there is none."""
+        """Place at which to cut a step; on cells, finer cells have to confirm the place.  None without such a place."""
         if lo.place.on_line:
             return 0.5 * (lo.t + hi.t)
         for share in (0.5, 0.25, 0.75):
@@ -267,10 +268,10 @@ class Follower:
             if not (self.match(a, b).smooth and self.match(b, c).smooth):
                 continue
             for each in approaches(self.path, a, c):
-                found = nearest(each, middle)
-                if found is None:
+                touch = nearest(each, middle)
+                if touch is None:
                     continue
-                t, gap = found
+                t, gap = touch
                 self._touched(each, (before, middle, after), t, gap)
 
     def _touched(self, each: Approach, steps: tuple[float, float, float], t: float, gap: float) -> None:
@@ -312,10 +313,10 @@ class Follower:
 def numbered(follower: Follower) -> list[list[int]]:
     """Give every attractor at every step its number."""
     steps = [follower.at(t) for t in sorted(follower.snapshots)]
-    numbers = [list(range(len(steps[0].found)))]
-    following = len(steps[0].found)
+    numbers = [list(range(len(steps[0].attractors)))]
+    following = len(steps[0].attractors)
     for before, after in pairwise(steps):
-        given = [-1] * len(after.found)
+        given = [-1] * len(after.attractors)
         for group in follower.match(before, after).groups:
             old = [numbers[-1][position] for position in group.before]
             for position in group.after:
@@ -327,16 +328,16 @@ def numbered(follower: Follower) -> list[list[int]]:
     return numbers
 
 
-def _change(one: Found, other: Found) -> str:
+def _change(one: AttractorAtPlace, other: AttractorAtPlace) -> str:
     before, after = State.of(one).words(), State.of(other).words()
     if before.removeprefix(LEAST) != after.removeprefix(LEAST):
         return f"{before} -> {after}"
     return f"bands {one.bands} -> bands {other.bands}" if one.bands != other.bands else ""
 
 
-def _whereto(found: Found, there: Snapshot, numbers: list[int], reach: float) -> str:
+def _whereto(attractor: AttractorAtPlace, there: Snapshot, numbers: list[int], reach: float) -> str:
     """Say where the states of an attractor go at the other end of a bracket."""
-    ends = arrivals(found, there, reach)
+    ends = arrivals(attractor, there, reach)
     words = [f"attractor {numbers[position]}" for position in sorted(ends) if position >= 0]
     words += ["an exit"] if -2 in ends else []
     return " and ".join(words) or "no attractor within 1000 steps"
@@ -357,13 +358,23 @@ class _Between(NamedTuple):
         after = tuple(self.new[position] for position in group.after)
         collision = None if met is None else met.collision
         words = between(self.before.place, self.after.place)
-        return Event(kind, t, values, before, after, change, jump, collision, words)
+        return Event(
+            kind=kind,
+            t=t,
+            values=values,
+            before=before,
+            after=after,
+            change=change,
+            jump=jump,
+            collision=collision,
+            words=words,
+        )
 
     def of_group(self, group: Group, met: Met | None) -> Event | None:
         """Tell what happens to one group of attractors, None for nothing."""
         reach = REACH * self.before.place.extent
         if group.one_to_one:
-            one, other = self.before.found[group.before[0]], self.after.found[group.after[0]]
+            one, other = self.before.attractors[group.before[0]], self.after.attractors[group.after[0]]
             jump = 0.0 if one.cells is not None else distance(one, other)
             change = "" if one.cells is not None else _change(one, other)
             if met is not None:
@@ -371,7 +382,9 @@ class _Between(NamedTuple):
             if not change and jump <= reach:
                 return None
             return self.event("bands" if change else "jump", group, change, jump, None)
-        one_side = [self.before.found[k] for k in group.before] or [self.after.found[k] for k in group.after]
+        one_side = [self.before.attractors[k] for k in group.before] or [
+            self.after.attractors[k] for k in group.after
+        ]
         words = " and ".join(State.of(each).words() for each in one_side)
         if not group.after:
             goes = _whereto(one_side[0], self.after, self.new, reach)
@@ -379,7 +392,7 @@ class _Between(NamedTuple):
         if not group.before:
             came = _whereto(one_side[0], self.before, self.old, reach)
             return self.event("birth", group, f"{words}, its states came to {came}", None, met)
-        many = [self.after.found[k] for k in group.after]
+        many = [self.after.attractors[k] for k in group.after]
         change = f"{words} -> {' and '.join(State.of(each).words() for each in many)}"
         kind = "merge" if len(group.before) >= len(group.after) else "split"
         return self.event(kind, group, change, None, met)
@@ -389,7 +402,7 @@ def events_of(follower: Follower, numbers: list[list[int]]) -> tuple[Event, ...]
     """Tell all events along the path."""
     steps = sorted(follower.snapshots)
     place_of = {t: k for k, t in enumerate(steps)}
-    found: list[Event] = []
+    events: list[Event] = []
     for k, (lo, hi) in enumerate(pairwise(steps)):
         if not (follower.is_sure(lo) and follower.is_sure(hi)):
             continue
@@ -399,14 +412,26 @@ def events_of(follower: Follower, numbers: list[list[int]]) -> tuple[Event, ...]
             mine: list[Met | None] = [
                 met for met in here if met.owner[1] in (group.before if met.owner[0] == lo else group.after)
             ]
-            found += [event for met in mine or [None] if (event := pair.of_group(group, met)) is not None]
+            events += [event for met in mine or [None] if (event := pair.of_group(group, met)) is not None]
     for met in follower.met:
         if place_of[met.t[1]] != place_of[met.t[0]] + 1:  # a touch, with steps in its bracket
             number = numbers[place_of[met.owner[0]]][met.owner[1]]
             one, other = (follower.at(t).place for t in met.t)
             values, words = (one.values, other.values), between(one, other)
-            found.append(Event(met.kind, met.t, values, (number,), (number,), "", 0.0, met.collision, words))
-    return tuple(sorted(found, key=lambda event: event.t))
+            events.append(
+                Event(
+                    kind=met.kind,
+                    t=met.t,
+                    values=values,
+                    before=(number,),
+                    after=(number,),
+                    change="",
+                    jump=0.0,
+                    collision=met.collision,
+                    words=words,
+                )
+            )
+    return tuple(sorted(events, key=lambda event: event.t))
 
 
 # ----------------------------------------------------------------
@@ -501,28 +526,28 @@ def _answer(curve: Path, follower: Follower) -> Continuation:
     visited = [follower.at(t) for t in sorted(follower.snapshots)]
     names = visited[0].place.values
     return Continuation(
-        curve.name,
-        curve.unit,
-        np.array([each.t for each in visited]),
-        {name: np.array([each.place.values[name] for each in visited]) for name in names},
-        tuple(
+        name=curve.name,
+        unit=curve.unit,
+        t=np.array([each.t for each in visited]),
+        values={name: np.array([each.place.values[name] for each in visited]) for name in names},
+        attractors=tuple(
             {
-                number: State.of(found)
-                for number, found in sorted(zip(row, each.found, strict=True), key=itemgetter(0))
+                number: State.of(attractor)
+                for number, attractor in sorted(zip(row, each.attractors, strict=True), key=itemgetter(0))
             }
             for row, each in zip(numbers, visited, strict=True)
         ),
-        tuple(_critical(each) for each in visited),
-        events_of(follower, numbers),
-        len(visited),
+        critical=tuple(_critical(each) for each in visited),
+        events=events_of(follower, numbers),
+        evaluations=len(visited),
     )
 
 
 def _critical(snapshot: Snapshot) -> dict[int, tuple[float, ...]]:
     if not snapshot.place.on_line:
         return {}
-    found: dict[int, list[float]] = {side: [] for side in snapshot.place.forward.pieces}
+    points: dict[int, list[float]] = {side: [] for side in snapshot.place.forward.pieces}
     for border in snapshot.place.borders:
         if border.kind == "critical":
-            found[border.side].append(border.x_above)
-    return {side: tuple(x) for side, x in found.items()}
+            points[border.side].append(border.x_above)
+    return {side: tuple(x) for side, x in points.items()}

@@ -50,7 +50,7 @@ class _Pieces:
         """F of some intervals; what leaves the domain is dropped."""
         lo = np.maximum(given.lo[:, None], self.bottom)
         hi = np.minimum(given.hi[:, None], self.top)
-        # A part that only rounding makes would be thrown elsewhere, far from everything.
+        # Rounding may leave a sliver, whose image would lie far from all others.
         row, k = np.nonzero((given.side[:, None] == self.side) & (hi - lo > NONE * self.extent))
         count = row.size
         if count == 0:
@@ -97,27 +97,27 @@ def grown(
     """Union of all images of short intervals around some points; None where they do not grow, or do not settle."""
     pieces = _Pieces(forward, extent)
     lo, hi = np.maximum(x - SHORT * extent, pieces.lo[side]), np.minimum(x + SHORT * extent, pieces.hi[side])
-    found = pieces.joined(_Intervals(side, lo, hi))
-    first = float((found.hi - found.lo).sum())
+    union = pieces.joined(_Intervals(side, lo, hi))
+    first = float((union.hi - union.lo).sum())
     for count in range(MOST_STEPS):
-        length = float((found.hi - found.lo).sum())
+        length = float((union.hi - union.lo).sum())
         if length >= LONG * extent:
             break
-        found = pieces.image(found)
-        if not 0 < found.lo.size <= MOST_INTERVALS or (count == EARLY and length < TENFOLD * first):
+        union = pieces.image(union)
+        if not 0 < union.lo.size <= MOST_INTERVALS or (count == EARLY and length < TENFOLD * first):
             return None
-    if float((found.hi - found.lo).sum()) < SHORT * extent:
+    if float((union.hi - union.lo).sum()) < SHORT * extent:
         return None
     for _ in range(MOST_STEPS):
-        after = pieces.joined(found, pieces.image(found))
-        if _same(found, after, extent):
+        after = pieces.joined(union, pieces.image(union))
+        if _same(union, after, extent):
             extents: dict[int, list[tuple[float, float]]] = {}
             for s, low, high in zip(after.side.tolist(), after.lo.tolist(), after.hi.tolist(), strict=True):
                 extents.setdefault(s, []).append((low, high))
             return extents
         if after.lo.size > MOST_INTERVALS:
             return None
-        found = after
+        union = after
     return None
 
 
@@ -182,13 +182,13 @@ def recorded(place: Place, x: Array, side: Ints, steps: int) -> Recorded:
         xs.append(x)
         sides.append(side)
         codes.append(code)
-    found = Recorded(np.stack(xs, axis=1), np.stack(sides, axis=1), np.stack(codes, axis=1))
-    return found.rows((found.code >= 0).all(axis=1) & _on_domain(place, found))
+    orbits = Recorded(np.stack(xs, axis=1), np.stack(sides, axis=1), np.stack(codes, axis=1))
+    return orbits.rows((orbits.code >= 0).all(axis=1) & _on_domain(place, orbits))
 
 
-def _on_domain(place: Place, found: Recorded) -> Flags:
-    lo, hi = place.domain.lo[found.side, 0], place.domain.hi[found.side, 0]
-    inside: Flags = ((found.x >= lo) & (found.x <= hi)).all(axis=1)
+def _on_domain(place: Place, orbits: Recorded) -> Flags:
+    lo, hi = place.domain.lo[orbits.side, 0], place.domain.hi[orbits.side, 0]
+    inside: Flags = ((orbits.x >= lo) & (orbits.x <= hi)).all(axis=1)
     return inside
 
 
@@ -233,7 +233,7 @@ def _as_cycle(place: Place, x: float, side: int, word: Ints) -> Cycle | None:
 
 
 def _shortest(place: Place, cycle: Cycle) -> Cycle:
-    """Cycle that this one runs through several times, if that one attracts."""
+    """Return the shorter cycle that a cycle repeats, if the shorter one attracts; else the cycle itself."""
     for period in range(1, cycle.period):
         if cycle.period % period == 0 and cycle.side[period] == cycle.side[0]:
             if abs(cycle.x[period] - cycle.x[0]) > 1e-3 * place.extent:
@@ -246,22 +246,22 @@ def _shortest(place: Place, cycle: Cycle) -> Cycle:
     return cycle
 
 
-def attracting_cycles(place: Place, found: Recorded) -> tuple[list[Cycle], Flags]:
+def attracting_cycles(place: Place, orbits: Recorded) -> tuple[list[Cycle], Flags]:
     """Find the attracting cycles that orbits have come near; which orbits have come near none."""
-    away = np.abs(found.x[:, 1:] - found.x[:, :1])
-    away[found.side[:, 1:] != found.side[:, :1]] = np.inf
+    away = np.abs(orbits.x[:, 1:] - orbits.x[:, :1])
+    away[orbits.side[:, 1:] != orbits.side[:, :1]] = np.inf
     near = away <= RETURN * place.extent
     first = np.where(near.any(axis=1), near.argmax(axis=1) + 1, 0)
     closest = away.argmin(axis=1) + 1 if away.size else first
     cycles: list[Cycle] = []
-    left = np.ones(len(found.x), dtype=bool)
+    left = np.ones(len(orbits.x), dtype=bool)
     for periods in (first, 2 * first, np.where(first > 0, closest, 0)):
         for period in np.unique(periods[left & (periods > 0) & (periods <= MOST_PERIOD)]).tolist():
             k = np.flatnonzero(left & (periods == period))
-            words = np.ascontiguousarray(found.code[k, :period])
-            x, slope, good = on_itinerary(place, found.x[k, 0].copy(), found.side[k, 0], words)
+            words = np.ascontiguousarray(orbits.code[k, :period])
+            x, slope, good = on_itinerary(place, orbits.x[k, 0].copy(), orbits.side[k, 0], words)
             for j in np.flatnonzero(good & (np.abs(slope) < 1.0 + 1e-6)).tolist():
-                side = int(found.side[k[j], 0])
+                side = int(orbits.side[k[j], 0])
                 if not any(_passes(cycle, float(x[j]), side, place.extent) for cycle in cycles):
                     cycle = _as_cycle(place, float(x[j]), side, words[j])
                     if cycle is None:
@@ -272,7 +272,7 @@ def attracting_cycles(place: Place, found: Recorded) -> tuple[list[Cycle], Flags
 
 
 def _told_apart(place: Place, cycles: list[Cycle]) -> list[Cycle]:
-    """Cycles of which rounding lets one be told from another: near slope 1 all numbers between two are roots."""
+    """Keep the cycles that rounding can tell apart: near slope 1 every number between two cycles is a root."""
     kept: list[Cycle] = []
     for cycle in sorted(cycles, key=lambda each: each.period):
         twin = False

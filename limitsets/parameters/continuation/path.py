@@ -98,19 +98,19 @@ class Place:
     @cached_property
     def borders(self) -> list[Border]:
         """Where two monotone pieces meet, and where one ends at an exit or with the domain (branch -1 beyond)."""
-        found: list[Border] = []
+        edges: list[Border] = []
         for side, pieces in self.forward.pieces.items():
-            found += [
+            edges += [
                 Border(side, lower.top.kind, lower.branch, upper.branch, lower.top.x, upper.bottom.x)
                 for lower, upper in pairwise(pieces)
                 if lower.top.kind in KINDS
             ]
             for branch, bottom, top in pieces:
                 if top.kind in LEAVING:
-                    found.append(Border(side, top.kind, branch, -1, top.x, top.x))
+                    edges.append(Border(side, top.kind, branch, -1, top.x, top.x))
                 if bottom.kind in LEAVING:
-                    found.append(Border(side, bottom.kind, -1, branch, bottom.x, bottom.x))
-        return found
+                    edges.append(Border(side, bottom.kind, -1, branch, bottom.x, bottom.x))
+        return edges
 
 
 def between(lo: Place, hi: Place) -> str:
@@ -230,11 +230,11 @@ def read_path(subject: Any, path: Curve, domain: Any) -> Path:
     """Read a path of a scene, or of a map; AnswerError for what is none."""
     if isinstance(subject, Scene) and domain is not None:
         raise AnswerError("the domain", domain, "None: a scene has its own", "leave it out")
-    found = _of_scene(subject, path) if isinstance(subject, Scene) else _of_map(subject, path, domain)
-    names = set(found.at(0.0).values)
+    unchecked = _of_scene(subject, path) if isinstance(subject, Scene) else _of_map(subject, path, domain)
+    names = set(unchecked.at(0.0).values)
 
     def at(t: float) -> Place:
-        place = found.at(t)
+        place = unchecked.at(t)
         if set(place.values) != names:
             allowed = ", ".join(sorted(names))
             raise AnswerError(
@@ -242,4 +242,4 @@ def read_path(subject: Any, path: Curve, domain: Any) -> Path:
             )
         return place
 
-    return found._replace(at=lru_cache(maxsize=65_536)(at))  # a place remembers what was found there
+    return unchecked._replace(at=lru_cache(maxsize=65_536)(at))  # a place remembers what was found there

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ FINER, MOST_CELLS = 1.6, 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class AttractorAtPlace:
     """One attractor at one place.
 
     Attributes
@@ -99,14 +99,14 @@ class Snapshot:
     ----------
     place : Place
         Where.
-    found : tuple of Found
+    attractors : tuple of AttractorAtPlace
         The attractors.
     cells : int
         Cells per axis on which they were found.
     """
 
     place: Place
-    found: tuple[Found, ...]
+    attractors: tuple[AttractorAtPlace, ...]
     cells: int
 
     @property
@@ -142,25 +142,25 @@ def _starts(place: Place, sets: Iterable[CellSet]) -> tuple[Array, Ints]:
     return np.array(xs), np.array(sides, dtype=np.int64)
 
 
-def _of_cycle(cycle: Cycle) -> Found:
+def _of_cycle(cycle: Cycle) -> AttractorAtPlace:
     extents: Intervals = {}
     for x, side in sorted(zip(cycle.x.tolist(), cycle.side.tolist(), strict=True)):
         extents.setdefault(side, []).append((x, x))
-    return Found(dict(sorted(extents.items())), (), cycle, None, True)
+    return AttractorAtPlace(dict(sorted(extents.items())), (), cycle, None, True)
 
 
-def _of_intervals(place: Place, extents: Intervals, *, inside: bool) -> Found | None:
+def _of_intervals(place: Place, extents: Intervals, *, inside: bool) -> AttractorAtPlace | None:
     union, known = carried(place.forward, extents, place.domain, place.extent, MOST_IMAGES, rest=not inside)
     if not union:
         return None
     ends = ends_of(kind_of(place.params).branches, union)
-    found = {side: [(lo.x, hi.x) for lo, hi in parts] for side, parts in union.items()}
-    return Found(found, ends, None, None, inside and known)
+    bands = {side: [(lo.x, hi.x) for lo, hi in parts] for side, parts in union.items()}
+    return AttractorAtPlace(bands, ends, None, None, inside and known)
 
 
-def _grown_sets(place: Place, rows: Recorded, sets: list[CellSet]) -> list[Found]:
+def _grown_sets(place: Place, rows: Recorded, sets: list[CellSet]) -> list[AttractorAtPlace]:
     """Find the sets of the orbits that are on no cycle."""
-    found: list[Found] = []
+    attractors: list[AttractorAtPlace] = []
     x, side = rows.x[:, -1], rows.side[:, -1]
     left, tried = np.arange(x.size), 0
     while left.size and tried < TRIED * (1 + len(sets)):
@@ -174,33 +174,33 @@ def _grown_sets(place: Place, rows: Recorded, sets: list[CellSet]) -> list[Found
             new = None if around is None else _of_intervals(place, around.extents(), inside=False)
         left = left[1:]
         if new is not None:
-            found.append(new)
+            attractors.append(new)
             left = left[new.distance(x[left], side[left]) > 0.0]
-    return found
+    return attractors
 
 
-def _holds(outer: Found, inner: Found, slack: float) -> bool:
+def _holds(outer: AttractorAtPlace, inner: AttractorAtPlace, slack: float) -> bool:
     ends = [(x, side) for side, parts in inner.extents.items() for pair in parts for x in pair]
     x, side = np.array([each[0] for each in ends]), np.array([each[1] for each in ends], dtype=np.int64)
     return bool((outer.distance(x, side) <= slack).all())
 
 
-def _least(found: list[Found], slack: float) -> tuple[Found, ...]:
-    """Keep the sets that hold no other one; of two that are the same the first."""
+def _least(attractors: list[AttractorAtPlace], slack: float) -> tuple[AttractorAtPlace, ...]:
+    """Keep the sets that contain no other set; of two equal sets keep the first."""
     return tuple(
         each
-        for k, each in enumerate(found)
+        for k, each in enumerate(attractors)
         if not any(
             _holds(each, other, slack) and (j < k or not _holds(other, each, slack))
-            for j, other in enumerate(found)
+            for j, other in enumerate(attractors)
             if j != k
         )
     )
 
 
-def _order(found: Found) -> tuple[int, float]:
-    side = min(found.extents)
-    return side, found.extents[side][0][0]
+def _order(attractor: AttractorAtPlace) -> tuple[int, float]:
+    side = min(attractor.extents)
+    return side, attractor.extents[side][0][0]
 
 
 def snapshot_at(place: Place, cells: int) -> Snapshot:
@@ -212,24 +212,30 @@ def snapshot_at(place: Place, cells: int) -> Snapshot:
     x, side, code, _ = advance(place.params, x, side, TRANSIENT)
     rows = recorded(place, x[code >= 0], side[code >= 0], MOST_PERIOD)
     cycles, left = attracting_cycles(place, rows)
-    found = [_of_cycle(cycle) for cycle in cycles]
-    found += _grown_sets(place, rows.rows(left), sets)
-    return Snapshot(place, tuple(sorted(_least(found, 1e-9 * place.extent), key=_order)), cells)
+    attractors = [_of_cycle(cycle) for cycle in cycles]
+    attractors += _grown_sets(place, rows.rows(left), sets)
+    return Snapshot(place, tuple(sorted(_least(attractors, 1e-9 * place.extent), key=_order)), cells)
 
 
 def _on_cells(place: Place, cells: int) -> Snapshot:
-    """Find the attracting cells, on finer ones where orbits stay elsewhere; on the finest add the cells they visit."""
+    """Find the attracting cells.  If orbits stay elsewhere, use finer cells; on the finest, add the visited cells."""
     cover = grid(place.domain, cells)
     sets = _cell_sets(transitions(place.params, cover))
-    found = Snapshot(place, tuple(Found(each.extents(), (), None, each, True) for each in sets), cells)
-    x, side, label = _rested(found)
+    snapshot = Snapshot(
+        place, tuple(AttractorAtPlace(each.extents(), (), None, each, True) for each in sets), cells
+    )
+    x, side, label = _rested(snapshot)
     if (label >= 0).all():
-        return found
+        return snapshot
     if (finer := _finer(place, cells)) is not None:
         return _on_cells(place, finer)
     visited = _visited(place, cover, x[label < 0], side[label < 0], sets)
     return replace(
-        found, found=(*found.found, *(Found(each.extents(), (), None, each, False) for each in visited))
+        snapshot,
+        attractors=(
+            *snapshot.attractors,
+            *(AttractorAtPlace(each.extents(), (), None, each, False) for each in visited),
+        ),
     )
 
 
@@ -256,7 +262,7 @@ def _rested(snapshot: Snapshot) -> tuple[Array, Ints, Ints]:
 
 
 def _visited(place: Place, cover: Grid, x: Array, side: Ints, sets: list[CellSet]) -> list[CellSet]:
-    """Cells that orbits visit, those together that share one; without the orbits that come to a set after all."""
+    """Join the cells of orbits that share one; orbits that reach a cell of `sets` are left out."""
     rows = []
     for _ in range(TRANSIENT):
         x, side, code, _ = advance(place.params, x, side, 1)
@@ -265,40 +271,45 @@ def _visited(place: Place, cover: Grid, x: Array, side: Ints, sets: list[CellSet
             here = np.flatnonzero((side == s) & (code >= 0))
             cells[here] = cover.index(x[here], s)
         rows.append(cells)
-    found: list[CellSet] = []
+    merged: list[CellSet] = []
     for orbit in np.stack(rows, axis=1):
         if (orbit < 0).any():
             continue
         new = CellSet.of(cover, np.unique(orbit))
         if any(each.mask[orbit].any() for each in sets):
             continue
-        for other in [each for each in found if (each.mask & new.mask).any()]:
-            found.remove(other)
+        for other in [each for each in merged if (each.mask & new.mask).any()]:
+            merged.remove(other)
             new = new | other
-        found.append(new)
-    return found
+        merged.append(new)
+    return merged
 
 
 def confirmed(snapshot: Snapshot) -> Snapshot | None:
-    """Find the attractors that two sizes of cells agree on, by the orbits that come to them; None where none do."""
+    """Find the attractors on which two sizes of cells agree, by the orbits that reach them; None if none agree."""
     place, cells = snapshot.place, _finer(snapshot.place, snapshot.cells)
-    if cells is None or not all(each.decided for each in snapshot.found):
+    if cells is None or not all(each.decided for each in snapshot.attractors):
         return None
     finer = snapshot_at(place, cells)
     x, side, fine = _rested(finer)
     coarse = _label(snapshot, x, side, 0.0)
     pairs = set(zip(coarse.tolist(), fine.tolist(), strict=True))
     one_to_one = len({a for a, _ in pairs}) == len({b for _, b in pairs}) == len(pairs)
-    if len(finer.found) == len(snapshot.found) and one_to_one and (fine >= 0).all() and (coarse >= 0).all():
+    if (
+        len(finer.attractors) == len(snapshot.attractors)
+        and one_to_one
+        and (fine >= 0).all()
+        and (coarse >= 0).all()
+    ):
         return finer
     return confirmed(finer)
 
 
-def _sampled(found: Found, count: int = 9) -> tuple[Array, Ints]:
+def _sampled(attractor: AttractorAtPlace, count: int = 9) -> tuple[Array, Ints]:
     """States of an attractor."""
-    if found.cells is not None:
-        cover = found.cells.grid
-        numbers = found.cells.numbers()
+    if attractor.cells is not None:
+        cover = attractor.cells.grid
+        numbers = attractor.cells.numbers()
         numbers = numbers[:: max(1, numbers.size // 64)]
         sides = cover.side_of(numbers)
         x = np.empty((numbers.size, cover.dimension))
@@ -306,8 +317,8 @@ def _sampled(found: Found, count: int = 9) -> tuple[Array, Ints]:
             lo, hi = cover.boxes(numbers[sides == side], side)
             x[sides == side] = 0.5 * (lo + hi)
         return x, sides
-    parts = [(side, *pair) for side, pairs in found.extents.items() for pair in pairs]
-    width = 1 if found.cycle is not None else count
+    parts = [(side, *pair) for side, pairs in attractor.extents.items() for pair in pairs]
+    width = 1 if attractor.cycle is not None else count
     x = np.concatenate([np.linspace(lo, hi, width + 2)[1:-1] for _, lo, hi in parts])
     return x, np.repeat([side for side, _, _ in parts], width).astype(np.int64)
 
@@ -315,22 +326,22 @@ def _sampled(found: Found, count: int = 9) -> tuple[Array, Ints]:
 def _label(snapshot: Snapshot, x: Any, side: Ints, reach: float) -> Ints:
     """Attractor that each state is at, -1 where it is at none."""
     label = np.full(side.size, -1)
-    if not snapshot.found:
+    if not snapshot.attractors:
         return label
-    if snapshot.found[0].cells is not None:
-        for number, each in enumerate(snapshot.found):
+    if snapshot.attractors[0].cells is not None:
+        for number, each in enumerate(snapshot.attractors):
             if each.cells is not None:
                 for s in np.unique(side).tolist():
                     here = np.flatnonzero(side == s)
                     label[here[each.cells.holds(x[here], s)]] = number
         return label
-    away = np.stack([each.distance(x, side) for each in snapshot.found])
+    away = np.stack([each.distance(x, side) for each in snapshot.attractors])
     return np.where(away.min(axis=0) <= reach, away.argmin(axis=0), -1)
 
 
-def arrivals(found: Found, there: Snapshot, reach: float) -> set[int]:
+def arrivals(attractor: AttractorAtPlace, there: Snapshot, reach: float) -> set[int]:
     """Attractors of another place in which the states of an attractor end; -2 for an exit."""
-    x, side = _sampled(found)
+    x, side = _sampled(attractor)
     x, side, code, _ = advance(there.place.params, x, side, TRANSIENT)
     stays = code >= 0
     label = _label(there, x[stays], side[stays], reach)
@@ -340,9 +351,6 @@ def arrivals(found: Found, there: Snapshot, reach: float) -> set[int]:
 # ----------------------------------------------------------------
 # What continuation gives: the attractors at each step, numbered, and the events between.
 
-
-if TYPE_CHECKING:
-    pass
 
 # Of the bands that a resolution shows.
 LEAST = "at least "
@@ -369,9 +377,9 @@ class State:
     decided: bool
 
     @classmethod
-    def of(cls, found: Found) -> State:
-        """Give what a snapshot found."""
-        return cls(found.extents, found.period, found.decided)
+    def of(cls, attractor: AttractorAtPlace) -> State:
+        """Give the state of an attractor of a snapshot."""
+        return cls(attractor.extents, attractor.period, attractor.decided)
 
     @property
     def bands(self) -> int:
@@ -518,7 +526,8 @@ class Continuation(Tabled):
             for k, t in enumerate(self.t.tolist())
         ]
         events = [
-            picked(e, "kind", "t", "values", "before", "after", "change", "jump")
+            picked(e, "kind", "t", "values")
+            | picked(e, "before", "after", "change", "jump")
             | {"collision": _table(e.collision)}
             for e in self.events
         ]

@@ -274,8 +274,8 @@ def first_points(scene: Scene) -> tuple[CriticalPoint | None, ...]:
     own, sides = scene.domain, scene.sides
     turn = sides.a + sides.d + math.pi * scene.kappa
     domain = Domain(own.lo, np.maximum(own.hi, turn[:, None]), own.anchor)
-    found = critical_points(scene.bare_map, domain, samples=SAMPLES)
-    return tuple(found[side][0] if found[side] else None for side in range(len(sides)))
+    points = critical_points(scene.bare_map, domain, samples=SAMPLES)
+    return tuple(points[side][0] if points[side] else None for side in range(len(sides)))
 
 
 def nearest_miss(scene: Scene, side: int, until: float) -> tuple[float, float] | None:
@@ -402,10 +402,10 @@ class _Duals(Numbers):
 
     def seeded(self, value: float, name: str = "") -> MultiDual:
         """Return a number, the quantity of this name if it is one."""
-        found = MultiDual(value, np.zeros(self.before + len(self.names)))
+        dual = MultiDual(value, np.zeros(self.before + len(self.names)))
         if name in self.names:
-            found.slope[self.before + self.names.index(name)] = 1.0
-        return found
+            dual.slope[self.before + self.names.index(name)] = 1.0
+        return dual
 
     def constant(self, text: str, dimension: str, key: str = "") -> MultiDual:
         """Return a text of a dimension."""
@@ -413,11 +413,11 @@ class _Duals(Numbers):
 
     def number(self, name: str) -> MultiDual:
         """Return a quantity by its name; kappa by a share of the speed, where nothing else is known of the speed."""
-        found = self.seeded(self.scene.value(name), name)
+        dual = self.seeded(self.scene.value(name), name)
         if name == KAPPA and self.open_speed:
             speed = self.seeded(1.0, SPEED)
-            return found / (speed * speed)
-        return found
+            return dual / (speed * speed)
+        return dual
 
 
 # ----------------------------------------------------------------
@@ -560,15 +560,15 @@ def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
     rows = [_Row(chosen, numbers, side, point) for side, point in enumerate(first_points(chosen))]
     slack = [number for side in zip(*_slacks(numbers), strict=True) for number in side]
     return CriticalJacobian(
-        chosen,
-        names,
-        np.array([present(chosen, name) for name in names]),
-        np.array([row.x for row in rows]),
-        tuple(row.kind for row in rows),
-        np.array([row.slope for row in rows]).reshape(len(rows), len(names)),
-        tuple(row.reason for row in rows),
-        np.array([float(number) for number in slack]),
-        np.array([number.slope[1:] for number in slack]).reshape(len(slack), len(names)),
+        scene=chosen,
+        names=names,
+        values=np.array([present(chosen, name) for name in names]),
+        x=np.array([row.x for row in rows]),
+        kinds=tuple(row.kind for row in rows),
+        matrix=np.array([row.slope for row in rows]).reshape(len(rows), len(names)),
+        reasons=tuple(row.reason for row in rows),
+        slack=np.array([float(number) for number in slack]),
+        slack_matrix=np.array([number.slope[1:] for number in slack]).reshape(len(slack), len(names)),
     )
 
 
@@ -596,20 +596,20 @@ class _Row:
 
     def _differentiate(self, start: float) -> str | None:
         x = start
-        found = self._decision(x)
+        decision = self._decision(x)
         for _ in range(STEPS):
-            if abs(found.steepness) < TOUCHING:
+            if abs(decision.steepness) < TOUCHING:
                 return "the flight only grazes the arm: another impact is about to be the first"
-            if abs(found.margin.slope[0]) * x < TOUCHING * found.size:
+            if abs(decision.margin.slope[0]) * x < TOUCHING * decision.size:
                 return "dF/dr = 0: two critical points meet"
-            step = found.margin.value / found.margin.slope[0]
+            step = decision.margin.value / decision.margin.slope[0]
             if not abs(step) <= STRAYED * x:
                 return "the decision jumps: the impact, or the way the part turns over, changes there"
             x -= step
-            found = self._decision(x)
+            decision = self._decision(x)
         miss = nearest_miss(self.scene, self.side, start - 4.0 * STRAYED * start)
         if miss is not None and miss[1] < DRAWN * self._decision(miss[0]).size:
             return f"another critical point is about to be the first, at x = {miss[0]:.9g}"
         self.x = x
-        self.slope = -found.margin.slope[1:] / found.margin.slope[0]
+        self.slope = -decision.margin.slope[1:] / decision.margin.slope[0]
         return None

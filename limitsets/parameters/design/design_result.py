@@ -130,7 +130,7 @@ class Option:
         """Give it as a plain table for JSON."""
         one = self.candidate
         return as_table(
-            **picked(one, "values", "order"), **picked(one.found, "margin", "x"), throws=self.feeding
+            **picked(one, "values", "order"), **picked(one.estimate, "margin", "x"), throws=self.feeding
         )
 
 
@@ -143,11 +143,11 @@ def unbeaten(margin: Sequence[float], throws: Sequence[float]) -> list[int]:
     [0, 1]
     """
     order = sorted(range(len(margin)), key=lambda k: (-margin[k], throws[k]))
-    found: list[int] = []
+    numbers: list[int] = []
     for k in order:
-        if not found or throws[k] < throws[found[-1]]:
-            found.append(k)
-    return found
+        if not numbers or throws[k] < throws[numbers[-1]]:
+            numbers.append(k)
+    return numbers
 
 
 def front_of(
@@ -180,16 +180,16 @@ def front_of(
     tuple of Option
         The surest first.
     """
-    known = [each for each in history if each.found.margin > 0.0 and np.isfinite(each.found.x)]
+    known = [each for each in history if each.estimate.margin > 0.0 and np.isfinite(each.estimate.x)]
     if not known:
         return (own,)
-    margins = np.array([each.found.margin for each in known])
+    margins = np.array([each.estimate.margin for each in known])
     which = np.minimum((CLASSES * margins / margins.max()).astype(int), CLASSES - 1)
     chosen = []
     for number in range(CLASSES):
         mine = np.flatnonzero(which == number)
         # a lower X against the reach is reached sooner: of each class those, besides the surest
-        early = [known[k].found.x / known[k].found.reach for k in mine]
+        early = [known[k].estimate.x / known[k].estimate.reach for k in mine]
         chosen += [int(k) for k in mine[np.argsort(early)[:PER_CLASS]]]
     chosen += [int(k) for k in np.argsort(-margins)[:PER_CLASS]]
     options = [own]
@@ -208,7 +208,7 @@ def _sure(
     seed: int,
     tell: Callable[[str, int, int], None],
 ) -> tuple[Option, ...]:
-    """Rate again on all corners whatever stands on the front, until all that does has been; the first one has been.
+    """Rate the designs on the front again on all corners, until all of them are rated so; the first one already is.
 
     The search knew some corners only: a rating from then may be too high, and hides designs that are better on all.
     """
@@ -220,11 +220,11 @@ def _sure(
         tell("designs on all corners", number, MOST_SURE)
         options.remove(option)
         one, search = option.candidate, searches[option.candidate.order]
-        found = on_all_corners(
+        estimate = on_all_corners(
             search.scene.with_values(dict(one.values)), search.tolerance, side, search.hard
         )
-        if found is not None and found.margin > 0.0:
-            again = _option(replace(one, found=found), search, side, seed)
+        if estimate is not None and estimate.margin > 0.0:
+            again = _option(replace(one, estimate=estimate), search, side, seed)
             sure += [] if again is None else [again]
             options += [] if again is None else [again]
     return tuple(best_of(sure))
@@ -232,14 +232,14 @@ def _sure(
 
 def _option(one: Candidate, search: DesignSearch, side: int, seed: int) -> Option | None:
     """Count the throws of a design at its best X; None if not every start is fed."""
-    feeding = throws_to_feed(search.scene.with_values(dict(one.values)), one.found.x, side, seed=seed)
+    feeding = throws_to_feed(search.scene.with_values(dict(one.values)), one.estimate.x, side, seed=seed)
     return Option(one, feeding) if feeding.fed == feeding.starts else None
 
 
 def best_of(options: Sequence[Option]) -> list[Option]:
     """Keep the options that no other beats in both, the surest first."""
     kept = unbeaten(
-        [each.candidate.found.margin for each in options], [each.feeding.mean for each in options]
+        [each.candidate.estimate.margin for each in options], [each.feeding.mean for each in options]
     )
     return [options[k] for k in kept]
 
@@ -335,8 +335,8 @@ class RobustDesign(Tabled):
             for name in (*sides, *self.varied)
         ]
         columns = ("quantity", Column("before", show=".6g"), Column("design", show=".6g"), "unit")
-        found = Table(columns, rows, f"{self.scene.name}: robust design", self.model.sentence)
-        return found, *((joined(self.margins),) if self.margins else ())
+        table = Table(columns, rows, f"{self.scene.name}: robust design", self.model.sentence)
+        return table, *((joined(self.margins),) if self.margins else ())
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON; every number is finite or null."""
@@ -372,12 +372,14 @@ def both(margins: Sequence[Margin]) -> tuple[float | None, float | None]:
     return min((one.proved for one in margins), default=None), min(refuted, default=None)
 
 
-def save(found: RobustDesign, folder: Path, *, recheck: bool = True) -> tuple[RobustDesign, tuple[Path, ...]]:
+def save(
+    design: RobustDesign, folder: Path, *, recheck: bool = True
+) -> tuple[RobustDesign, tuple[Path, ...]]:
     """Write scene, answer, and what `limitsets.recheck` checks; return the design without what it denies, the files."""
     folder.mkdir(parents=True, exist_ok=True)
-    scene, answer = folder / f"{found.scene.name}.toml", folder / "design.json"
-    dump(found.scene, scene)
-    margins = [settled(one, folder, recheck=recheck) for one in found.margins]
-    left = replace(found, margins=tuple(one for one, _ in margins))
+    scene, answer = folder / f"{design.scene.name}.toml", folder / "design.json"
+    dump(design.scene, scene)
+    margins = [settled(one, folder, recheck=recheck) for one in design.margins]
+    left = replace(design, margins=tuple(one for one, _ in margins))
     answer.write_text(as_json(left.to_json()), encoding="utf-8", newline="\n")
     return left, (scene, answer, *(path for _, paths in margins for path in paths))

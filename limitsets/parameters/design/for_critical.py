@@ -104,7 +104,7 @@ class Design(Tabled):
 
     def quantities(self) -> dict[str, tuple[float, float, str]]:
         """Give what was varied: value before, value found, unit."""
-        found = {}
+        quantities_varied = {}
         for name in self.jacobian.names:
             unit = unit_of(self.start, name)
             pair = tuple(
@@ -112,8 +112,8 @@ class Design(Tabled):
             )
             if name == "throw.speed" and self.start.gravity is None:
                 pair, unit = (1.0, float(np.sqrt(self.start.kappa / self.scene.kappa))), "of its own value"
-            found[name] = (pair[0], pair[1], unit)
-        return found
+            quantities_varied[name] = (pair[0], pair[1], unit)
+        return quantities_varied
 
     @property
     def model(self) -> Model:
@@ -142,7 +142,8 @@ class Design(Tabled):
         """Give it as plain tables for JSON."""
         return as_table(
             scene=self.scene.as_dict(),
-            **picked(self, "reached", "message", "how", "evaluations", "targets", "residual"),
+            **picked(self, "reached", "message", "how", "evaluations"),
+            **picked(self, "targets", "residual"),
             quantities=[
                 {"quantity": name, "before": before, "after": after, "unit": unit}
                 for name, (before, after, unit) in self.quantities().items()
@@ -270,47 +271,49 @@ def _searched(
     search.require_effect(search.at(own))
     center = unknowns.inside(own)
     first = search.at(center)
-    found, how = Solution(first, [] if first is None else [first], False), ""
+    solution, how = Solution(first, [] if first is None else [first], False), ""
     if first is not None and count is not None:
-        found, how = staged(search, first, count), f"continuation in {count} stages"
+        solution, how = staged(search, first, count), f"continuation in {count} stages"
     elif first is not None:
-        found, how = solved(search, center, search.wanted), "Newton's method from the scene"
-        if not found.reached and search.wanted.size <= center.size:
-            found, how = continued(search, first, 0.25), "continuation in the targets"
+        solution, how = solved(search, center, search.wanted), "Newton's method from the scene"
+        if not solution.reached and search.wanted.size <= center.size:
+            solution, how = continued(search, first, 0.25), "continuation in the targets"
     random, tries = np.random.default_rng(seed), starts if count is None or first is None else 0
     for number in range(tries):
-        if found.reached:
+        if solution.reached:
             break
         search.step, search.of = "other starts", (number, starts)
-        found, how = (
+        solution, how = (
             restarted(search, center, SPREADS[number % 2], random),
             f"start {number + 1} of {starts} drawn",
         )
-    if not found.reached:
+    if not solution.reached:
         best = search.best()
         if best is None:
             return Solution(None, [], False), "no scene was found that has the critical points wanted"
         near = nearest_to_targets(search, best)
         reached = search.cost(near) <= REACHED
-        return Solution(near, [*found.path[:1], near], reached), "least squares"
-    if search.wanted.size < center.size and found.trial is not None:
-        near = nearest_to_start(search, found.trial, own)
-        found = Solution(near, [*(each for each in found.path if each is not found.trial), near], True)
+        return Solution(near, [*solution.path[:1], near], reached), "least squares"
+    if search.wanted.size < center.size and solution.trial is not None:
+        near = nearest_to_start(search, solution.trial, own)
+        solution = Solution(
+            near, [*(each for each in solution.path if each is not solution.trial), near], True
+        )
         how += ", then the nearest to the scene"
-    return found, how
+    return solution, how
 
 
 def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Solution, how: str) -> Design:
-    before = search.trials[0].found
-    after = before if outcome.trial is None else outcome.trial.found
+    before = search.trials[0].jacobian
+    after = before if outcome.trial is None else outcome.trial.jacobian
     residual = tuple(
         None if target is None or not np.isfinite(x) else float(x - target)
         for target, x in zip(targets, after.x.tolist(), strict=True)
     )
-    found = _named(after.scene, search.scene) if outcome.trial is not None else search.scene
-    scenes = [found if trial is outcome.trial else trial.found.scene for trial in outcome.path]
+    scene = _named(after.scene, search.scene) if outcome.trial is not None else search.scene
+    scenes = [scene if trial is outcome.trial else trial.jacobian.scene for trial in outcome.path]
     return Design(
-        scene=found,
+        scene=scene,
         start=search.scene,
         targets=targets,
         reached=outcome.reached,
@@ -324,11 +327,11 @@ def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Soluti
     )
 
 
-def _named(found: Scene, start: Scene) -> Scene:
+def _named(scene: Scene, start: Scene) -> Scene:
     """Give the scene found a name of its own: files are named after it."""
     name = start.name if start.name.endswith("-design") else f"{start.name}-design"
-    changed = [one for one, text in texts(found.text) if text != text_at(start.text, one)]
-    return load(in_units_of(found, start, changed).as_dict() | {"name": name})
+    changed = [one for one, text in texts(scene.text) if text != text_at(start.text, one)]
+    return load(in_units_of(scene, start, changed).as_dict() | {"name": name})
 
 
 def _message(search: TrialLog, outcome: Solution, residual: tuple[float | None, ...]) -> str:
@@ -348,22 +351,22 @@ def _message(search: TrialLog, outcome: Solution, residual: tuple[float | None, 
 
 def _in_the_way(search: TrialLog, trial: Trial) -> list[str]:
     """Say which bounds and which edges of the part hold the search."""
-    unknowns, found = search.unknowns, []
+    unknowns, reasons = search.unknowns, []
     for row, side in enumerate(search.sides):
         if not trial.slope[row].any():
-            found.append(f"the critical point of side {side} does not depend on what is varied")
+            reasons.append(f"the critical point of side {side} does not depend on what is varied")
     for k, name in enumerate(unknowns.names):
         for end, word in ((unknowns.lo[k], "lower"), (unknowns.hi[k], "upper")):
             if np.isfinite(end) and abs(trial.at[k] - end) < 1e-6:
-                found.append(f"{name} is at its {word} bound")
+                reasons.append(f"{name} is at its {word} bound")
     size = float(np.ptp(search.scene.vertices, axis=0).max())
     words = ("the left end", "the right end", "the level")
-    for k, slack in enumerate(trial.found.slack.tolist()):
+    for k, slack in enumerate(trial.jacobian.slack.tolist()):
         if slack < 2.0 * KEPT * size:
-            found.append(
+            reasons.append(
                 f"the centre of mass is at {words[k % 3]} of side {k // 3}: beyond it the part tips over"
             )
-    return found
+    return reasons
 
 
 # ----------------------------------------------------------------
@@ -413,8 +416,8 @@ def limit_sets_along(
 
 def _limit_sets(scene: Scene) -> tuple[Extents, ...]:
     graph = transitions(scene.map, grid(scene.domain, cells=CELLS))
-    found = []
+    extents = []
     for attractor in attractors(graph):
         limit = limit_set(graph, attractor)
-        found.append(limit.extents if limit.converged else attractor.extents)
-    return tuple(found)
+        extents.append(limit.extents if limit.converged else attractor.extents)
+    return tuple(extents)

@@ -137,8 +137,8 @@ class GoalDesign(Tabled):
             )
             for name in self.varied
         ]
-        found = "design" if self.room > 0.0 else "nearest miss"
-        numbers = [Column("before", show=".6g"), Column(found, show=".6g")]
+        heading = "design" if self.room > 0.0 else "nearest miss"
+        numbers = [Column("before", show=".6g"), Column(heading, show=".6g")]
         numbers += [Column(head, show=".4g") for head in ("lowest", "highest")]
         caption = f"{self.scene.name}: {self.message}"
         return (Table(("quantity", *numbers, "unit"), rows, caption, self.model.sentence),)
@@ -147,17 +147,8 @@ class GoalDesign(Tabled):
         """Give it as plain tables for JSON."""
         return as_table(
             scene=self.scene.as_dict(),
-            **picked(
-                self,
-                "message",
-                "room",
-                "room_before",
-                "lacking_before",
-                "leaving",
-                "verdict",
-                "ruled_out",
-                "evaluations",
-            ),
+            **picked(self, "message", "room", "room_before", "lacking_before"),
+            **picked(self, "leaving", "verdict", "ruled_out", "evaluations"),
             quantities={
                 name: {"before": self.before.value(name), "after": self.scene.value(name), "bounds": ends}
                 for name, ends in self.varied.items()
@@ -184,7 +175,9 @@ class _GoalSearch:
         if scene is None or why:
             return room, room, why
         slack = 0.0 if self.laid else least_slack(scene.bare_map)
-        if slack < 0.0:  # after all designs that none leaves, and before those that do not meet the goal
+        if (
+            slack < 0.0
+        ):  # after all designs that no start leaves, and before all designs that do not meet the goal
             return end + max(slack, -end), room, LEAVES
         return end + room, room, ""
 
@@ -312,18 +305,27 @@ def design_for_goal(
         search.run(bounds_of(start, vary, bounds), evaluations - search.evaluations, seed)
     ends, (_, room, made) = search.bounds, search.best
     name = start.name if start.name.endswith("-design") else f"{start.name}-design"
-    found = load(made.as_dict() | {"name": name})
+    design = load(made.as_dict() | {"name": name})
     asked = (
         start.goal,
         *([Reaches(start.goal.x, start.goal.side)] if isinstance(start.goal, OrientedBeyond) else []),
     )
     goals = tuple(laid_goal(goal, start.goal.laid) for goal in asked)
-    verdict = Query.of(found, goals).prove().verdict if room > 0.0 else "undecided"
+    verdict = Query.of(design, goals).prove().verdict if room > 0.0 else "undecided"
     lost = why in (LOST, NO_PART)
     return GoalDesign(
-        found, start, ends, room, None if lost else room_before, why, _leaving(found, start.goal.laid), verdict,
-        dict(search.ruled_out), search.evaluations, time.perf_counter() - begin,
-    )  # fmt: skip
+        scene=design,
+        before=start,
+        varied=ends,
+        room=room,
+        room_before=None if lost else room_before,
+        lacking_before=why,
+        leaving=_leaving(design, start.goal.laid),
+        verdict=verdict,
+        ruled_out=dict(search.ruled_out),
+        evaluations=search.evaluations,
+        seconds=time.perf_counter() - begin,
+    )
 
 
 def _leaving(scene: Scene, laid: Laid) -> float | None:

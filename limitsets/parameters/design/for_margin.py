@@ -62,7 +62,7 @@ class _Best:
         self.hard: list[Signs] = list(search.hard)
         self.unknowns: list[float] = []
         self.scene: Scene | None = None
-        self.found: Estimate | None = None
+        self.estimate: Estimate | None = None
         self.tried = 0
 
     def rate(self, unknowns: Sequence[float]) -> float:
@@ -71,20 +71,20 @@ class _Best:
         self.tell("designs near the best", min(self.tried, self.of), self.of)
         scene = self.search.scene_of(unknowns)
         scene = None if scene is None else self.made(scene)
-        rating, found = self.search.rated(scene, self._estimate)
-        if found is not None and (self.found is None or found.margin > self.found.margin):
-            self.unknowns, self.scene, self.found = [float(u) for u in unknowns], scene, found
+        rating, estimate = self.search.rated(scene, self._estimate)
+        if estimate is not None and (self.estimate is None or estimate.margin > self.estimate.margin):
+            self.unknowns, self.scene, self.estimate = [float(u) for u in unknowns], scene, estimate
         return rating
 
     def _estimate(self, scene: Scene) -> Estimate | None:
         """Estimate a margin; where it may be the best, on all corners."""
         about = scene, self.search.tolerance, self.search.side
-        found = estimated(*about, hard=self.hard, steps=FINE, close=FINELY)
-        if found is None or not found.margin > (0.0 if self.found is None else self.found.margin):
-            return found
-        new = [signs for signs in failing(*about, found, found.margin) if signs not in self.hard]
+        estimate = estimated(*about, hard=self.hard, steps=FINE, close=FINELY)
+        if estimate is None or not estimate.margin > (0.0 if self.estimate is None else self.estimate.margin):
+            return estimate
+        new = [signs for signs in failing(*about, estimate, estimate.margin) if signs not in self.hard]
         self.hard[:0] = new
-        return on_all_corners(*about, self.hard) if new else found
+        return on_all_corners(*about, self.hard) if new else estimate
 
 
 def polished(
@@ -121,7 +121,7 @@ def polished(
         best.rate(row)
     for number, edge in enumerate(EDGES):
         share = (evaluations - best.tried) // (len(EDGES) - number)
-        if best.found is None or share < 1:
+        if best.estimate is None or share < 1:
             break
         minimize(
             lambda row: -best.rate(row),
@@ -131,9 +131,9 @@ def polished(
             options={"initial_simplex": _simplex(best.unknowns, edge), "maxfev": share, "adaptive": True},
         )
     search.evaluations += best.tried
-    if best.scene is None or best.found is None:
+    if best.scene is None or best.estimate is None:
         return None
-    return best.scene, best.found
+    return best.scene, best.estimate
 
 
 def _simplex(corner: Sequence[float], edge: float) -> NDArray[np.float64]:
@@ -193,25 +193,25 @@ def orders_of(scene: Scene) -> list[Scene]:
     sides = scene.text["part"].get("sides")
     if sides is None or len(sides) != 3:
         return [scene]
-    found = []
+    scenes = []
     for order in permutations(range(3)):
         tree = scene.as_dict()
         tree["part"]["sides"] = [sides[k] for k in order]
-        # the old centre of mass need not lie in it: the search begins elsewhere
+        # the old centre of mass may lie outside the new triangle: the search begins at another one
         left, right = (float(scene.sides.length[order[k]]) for k in (2, 0))
         mass = tree["part"]["mass"]
         if order != (0, 1, 2) and "center" in mass:
             mass["center"]["along"] = f"{0.6 * left:.4f} {scene.unit}"
             mass["center"]["above"] = f"{0.15 * min(left, right):.4f} {scene.unit}"
         elif order != (0, 1, 2):
-            # as far along each edge: what lies on the part lies on it
+            # the same shares along each edge: a point on the part stays on the part
             moved = np.linalg.solve(_edges(scene.vertices), _edges(triangle(scene.sides.length[list(order)])))
             for k, point in enumerate(mass.get("points", ())):
                 own = np.array([scene.value(f"part.mass.points[{k}].{word}") for word in "xy"])
                 x, y = (own - scene.vertices[0]) @ moved
                 point["x"], point["y"] = f"{x:.6f} {scene.unit}", f"{y:.6f} {scene.unit}"
-        found.append(load(tree))
-    return found
+        scenes.append(load(tree))
+    return scenes
 
 
 def _edges(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -274,9 +274,24 @@ class NoDesignError(AnswerError):
         self, evaluations: int, ruled_out: Mapping[str, int], miss: Scene | None, varied: Iterable[str]
     ) -> None:
         remedy = "widen the bounds, look at more designs, or ask the goal of another side"
-        found = f"none that feeds among {evaluations}"
-        super().__init__("the design", found, "one at least", f"{said(ruled_out)}; {remedy}")
+        super().__init__(
+            "the design",
+            f"none that feeds among {evaluations}",
+            "one at least",
+            f"{said(ruled_out)}; {remedy}",
+        )
         self.evaluations, self.ruled_out, self.miss, self.varied = evaluations, ruled_out, miss, tuple(varied)
+
+
+def _none_feeds(
+    searches: Sequence[DesignSearch], search: DesignSearch, nearest: Sequence[float], name: str
+) -> NoDesignError:
+    """Give the error of searches without a design, with the nearest miss if its part can be built."""
+    ruled_out = sum((each.ruled_out for each in searches), Counter[str]())
+    count, miss = sum(each.evaluations for each in searches), search.scene_of(nearest)
+    if miss is not None:
+        miss = load(_rounded(miss, search).as_dict() | {"name": name})
+    return NoDesignError(count, ruled_out, miss, search.bounds)
 
 
 @shown_in_notebooks
@@ -360,16 +375,24 @@ def robust_design(
     # a part whose masses are given is made as it is written
     lead = "center" in start.text["part"]["mass"]
     searches = [
-        DesignSearch(one, vector, on, bounds_of(one, names, given), number, lead, everywhere)
+        DesignSearch(
+            scene=one,
+            tolerance=vector,
+            side=on,
+            bounds=bounds_of(one, names, given),
+            order=number,
+            lead=lead,
+            everywhere=everywhere,
+        )
         for number, one in enumerate(orders_of(start) if orders else [start])
     ]
     if keep is not None:
         best_yet = [0.0]
 
-        def better(scene: Scene, found: Estimate) -> None:
-            if found.margin > best_yet[0] and math.isfinite(found.x):
-                best_yet[0] = found.margin
-                keep(_with_purpose(scene, found.x, on, texts, f"{start.name}-robust"))
+        def better(scene: Scene, estimate: Estimate) -> None:
+            if estimate.margin > best_yet[0] and math.isfinite(estimate.x):
+                best_yet[0] = estimate.margin
+                keep(_with_purpose(scene, estimate.x, on, texts, f"{start.name}-robust"))
 
         for one in searches:
             one.better = better
@@ -377,30 +400,23 @@ def robust_design(
     polish = max(evaluations // POLISH, 1)
     best = polished(search, population[:POLISHED], lambda made: _rounded(made, search), polish, tell)
     if best is None:
-        ruled_out = sum((each.ruled_out for each in searches), Counter[str]())
-        count, miss = sum(each.evaluations for each in searches), search.scene_of(population[0])
-        if miss is not None:
-            miss = load(_rounded(miss, search).as_dict() | {"name": f"{start.name}-robust"})
-        raise NoDesignError(count, ruled_out, miss, search.bounds)
-    made, found = best
-    x = round(found.x, DECIMALS_OF_X)
+        raise _none_feeds(searches, search, population[0], f"{start.name}-robust")
+    made, estimate = best
+    x = round(estimate.x, DECIMALS_OF_X)
     design = _with_purpose(made, x, on, texts, f"{start.name}-robust")
     before = on_all_corners(start, vector, on)
     history = tuple(candidate for each in searches for candidate in each.history)
     feeding = throws_to_feed(design, x, on, seed=seed)
     values = {name: design.value(name) for name in search.bounds}
-    own_option = Option(Candidate(values, found, search.order), feeding)
+    own_option = Option(Candidate(values, estimate, search.order), feeding)
     front = front_of(searches, history, own_option, on, seed, tell)
     seconds = time.perf_counter() - begin
-    known = before is not None and before.margin > 0.0
-    fed = throws_to_feed(start, before.x, on, seed=seed) if before is not None and known else None
-    margins: tuple[Margin, ...] = ()
-    own: tuple[Margin, ...] = ()
-    if prove > 0.0:
-        margins = _proved(design, fed_at(x, on, ranges), texts, prove, tell, "the design")
-        if before is not None and known:
-            goals = fed_at(round(before.x, DECIMALS_OF_X), on, ranges)
-            own = _proved(start, goals, texts, prove, tell, "the scene before")
+    margins = _proved(design, fed_at(x, on, ranges), texts, prove, tell, "the design")
+    fed, own = None, tuple[Margin, ...]()
+    if before is not None and before.margin > 0.0:
+        fed = throws_to_feed(start, before.x, on, seed=seed)
+        goals = fed_at(round(before.x, DECIMALS_OF_X), on, ranges)
+        own = _proved(start, goals, texts, prove, tell, "the scene before")
     return RobustDesign(
         scene=design,
         goals=fed_at(x, on, ranges),
@@ -408,7 +424,7 @@ def robust_design(
         side=on,
         varied=tuple(search.bounds),
         tolerance=texts,
-        sampled=found,
+        sampled=estimate,
         margins=margins,
         lead=counterweight_of(design),
         feeding=feeding,
@@ -426,16 +442,19 @@ def robust_design(
 def _proved(
     scene: Scene, goals: Sequence[Goal], texts: Mapping[str, str], seconds: float, tell: Tell, whose: str
 ) -> tuple[Margin, ...]:
-    """Bracket the joint margin of each goal by itself: one may be proved much farther than the other."""
-    found = []
-    for goal in goals:
+    """Bracket the joint margin of each goal by itself: one may be proved much farther than the other.
+
+    Without time for it there are no margins.
+    """
+    margins = []
+    for goal in goals if seconds > 0.0 else ():
         what = f"margin of {whose}, {goal.kind}"
 
         def told(share: float, what: str = what) -> None:
             tell(what, math.floor(100 * share), 100)
 
-        found.append(joint_margin(scene, (goal,), texts, seconds=seconds / len(goals), tell=told))
-    return tuple(found)
+        margins.append(joint_margin(scene, (goal,), texts, seconds=seconds / len(goals), tell=told))
+    return tuple(margins)
 
 
 def _side(scene: Scene, side: int | None) -> int:

@@ -130,14 +130,14 @@ NAMED = {("landing", "angle"), ("release", "tipping"), ("slip", "press")}
 ASKED = [about for about in ASSUMPTIONS if (about.effect, about.what) in NAMED]
 
 
-def validity_slack(scene: Scene, found: InvariantIntervals) -> float:
+def validity_slack(scene: Scene, invariant: InvariantIntervals) -> float:
     """Give what is to spare before an assumption of `ASKED` fails: below 0 one does.
 
     Parameters
     ----------
     scene : Scene
         The scene.
-    found : InvariantIntervals
+    invariant : InvariantIntervals
         Where the part is kept.
 
     Returns
@@ -158,12 +158,12 @@ def validity_slack(scene: Scene, found: InvariantIntervals) -> float:
     rows = [Row(about, about.terms(scene, None)) for about in ASKED]
     sizes = {"angle": scene.sides.corner, "length": scene.sides.length, "": np.ones(len(scene.sides))}
     spare = np.inf
-    for side, ends in enumerate(np.stack([found.lo, found.hi], axis=1)):
+    for side, ends in enumerate(np.stack([invariant.lo, invariant.hi], axis=1)):
         if np.isfinite(ends).all():
             numbers = assumed(params, params, side, ends, ends)
             shares = [row.spare(numbers, side).min() / sizes[row.about.dimension][side] for row in rows]
             spare = min(spare, *shares)
-    # a number that is not known is no number to rely on
+    # an unknown number cannot be relied on
     return float(spare) if np.isfinite(spare) else -9.0
 
 
@@ -210,7 +210,7 @@ def bounds_of(
     {'throw.speed': (2.120469229098313, 3.0), 'arm.length': (20.0, 42.0)}
     """
     given = dict(given or {})
-    found = {}
+    bounds = {}
     for name in dict.fromkeys([*(vary or ([] if given else _usual(scene))), *given]):
         lo, hi = (
             own if end is None else float(end)
@@ -220,8 +220,8 @@ def bounds_of(
             raise AnswerError(
                 "the bounds", f"{lo:g} to {hi:g}", "a lower and a higher one", "give both", key=name
             )
-        found[name] = lo, hi
-    return found
+        bounds[name] = lo, hi
+    return bounds
 
 
 def of_the_arm(scene: Scene) -> list[str]:
@@ -243,7 +243,7 @@ def _usual(scene: Scene) -> list[str]:
 
 
 def _own(scene: Scene, name: str) -> tuple[float, float]:
-    """Give bounds of one quantity which hold its value; beyond the usual ones a throw may have half or twice of it."""
+    """Give bounds of one quantity that contain its value; outside the usual ones a throw may have half or twice it."""
     dimension, value = find(name).dimension, scene.value(name)
     corners, size = scene.vertices, float(scene.sides.length.mean())
     half, twice = sorted((0.5 * value, 2.0 * value))
@@ -304,14 +304,14 @@ class Candidate:
     ----------
     values : dict of str to float
         What was varied [scene's units].
-    found : Estimate
+    estimate : Estimate
         Its margin by floats.
     order : int
         Which of the scenes that the search began with: another order of the sides.
     """
 
     values: dict[str, float]
-    found: Estimate
+    estimate: Estimate
     order: int
 
 
@@ -372,11 +372,11 @@ class DesignSearch:
         def quickly(one: Scene) -> Estimate | None:
             return estimated(one, self.tolerance, self.side, hard=self.hard, above=above)
 
-        rating, found = self.rated(scene, quickly)
-        if scene is not None and found is not None:
+        rating, estimate = self.rated(scene, quickly)
+        if scene is not None and estimate is not None:
             if self.better is not None:
-                self.better(scene, found)
-            self.history.append(Candidate(self._values(scene), found, self.order))
+                self.better(scene, estimate)
+            self.history.append(Candidate(self._values(scene), estimate, self.order))
         return rating
 
     def rated(
@@ -387,15 +387,17 @@ class DesignSearch:
         if scene is None or lacking < 0.0:
             self.ruled_out[NO_PART if scene is None else NO_WEIGHT] += 1
             return lacking, None
-        found = estimate(scene)
-        if found is None or not found.margin > 0.0:
-            self.ruled_out[LOST if found is None else OTHER_SIDE] += 1
-            return (-10.0 if found is None else found.margin - self.strict), None
-        lacking = self.broken(scene, found)
+        estimated_margin = estimate(scene)
+        if estimated_margin is None or not estimated_margin.margin > 0.0:
+            self.ruled_out[LOST if estimated_margin is None else OTHER_SIDE] += 1
+            return (-10.0 if estimated_margin is None else estimated_margin.margin - self.strict), None
+        lacking = self.broken(scene, estimated_margin)
         if lacking < 0.0:
-            self.ruled_out[LEAVES if validity_slack(scene, found.invariant) >= 0.0 else ASSUMPTION] += 1
+            self.ruled_out[
+                LEAVES if validity_slack(scene, estimated_margin.invariant) >= 0.0 else ASSUMPTION
+            ] += 1
             return max(lacking, -1.0) if self.strict else lacking, None
-        return found.margin, found
+        return estimated_margin.margin, estimated_margin
 
     def lacking(self, scene: Scene) -> float:
         """Rate a part that no lead weight makes: -20 or below; 0 where one does."""
@@ -405,9 +407,9 @@ class DesignSearch:
         lacking = max(weight.share - MOST_LEAD, -weight.inside / float(scene.sides.length.mean()))
         return 0.0 if lacking <= 0.0 else -20.0 - min(9.0, lacking)
 
-    def broken(self, scene: Scene, found: Estimate) -> float:
+    def broken(self, scene: Scene, estimate: Estimate) -> float:
         """Rate a design outside of the model, or one that loses parts: below 0; 0 or above for any other."""
-        spare = validity_slack(scene, found.invariant)
+        spare = validity_slack(scene, estimate.invariant)
         if self.everywhere:
             spare = min(spare, least_slack(scene.bare_map) / scene.arm_length)
         return max(spare, -9.0)
@@ -423,10 +425,10 @@ class DesignSearch:
     def harden(self, unknowns: Sequence[float]) -> None:
         """Try a design on all corners at nearly its margin, and keep those at which it fails."""
         scene = self.scene_of(unknowns)
-        found = None if scene is None else estimated(scene, self.tolerance, self.side, hard=self.hard)
-        if scene is None or found is None or not found.margin > 0.0:
+        estimate = None if scene is None else estimated(scene, self.tolerance, self.side, hard=self.hard)
+        if scene is None or estimate is None or not estimate.margin > 0.0:
             return
-        wrong = failing(scene, self.tolerance, self.side, found, 0.97 * found.margin)
+        wrong = failing(scene, self.tolerance, self.side, estimate, 0.97 * estimate.margin)
         new = [signs for signs in wrong if signs not in self.hard]
         self.hard[:] = (new[: MOST_HARD // 3] + self.hard)[:MOST_HARD]
 
@@ -437,7 +439,7 @@ class DesignSearch:
         end, step = self.evaluations + max(evaluations, 1), 0
         begin = self.evaluations
         while self.evaluations < end:
-            found = differential_evolution(
+            evolution = differential_evolution(
                 lambda unknowns: -self.rate(unknowns),
                 [(0.0, 1.0)] * len(self.bounds),
                 maxiter=GENERATIONS,
@@ -449,8 +451,8 @@ class DesignSearch:
                 recombination=0.9,
             )
             step += 1
-            order = np.argsort(found.population_energies)
-            population, ratings = found.population[order], -found.population_energies[order]
+            order = np.argsort(evolution.population_energies)
+            population, ratings = evolution.population[order], -evolution.population_energies[order]
             self.harden(population[0])
             tell("designs", self.evaluations - begin, evaluations)
         return population, ratings

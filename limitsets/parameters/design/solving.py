@@ -157,7 +157,7 @@ class Trial(NamedTuple):
     ----------
     at : ndarray, shape (k,)
         Where, as the solver sees it.
-    found : CriticalJacobian
+    jacobian : CriticalJacobian
         Its critical points and their derivatives by the quantities.
     x : ndarray, shape (m,)
         Critical points that have a target.
@@ -166,7 +166,7 @@ class Trial(NamedTuple):
     """
 
     at: Array
-    found: CriticalJacobian
+    jacobian: CriticalJacobian
     x: Array
     slope: Array
 
@@ -220,15 +220,15 @@ class TrialLog:
             scene = with_present(self.scene, dict(zip(self.unknowns.names, values, strict=True)))
         except (LimitsetsError, OverflowError):  # a part that tips over on one of its sides, or cannot be
             return None
-        found = critical_jacobian(scene, *self.unknowns.names)
-        slope = found.matrix[self.sides] * self._rates(found)
-        self.trials.append(Trial(seen, found, found.x[self.sides], slope))
+        jacobian = critical_jacobian(scene, *self.unknowns.names)
+        slope = jacobian.matrix[self.sides] * self._rates(jacobian)
+        self.trials.append(Trial(seen, jacobian, jacobian.x[self.sides], slope))
         return self.trials[-1] if self.is_whole(self.trials[-1]) else None
 
     def require_effect(self, first: Trial | None) -> None:
         """Refuse to vary what no critical point depends on."""
         for k, name in enumerate(self.unknowns.names):
-            if first is not None and not np.nan_to_num(first.found.matrix[:, k], nan=1.0).any():
+            if first is not None and not np.nan_to_num(first.jacobian.matrix[:, k], nan=1.0).any():
                 raise AnswerError(
                     "a quantity to vary",
                     name,
@@ -236,13 +236,13 @@ class TrialLog:
                     "leave it out (where a throw is given by kappa, gravity is part of that)",
                 )
 
-    def _rates(self, found: CriticalJacobian) -> Array:
+    def _rates(self, jacobian: CriticalJacobian) -> Array:
         """Return what one step of each of the solver's numbers changes its quantity by."""
-        return np.where(self.unknowns.logs, found.values, self.unknowns.scale)
+        return np.where(self.unknowns.logs, jacobian.values, self.unknowns.scale)
 
     def rates(self, trial: Trial) -> Array:
         """Return the derivatives of the quantities by the solver's numbers."""
-        return self._rates(trial.found)
+        return self._rates(trial.jacobian)
 
     def is_whole(self, trial: Trial) -> bool:
         """Whether all that is wanted is there, with derivatives."""
@@ -367,9 +367,9 @@ def continued(search: TrialLog, first: Trial, step: float) -> Solution:
         start = search.unknowns.inside(ahead)
         if search.at(start) is None:
             start = last.at
-        found = solved(search, start, goal, MOST_OF_STAGE, within)
-        if found.reached and found.trial is not None:
-            path, share = [*path, found.trial], to
+        solution = solved(search, start, goal, MOST_OF_STAGE, within)
+        if solution.reached and solution.trial is not None:
+            path, share = [*path, solution.trial], to
         else:
             step *= 0.5
     return Solution(path[-1], path, share == 1.0)
@@ -381,10 +381,10 @@ def staged(search: TrialLog, first: Trial, count: int) -> Solution:
     try:
         for stage in range(1, count + 1):
             search.wanted = wanted if stage == count else begin + stage / count * (wanted - begin)
-            found = continued(search, path[-1], 1.0)
-            if not found.reached or found.trial is None:
+            solution = continued(search, path[-1], 1.0)
+            if not solution.reached or solution.trial is None:
                 return Solution(path[-1], path, False)
-            path.append(found.trial)
+            path.append(solution.trial)
     finally:
         search.wanted = wanted
     return Solution(path[-1], path, True)
@@ -434,11 +434,11 @@ class _Model:
 
     def slack(self, seen: Array) -> Array:
         base, _ = self.look(seen)
-        return np.asarray(base.found.slack + self.slack_slope(seen) @ (seen - base.at) - self.kept)
+        return np.asarray(base.jacobian.slack + self.slack_slope(seen) @ (seen - base.at) - self.kept)
 
     def slack_slope(self, seen: Array) -> Array:
         base, _ = self.look(seen)
-        return np.asarray(base.found.slack_matrix * self.search.rates(base))
+        return np.asarray(base.jacobian.slack_matrix * self.search.rates(base))
 
 
 def _minimised(model: _Model, start: Trial, cost: Any, slope: Any, more: list[dict[str, Any]]) -> None:
@@ -490,9 +490,9 @@ def nearest_to_start(search: TrialLog, reached: Trial, center: Array) -> Trial:
     _minimised(model, reached, cost, slope, [equal])
     near = [trial for trial in search.trials[before:] if search.is_whole(trial) and search.cost(trial) < 1e-2]
     for trial in sorted(near, key=lambda each: cost(each.at) + search.cost(each))[:3]:
-        found = _tightened(search, trial)
-        if found is not None and cost(found.at) < cost(reached.at):
-            return found
+        nearer = _tightened(search, trial)
+        if nearer is not None and cost(nearer.at) < cost(reached.at):
+            return nearer
     return reached
 
 

@@ -126,7 +126,7 @@ def fit(
     tell("profiles", 2, 3)
     threshold = threshold_of(1, len(film), len(start.names))
     best, ends = profiles(own, best, threshold, start)
-    return _answer(chosen, own, best, ends, start, threshold, remark, begin)
+    return _answer(chosen, own, best, ends=ends, start=start, threshold=threshold, remark=remark, begin=begin)
 
 
 def _film(throws: Throws | str | Path, scene: Scene) -> tuple[Throws, DataError | None]:
@@ -189,9 +189,9 @@ def _answer(
         if math.isinf(lo) and values[j] < NOTHING * hi:
             values[j] = 0.0
         scatters.append(Scatter(float(values[j]), max(lo, 0.0), hi, not own.rows.known))
-    found = tuple(quantities)
+    fitted = tuple(quantities)
     speed, landing = scatters
-    new = fitted_scene(scene, found, speed, landing)
+    new = fitted_scene(scene, fitted, speed, landing)
     told = own.told(values[None])
     loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
     misses = own.rows.throws.x_after - told.after[0]
@@ -200,33 +200,35 @@ def _answer(
         + (told.per_log_speed[0] * values[-2]) ** 2
         + loose[0, 0] ** 2
     )
-    names = tuple(each.name for each in found)
+    names = tuple(each.name for each in fitted)
     error = own.rows.error
-    if not own.rows.known:  # what the answer may be sharpened to is then told with all scatter as one
+    if not own.rows.known:  # the gain of further throws is then computed with all scatter as one
         error = np.full(len(error), landing.value / math.sqrt(2.0))
     throws = own.rows.throws
     asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value), throws.corner)
     more = further_throws(asked, throws.x_before, own.rows.side, error)
+    misread, misread_rate = _misread(own.rows, len(scene.sides))
     return Fit(
-        new,
-        scene,
-        own.rows,
-        found,
-        held,
-        undetermined,
-        speed,
-        landing,
-        float(np.mean(own.rows.error)) if own.rows.known else None,
-        *_misread(own.rows, len(scene.sides)),
-        misfit_of(scene, start),
-        remark,
-        misses,
-        sizes,
-        more,
-        time.perf_counter() - begin,
-        own,
-        best,
-        threshold,
+        scene=new,
+        given=scene,
+        rows=own.rows,
+        quantities=fitted,
+        held=held,
+        undetermined=undetermined,
+        speed=speed,
+        landing=landing,
+        error=float(np.mean(own.rows.error)) if own.rows.known else None,
+        misread=misread,
+        misread_rate=misread_rate,
+        misfit=misfit_of(scene, start),
+        explained=remark,
+        residuals=misses,
+        deviations=sizes,
+        further=more,
+        seconds=time.perf_counter() - begin,
+        likelihood=own,
+        best=best,
+        threshold=threshold,
     )
 
 
@@ -314,13 +316,13 @@ def simulated_throws(
     if corner:
         places, after = places - scene.sides.a[sides], after - scene.sides.a[ends]
     return Throws(
-        places + error * draw.standard_normal(n),
-        sides,
-        after + error * draw.standard_normal(n),
-        (ends + wrong * draw.integers(1, count, n)) % count,
-        np.full(n, error if error > 0.0 else np.nan),
-        np.zeros(n, dtype=bool),
-        np.arange(2, n + 2),
+        x_before=places + error * draw.standard_normal(n),
+        side_before=sides,
+        x_after=after + error * draw.standard_normal(n),
+        side_after=(ends + wrong * draw.integers(1, count, n)) % count,
+        error=np.full(n, error if error > 0.0 else np.nan),
+        follows=np.zeros(n, dtype=bool),
+        row=np.arange(2, n + 2),
         corner=corner,
     )
 

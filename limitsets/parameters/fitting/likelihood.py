@@ -90,13 +90,13 @@ def predicted(
     if corner:
         after = after - params.a[:, (side + branch) % len(scene.sides)]
     return Predicted(
-        after,
-        slope,
-        (fast - slow) / (2 * STEP),
-        decides,
-        (beyond - short) / (2 * move),
-        (fast_decides - slow_decides) / (2 * STEP),
-        stack.possible[:, None],
+        after=after,
+        slope=slope,
+        per_log_speed=(fast - slow) / (2 * STEP),
+        decides=decides,
+        decides_slope=(beyond - short) / (2 * move),
+        decides_per_log_speed=(fast_decides - slow_decides) / (2 * STEP),
+        possible=stack.possible[:, None],
     )
 
 
@@ -165,7 +165,7 @@ class Rows:
 
 
 def as_recorded(throws: Throws, error: Array, known: bool, sides: int) -> Rows:
-    """Take every row at its word; one that ends on neither of the two sides it could counts as a jog."""
+    """Take every row as recorded; a row that ends on neither possible side counts as a jog."""
     flipped = throws.side_after == (throws.side_before + 1) % sides
     return Rows(throws, throws.side_before, flipped.astype(np.int64), error, known)
 
@@ -208,7 +208,7 @@ def assigned(rows: Rows, scene: Scene, values: Mapping[str, float], spread: floa
     for k in range(count):
         # one reading for both rows: it is as right or wrong as it was in the row before
         recorded = (before[k - 1] + own[k - 1]) % sides if shared[k] else throws.side_before[k]
-        # wrong before and after at once would be a way out for whatever lands where no throw can
+        # with both sides wrong, a row could explain a landing that no throw can make
         single = (after[:, 0] == throws.side_after[k]) & ~shared[k]
         price = np.where(side == recorded, right, np.where(single, wrong, -np.inf))
         best = int(np.argmax(fits[:, k] + price))
@@ -295,9 +295,9 @@ class Likelihood:
 
     def values(self, at: Array) -> Array:
         """Return quantities and scatters, of shape (m, p + 2); the sign of a scatter means nothing."""
-        found = self.centre + self.scale * np.atleast_2d(at)
-        found[:, -SCATTERS:] = np.abs(found[:, -SCATTERS:])
-        return found
+        numbers = self.centre + self.scale * np.atleast_2d(at)
+        numbers[:, -SCATTERS:] = np.abs(numbers[:, -SCATTERS:])
+        return numbers
 
     def at(self, values: Array) -> Array:
         """Return the numbers at which quantities and scatters have these values."""
@@ -416,7 +416,7 @@ def further_throws(asked: Question, x: Array, side: NDArray[np.int64], error: Ar
     scene, names = asked.scene, asked.names
     known = information(asked, x, side, error).sum(axis=0)
     known += np.eye(len(names)) / BEFORE**2
-    found = []
+    further = []
     size = float(np.mean(error)) if np.mean(error) > 0 else asked.scatter[1]
     for own in range(len(scene.sides)):
         near, far = scene.sides.a[own], scene.arm_length
@@ -426,5 +426,5 @@ def further_throws(asked: Question, x: Array, side: NDArray[np.int64], error: Ar
         best = int(np.argmax(gains))
         ratio = np.diag(np.linalg.inv(known)) / np.diag(np.linalg.inv(known + MORE * there[best]))
         shrinks = {name: float(np.sqrt(each)) for name, each in zip(names, ratio, strict=True)}
-        found.append(Further(float(places[best]), own, 0.5 * float(gains[best]), shrinks))
-    return tuple(sorted(found, key=lambda each: -each.gain))
+        further.append(Further(float(places[best]), own, 0.5 * float(gains[best]), shrinks))
+    return tuple(sorted(further, key=lambda each: -each.gain))

@@ -90,8 +90,8 @@ def misfit_of(scene: Scene, start: Start) -> Misfit:
     k = [int(np.argmin(loss.sum(axis=1)))]
 
     def white(miss: Array | None) -> Array:
-        found: Array = whitened(rows, told, speed[k], landing[k], miss).residual[0]
-        return found
+        residuals: Array = whitened(rows, told, speed[k], landing[k], miss).residual[0]
+        return residuals
 
     columns = np.stack([white(column[None]) for column in slopes.T], axis=1)
     throws = rows.throws
@@ -117,10 +117,10 @@ def misfit(
         Lines of the file.
     """
     drawn = np.random.default_rng(13).standard_normal((DRAWS, residual.size))
-    found = _cleared(residual[None], slopes)
-    ratio, others = _ratio(found)[0], _ratio(_cleared(drawn, slopes))
+    cleared = _cleared(residual[None], slopes)
+    ratio, others = _ratio(cleared)[0], _ratio(_cleared(drawn, slopes))
     outliers = (1.0 + np.count_nonzero(others >= ratio)) / (1.0 + DRAWS)
-    strange = tuple(int(each) for each in row[np.abs(found[0]) > NAMED])
+    strange = tuple(int(each) for each in row[np.abs(cleared[0]) > NAMED])
     return Misfit(float(outliers), _structure(residual, slopes, groups, x), strange)
 
 
@@ -256,15 +256,19 @@ def explained(
         return ""
     if refused is not None and impossible(scene, throws).sum() <= max(1, MOST_TYPED * len(throws)):
         raise refused
-    found = explanation(scene, throws, error, known, start)
-    if found is not None and (start is None or not found.fitted):
+    reading = explanation(scene, throws, error, known, start)
+    if reading is not None and (start is None or not reading.fitted):
         allowed = "throws that this machine can make"
         raise DataError(
-            "what the film shows", "no throws of this machine", allowed, found.said, file=throws.file or None
+            "what the film shows",
+            "no throws of this machine",
+            allowed,
+            reading.said,
+            file=throws.file or None,
         ) from refused
     if refused is not None:
         raise refused
-    return "" if found is None else found.said
+    return "" if reading is None else reading.said
 
 
 def explanation(
@@ -305,13 +309,13 @@ def explanation(
 
     now = math.inf if start is None else _cost(scene, start.rows, _values(start), 1.0)
     first = sorted(_readings(scene, throws), key=suits)[:FITTED]
-    found = [(reading, fitted(reading)) for reading in first]
-    plain, best = min(found, key=lambda pair: pair[1].cost)
+    judged = [(reading, fitted(reading)) for reading in first]
+    plain, best = min(judged, key=lambda pair: pair[1].cost)
     gained = best.start is not None and now - best.cost > EACH * len(throws)
     if gained and _holds(scene, best):
         return Explanation(plain.said, False)
-    found = [_closest(suits, fitted, make, grid) for make, grid in _families(scene, throws)]
-    reading, least = min(found, key=lambda pair: pair[1].cost)
+    judged = [_closest(suits, fitted, make, grid) for make, grid in _families(scene, throws)]
+    reading, least = min(judged, key=lambda pair: pair[1].cost)
     if now - least.cost > IN_ALL and _holds(scene, least):
         return Explanation(reading.said, True)
     return Explanation(plain.said, False) if gained and best.cost < least.cost else None

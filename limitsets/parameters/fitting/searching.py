@@ -89,11 +89,11 @@ def jacobian(scene: Scene, rows: Rows, names: tuple[str, ...], values: Array, un
     count = len(names)
     moves = np.concatenate([np.diag(units), -np.diag(units), np.zeros((1, count))]) * STEP
     told = rows.told(scene, dict(zip(names, (values + moves).T, strict=True)))
-    # a step that leads out of what can be is not made: the difference is one-sided there
+    # a step to an impossible scene is left out: the difference is one-sided there
     after = np.where(told.possible, told.after, told.after[-1])
     steps = STEP * (told.possible[:count] * 1.0 + told.possible[count:-1])
-    found: Array = ((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T
-    return found
+    derivatives: Array = ((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T
+    return derivatives
 
 
 def _least_squares(
@@ -110,8 +110,8 @@ def _least_squares(
         return np.where(np.isfinite(miss), miss, 1e6) if told.possible[0, 0] else refused
 
     def slopes(at: Array) -> Array:
-        found = -jacobian(scene, rows, names, values + units * at, units) / scale
-        return np.where(np.isfinite(found), found, 0.0)
+        slope = -jacobian(scene, rows, names, values + units * at, units) / scale
+        return np.where(np.isfinite(slope), slope, 0.0)
 
     # a hundredth of a unit of change is a step; nothing leads farther than half of one
     done = least_squares(
@@ -134,7 +134,7 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
     while True:
         spread = ROUGH * float(np.mean(scene.sides.length))
         for loss in LOSSES:
-            values = _least_squares(scene, rows, names, values, units, spread, loss)
+            values = _least_squares(scene, rows, names, values=values, units=units, scale=spread, loss=loss)
             here = dict(zip(names, values.tolist(), strict=True))
             told = rows.told(scene, {k: np.array([v]) for k, v in here.items()})
             spread = max(spread_of(rows.throws.x_after - told.after[0]), 1e-9 * scene.arm_length)
@@ -165,14 +165,22 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
     errors = np.sqrt(np.diag(covariance))
     known = scene.with_values(dict(zip(names, values.tolist(), strict=True)))
     undetermined = _undetermined(known, rows, names, together, slopes, errors)
-    return Start(rows, names, values, errors * units, held, undetermined, spread)
+    return Start(
+        rows=rows,
+        names=names,
+        values=values,
+        errors=errors * units,
+        held=held,
+        undetermined=undetermined,
+        spread=spread,
+    )
 
 
 def _undetermined(
     scene: Scene, rows: Rows, names: tuple[str, ...], held: dict[str, list[str]], slopes: Array, errors: Array
 ) -> dict[str, str]:
     """Find what goes with a quantity that is held, or moves when that one moves within what the landings leave open."""
-    found: dict[str, list[str]] = {}
+    movers: dict[str, list[str]] = {}
     for one, others in held.items():
         own = np.array([scene.value(one)])
         moved = jacobian(scene, rows, (one,), own, units_of_change(scene, (one,)))[:, 0]
@@ -180,8 +188,8 @@ def _undetermined(
         # a decision depends on all quantities, so that the radius of gyration goes with each
         for name, size in zip((*names, RADIUS), (*np.abs(follows) * TOLD / errors, np.inf), strict=True):
             if size > MOVED or name in others:
-                found.setdefault(name, []).append(one)
-    return {name: ", ".join(others) for name, others in found.items()}
+                movers.setdefault(name, []).append(one)
+    return {name: ", ".join(others) for name, others in movers.items()}
 
 
 def _require_flight(scene: Scene, rows: Rows) -> None:
@@ -275,15 +283,15 @@ def maximised(f: Function, start: Array, held: int | None = None, gain: float = 
             break
         there = at.copy()
         there[free] += step
-        found = _expanded(f, there, free)
-        if not found[0] > value:
+        expansion = _expanded(f, there, free)
+        if not expansion[0] > value:
             tries = np.repeat(at[None], SHARES.size, axis=0)
             tries[:, free] += SHARES[:, None] * step
             there = tries[int(np.argmax(f(tries)))]
-            found = _expanded(f, there, free)
-            if not found[0] > value:
+            expansion = _expanded(f, there, free)
+            if not expansion[0] > value:
                 break
-        at, (value, gradient, hessian) = there, found
+        at, (value, gradient, hessian) = there, expansion
     whole = np.zeros((at.size, at.size))
     whole[np.ix_(free, free)] = hessian
     return Maximum(at, value, whole)
@@ -337,20 +345,20 @@ def end_of_profile(
     near, near_root, far, far_root = 0.0, 0.0, math.inf, math.inf
     last, distance, wall = best.at, min(first, limit), False
     for _ in range(40):
-        # where the others went along so far that there is nothing they stay nearer to where they were
+        # if the other numbers moved so far that the function is undefined, they move less
         starts = last + SHARES_BACK[:, None] * (best.at + distance * along - last)
         starts[:, k] = best.at[k] + way * distance
         start = starts[int(np.argmax(f(starts) > WORST))]
-        found = maximised(f, start, held=k, gain=ROUGHLY)
-        nothing = found.value <= WORST
+        maximum = maximised(f, start, held=k, gain=ROUGHLY)
+        nothing = maximum.value <= WORST
         if not nothing:
-            along = (found.at - best.at) / distance
-        loss = 2.0 * (best.value - found.value)
+            along = (maximum.at - best.at) / distance
+        loss = 2.0 * (best.value - maximum.value)
         if loss < -0.01:
-            return End(start[k], maximised(f, found.at))
+            return End(start[k], maximised(f, maximum.at))
         root = math.sqrt(max(loss, 0.0))
         if root < wanted:
-            near, near_root, last = distance, root, found.at
+            near, near_root, last = distance, root, maximum.at
             if distance >= limit:
                 return End(way * math.inf)
         else:
@@ -405,14 +413,14 @@ def largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     known = rows.error**2 * (1.0 + told.slope[0] ** 2)
     left = math.sqrt(max(start.spread**2 - float(known.mean()), 0.01 * start.spread**2) / 2.0)
     share = left / max(float(np.median(np.abs(told.per_log_speed[0]))), 1e-12)
-    # landings that happen to agree better than their errors of measurement tell no more than these let them
+    # landings that agree better than their errors of measurement by chance tell no more than these errors allow
     sizes[: len(start.names)] *= max(1.0, math.sqrt(float(known.mean())) / start.spread)
     own = replace(own, scale=np.append(sizes, [share, left]))
     at = np.append(np.zeros(len(names)), [1.0, 1.0])
     best = maximised(own, _best_radius(own, at))
     for _ in range(ROUNDS):
-        found = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
-        again = assigned(own.rows, scene, found, start.spread)
+        best_values = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
+        again = assigned(own.rows, scene, best_values, start.spread)
         same = (again.side == own.rows.side).all() and (again.branch == own.rows.branch).all()
         if same:
             break
@@ -438,8 +446,8 @@ def largest_radius(scene: Scene) -> float:
 
     arms = scene.vertices - np.array(scene.centre)
     shares = np.vstack([arms.T, np.ones(len(arms))])
-    found = linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0])
-    return math.sqrt(max(-float(found.fun), 0.0))
+    program = linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0])
+    return math.sqrt(max(-float(program.fun), 0.0))
 
 
 def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
@@ -475,7 +483,7 @@ def profiles(
                 if limit < (1e-9 if quantity else 1e-3):
                     pair.append(End(way * math.inf))
                     continue
-                end = end_of_profile(own, best, k, way, threshold, first, limit)
+                end = end_of_profile(own, best, k, way=way, threshold=threshold, first=first, limit=limit)
                 if (math.isinf(end.at) or end.wall) and quantity and own.names[k] == RADIUS:
                     end = End(float(best.at[k]) + way * limit, wall=True)
                 pair.append(end)

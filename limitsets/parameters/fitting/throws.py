@@ -84,8 +84,8 @@ class Throws:
         """Differences of two readings of one place: a row that follows another with a reading of its own [length]."""
         again = np.flatnonzero(self.follows & ~self.shared)
         again = again[self.side_before[again] == self.side_after[again - 1]]
-        found: Array = self.x_before[again] - self.x_after[again - 1]
-        return found
+        differences: Array = self.x_before[again] - self.x_after[again - 1]
+        return differences
 
 
 def read_throws(file: str | Path, scene: Scene) -> Throws:
@@ -167,7 +167,18 @@ def _throws(
     corner = CORNERS[0] in values
     before, after = (np.array(values[each], dtype=np.float64) for each in (CORNERS if corner else PLACES))
     start, end = (np.array(values[each], dtype=np.int64) for each in SIDES)
-    return Throws(before, start, after, end, np.array(error), follows, np.array(lines), name, corner, unit)
+    return Throws(
+        x_before=before,
+        side_before=start,
+        x_after=after,
+        side_after=end,
+        error=np.array(error),
+        follows=follows,
+        row=np.array(lines),
+        file=name,
+        corner=corner,
+        unit=unit,
+    )
 
 
 def _rows(path: Path, name: str) -> list[tuple[int, list[str]]]:

@@ -77,7 +77,7 @@ class Ray:
 
     def __init__(self, query: Query, tolerance: Tolerance, signs: Signs) -> None:
         self.query, self.tolerance, self.signs = query, tolerance, signs
-        self.found = Bracket()
+        self.bracket = Bracket()
         self.end: Fraction | None = None
 
     def _at(self, size: Fraction) -> tuple[SceneBox | None, dict[str, str]]:
@@ -87,17 +87,17 @@ class Ray:
         """Whether the goals are proved at a size."""
         one = self.query.prove(*self._at(size), finest)
         if one.verdict != "proved":
-            self.found.reason = one.reason
-        elif size > self.found.proved:
-            self.found.proved, self.found.pieces = size, [one]
+            self.bracket.reason = one.reason
+        elif size > self.bracket.proved:
+            self.bracket.proved, self.bracket.pieces = size, [one]
         return one.verdict == "proved"
 
     def refutes(self, size: Fraction) -> bool:
         """Whether an orbit violates a goal at a size."""
         one = self.query.refute(*self._at(size))
         if one.verdict == "refuted":
-            self.found.refuted = size
-            self.found.against = replace(one, within=self.tolerance.texts(size))
+            self.bracket.refuted = size
+            self.bracket.against = replace(one, within=self.tolerance.texts(size))
         return one.verdict == "refuted"
 
     def ask(self, size: Fraction) -> str:
@@ -108,24 +108,24 @@ class Ray:
                 return "refuted"
             one = self.query.prove(*self._at(size))
         if one.verdict == "proved":
-            self.found.proved = max(self.found.proved, size)
+            self.bracket.proved = max(self.bracket.proved, size)
         else:
-            self.end, self.found.reason = size, one.reason
+            self.end, self.bracket.reason = size, one.reason
         return one.verdict
 
     @property
     def gap(self) -> bool:
         """Whether nothing is known of some scene before those that are refuted."""
-        return self.found.refuted is not None and self.end is not None and self.end < self.found.refuted
+        return self.bracket.refuted is not None and self.end is not None and self.end < self.bracket.refuted
 
 
 def _reach(query: Query, scale: DeviationScale, sign: int, width: Fraction, known: Fraction | None) -> Ray:
     """Go outward from the scene as it is until single scenes are refuted or cannot be, then halve."""
     ray, step = Ray(query, Tolerance.alone(scale), (sign,)), scale.least
-    found = ray.found
+    bracket = ray.bracket
     for _ in range(STEPS):
         size = step if scale.most is None else min(step, (step / FACTOR + scale.most) / 2)
-        if known is not None and found.proved >= known:
+        if known is not None and bracket.proved >= known:
             return ray
         if ray.ask(size) != "proved":
             break
@@ -133,11 +133,11 @@ def _reach(query: Query, scale: DeviationScale, sign: int, width: Fraction, know
     else:
         return ray
     least = NONE * scale.least
-    # beyond a gap what is refuted is nearly as near as can be
-    halved(found.proved, size, lambda s: ray.ask(s) == "proved", width, least, stop=lambda: ray.gap)
-    if found.refuted is not None and ray.end is not None:
+    # beyond a gap the refuted size is nearly the smallest that can be refuted
+    halved(bracket.proved, size, lambda s: ray.ask(s) == "proved", width, least, stop=lambda: ray.gap)
+    if bracket.refuted is not None and ray.end is not None:
         # lower what is refuted towards what is undecided, and raise what is proved
-        halved(ray.end, found.refuted, lambda s: ray.ask(s) != "refuted", width)
+        halved(ray.end, bracket.refuted, lambda s: ray.ask(s) != "refuted", width)
         ray.end = None
     return ray
 
@@ -154,16 +154,16 @@ def _grow(
             return low, pieces, ""
         step = step if scale.widest is None else min(step, scale.widest)
         high = min(target, short(low + step, up=True))
-        # far from the wall narrower pieces do as well as finer cells, and to fail with these is what takes time
+        # far from the wall narrower pieces do as well as finer cells, and a failed proof on fine cells takes long
         finest = 3 if low > NEAR * wall else 1
-        found = query.prove(scale.piece(scale.between(sign * low, sign * high)), finest=finest)
-        if found.verdict == "proved":
-            pieces.append(found)
+        outcome = query.prove(scale.piece(scale.between(sign * low, sign * high)), finest=finest)
+        if outcome.verdict == "proved":
+            pieces.append(outcome)
             low, share = high, min(share * Fraction(9, 8), Fraction(3))
             step = share * (wall - high)
             tell(float(low / target))
         else:
-            reason, share = found.reason, share * Fraction(2, 3)
+            reason, share = outcome.reason, share * Fraction(2, 3)
             step = share * (wall - low)
             if step < min((wall - target) / 8, target / 1000):
                 break
@@ -175,59 +175,61 @@ def bracket_fixed(query: Query, scale: DeviationScale, width: Fraction, tell: Te
     ways: dict[int, Ray] = {}
     for sign in (-1, 1):
         known = min(
-            (way.found.refuted for way in ways.values() if way.found.refuted is not None), default=None
+            (way.bracket.refuted for way in ways.values() if way.bracket.refuted is not None), default=None
         )
         ways[sign] = _reach(query, scale, sign, width / 4, known)
-    found = Bracket()
+    bracket = Bracket()
     for sign, way in ways.items():
-        bad = way.found.refuted
-        if bad is not None and (found.refuted is None or bad < found.refuted):
-            found.refuted, found.against, found.sign = bad, way.found.against, sign
+        bad = way.bracket.refuted
+        if bad is not None and (bracket.refuted is None or bad < bracket.refuted):
+            bracket.refuted, bracket.against, bracket.sign = bad, way.bracket.against, sign
     ends = [way for way in ways.values() if way.end is not None]
-    if found.refuted is not None:
-        goal = found.refuted * (1 - width * Fraction(6, 10))
-        goal = min([goal, *(way.found.proved for way in ends)])
+    if bracket.refuted is not None:
+        goal = bracket.refuted * (1 - width * Fraction(6, 10))
+        goal = min([goal, *(way.bracket.proved for way in ends)])
     else:
-        goal = min(way.found.proved for way in ends or ways.values())
-    first = next((way for way in ends if way.found.proved == goal), None)
+        goal = min(way.bracket.proved for way in ends or ways.values())
+    first = next((way for way in ends if way.bracket.proved == goal), None)
     if first is not None and first.end is not None:
-        found.reason = f"from {scale.text(first.end)} on: {first.found.reason}"
-    found = _fixed_proof(query, scale, found, short(goal), tell)
-    _come_back(query, scale, found, width)
-    found.reason = "" if found.closed(width) else found.reason
-    return found
+        bracket.reason = f"from {scale.text(first.end)} on: {first.bracket.reason}"
+    bracket = _fixed_proof(query, scale, bracket, short(goal), tell)
+    _come_back(query, scale, bracket, width)
+    bracket.reason = "" if bracket.closed(width) else bracket.reason
+    return bracket
 
 
-def _fixed_proof(query: Query, scale: DeviationScale, found: Bracket, goal: Fraction, tell: Tell) -> Bracket:
+def _fixed_proof(
+    query: Query, scale: DeviationScale, bracket: Bracket, goal: Fraction, tell: Tell
+) -> Bracket:
     """Prove it all at once, or grow the proof in both directions."""
     if goal <= NONE * scale.least:
-        return found
+        return bracket
     # all at once first: two throws with the same parameters may settle it
     whole = query.prove(scale.piece(scale.between(-goal, goal)), finest=1)
     if whole.verdict == "proved":
-        found.pieces, found.proved = [whole], goal
-        return found
-    wall = found.refuted or goal * Fraction(101, 100)
+        bracket.pieces, bracket.proved = [whole], goal
+        return bracket
+    wall = bracket.refuted or goal * Fraction(101, 100)
     for sign in (-1, 1):
-        near = found.against is not None and sign == found.sign
+        near = bracket.against is not None and sign == bracket.sign
         far, pieces, reason = _grow(query, scale, sign, goal, wall if near else 3 * wall, tell)
-        found.pieces += pieces
+        bracket.pieces += pieces
         if far < goal:
             stuck = f"{reason}; {NARROWER}" if reason else f"from there on it is in more than {TRIALS} pieces"
-            goal, found.reason = far, stuck
-            _fails_beyond(Ray(query, Tolerance.alone(scale), (sign,)), sign, far, found)
+            goal, bracket.reason = far, stuck
+            _fails_beyond(Ray(query, Tolerance.alone(scale), (sign,)), sign, far, bracket)
             if not far:
                 break
-    found.proved = goal
-    return found
+    bracket.proved = goal
+    return bracket
 
 
-def _come_back(query: Query, scale: DeviationScale, found: Bracket, width: Fraction) -> None:
+def _come_back(query: Query, scale: DeviationScale, bracket: Bracket, width: Fraction) -> None:
     """Come back to the size up to which all pieces together are one claim, as a certificate has to make it.
 
     Each piece is proved for its own starts; where these differ too much, no claim is left for all of them.
     """
-    pieces, missing = found.pieces, unjoined(found.pieces) if found.pieces else ""
+    pieces, missing = bracket.pieces, unjoined(bracket.pieces) if bracket.pieces else ""
     if not missing:
         return
 
@@ -236,16 +238,16 @@ def _come_back(query: Query, scale: DeviationScale, found: Bracket, width: Fract
         within = _within(query, scale, pieces, size)
         why = unjoined(within)
         if not why:
-            found.proved, found.pieces = size, within
+            bracket.proved, bracket.pieces = size, within
         missing = why or missing
         return not why
 
-    top = found.proved
+    top = bracket.proved
     if joins(top):
         return
-    found.proved, found.pieces = Fraction(0), []
+    bracket.proved, bracket.pieces = Fraction(0), []
     _, bad = halved(Fraction(0), top, joins, min(width, Fraction(1, 50)), NONE * scale.least)
-    found.reason = f"from {scale.text(bad)} on: {missing}"
+    bracket.reason = f"from {scale.text(bad)} on: {missing}"
 
 
 def _within(query: Query, scale: DeviationScale, pieces: Sequence[Outcome], size: Fraction) -> list[Outcome]:
@@ -261,45 +263,51 @@ def _within(query: Query, scale: DeviationScale, pieces: Sequence[Outcome], size
     return kept
 
 
-def _fails_beyond(ray: Ray, sign: int, far: Fraction, found: Bracket) -> None:
+def _fails_beyond(ray: Ray, sign: int, far: Fraction, bracket: Bracket) -> None:
     """Where a proof stops growing, look for a scene that fails: a goal may fail at a size and hold at larger ones."""
     for beyond in a_little_beyond(far, Fraction(1, 400), 10):
         size = short(beyond, up=True)
-        if found.refuted is not None and size >= found.refuted:
+        if bracket.refuted is not None and size >= bracket.refuted:
             return
         if ray.refutes(size):
-            found.refuted, found.against, found.sign = size, ray.found.against, sign
+            bracket.refuted, bracket.against, bracket.sign = size, ray.bracket.against, sign
             return
 
 
 def bracket_per_throw(query: Query, scale: DeviationScale, width: Fraction, tell: Tell) -> Bracket:
-    """Bracket the margin of a quantity that is another one at every throw."""
+    """Bracket the margin of a quantity that has another value at every throw."""
     ray, size, most = Ray(query, Tolerance.alone(scale), ()), scale.least, scale.most
-    found = ray.found
+    bracket = ray.bracket
     for _ in range(STEPS):
         if not ray.proves(size, 1):
             break
         nearer = FACTOR * size
         size = nearer if most is None or nearer < most else (size + most) / 2
-    _, size = halved(found.proved, size, lambda s: ray.proves(s, 1), Fraction(1, 40), NONE * scale.least)
+    _, size = halved(bracket.proved, size, lambda s: ray.proves(s, 1), Fraction(1, 40), NONE * scale.least)
     tell(0.3)
     for beyond in a_little_beyond(size, Fraction(1, 100), 8):
         if (most is None or short(beyond) < most) and ray.refutes(short(beyond)):
             break
     tell(0.5)
-    if found.refuted is not None and not found.closed(width):
-        ray.proves(short(found.refuted * (1 - width * Fraction(9, 10))), 3)
+    if bracket.refuted is not None and not bracket.closed(width):
+        ray.proves(short(bracket.refuted * (1 - width * Fraction(9, 10))), 3)
+    _close_per_throw(ray, width, NONE * scale.least)
+    bracket.reason = "" if bracket.closed(width) else bracket.reason
+    return bracket
+
+
+def _close_per_throw(ray: Ray, width: Fraction, least: Fraction) -> None:
+    """Move both ends of a bracket towards each other, until it is closed or no size between them is decided."""
+    bracket = ray.bracket
     low = high = None  # nothing is known between them
-    while found.refuted is not None and not found.closed(width) and found.refuted > NONE * scale.least:
-        middle = short(((high or found.proved) + found.refuted) / 2)
-        if found.refuted - (high or found.proved) > width / 4 * found.refuted:
+    while bracket.refuted is not None and not bracket.closed(width) and bracket.refuted > least:
+        middle = short(((high or bracket.proved) + bracket.refuted) / 2)
+        if bracket.refuted - (high or bracket.proved) > width / 4 * bracket.refuted:
             if ray.refutes(middle) or ray.proves(middle, 3):
                 continue
             low, high = low or middle, middle
-        elif low is not None and low - found.proved > width / 4 * low:
-            middle = short((found.proved + low) / 2)
+        elif low is not None and low - bracket.proved > width / 4 * low:
+            middle = short((bracket.proved + low) / 2)
             low = low if ray.proves(middle, 3) else middle
         else:
             break
-    found.reason = "" if found.closed(width) else found.reason
-    return found

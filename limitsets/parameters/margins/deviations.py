@@ -212,8 +212,8 @@ def given(scene: Scene) -> tuple[str, ...]:
     by_kappa = "kappa" in scene.text["throw"]
     gravity = ("gravity.acceleration", "gravity.tilt")
     tables = {word: scene.text[word] for word in ("part", "arm", "throw", "gravity") if word in scene.text}
-    found = [name for name, _ in texts(tables) if name not in ("throw.kappa", "throw.speed")]
-    kept = [name for name in found if not (by_kappa and name in gravity[:1])]
+    names = [name for name, _ in texts(tables) if name not in ("throw.kappa", "throw.speed")]
+    kept = [name for name in names if not (by_kappa and name in gravity[:1])]
     return (*kept, "throw.speed", "landing.x")
 
 
@@ -263,10 +263,10 @@ def deviation_scale(scene: Scene, quantity: str, reading: str | None = None) -> 
         raise AnswerError(
             "the quantity", quantity, "one that the throw depends on; it is given by kappa", remedy
         )
-    found = DeviationScale(quantity, reading, _unit(scene, quantity, reading), scene)
+    scale = DeviationScale(quantity, reading, _unit(scene, quantity, reading), scene)
     if quantity not in ("landing.x", "throw.speed"):
         _text_at(scene, quantity)
-    return found
+    return scale
 
 
 def deviation_scales(scene: Scene, reading: str | None = None) -> tuple[DeviationScale, ...]:
@@ -280,14 +280,14 @@ def deviation_scales(scene: Scene, reading: str | None = None) -> tuple[Deviatio
         Only this one.
     """
     by_kappa = "kappa" in scene.text["throw"]
-    found = []
+    scales = []
     for word in READINGS if reading is None else (reading,):
         for name in given(scene):
             if word == "fixed" and (name == "landing.x" or (by_kappa and name == "gravity.tilt")):
                 continue
             if word == "fixed" or name in VARYING:
-                found.append(deviation_scale(scene, name, word))
-    return tuple(found)
+                scales.append(deviation_scale(scene, name, word))
+    return tuple(scales)
 
 
 # ----------------------------------------------------------------

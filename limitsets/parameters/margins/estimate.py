@@ -244,11 +244,11 @@ def _kept(scene: Scene | None, start: tuple[float, int], landing: float) -> Inva
     return invariant_intervals(scene.bare_map, *start, landing=landing)
 
 
-def _ways(scene: Scene, found: InvariantIntervals, side: int) -> Array:
+def _ways(scene: Scene, intervals: InvariantIntervals, side: int) -> Array:
     """Numbers that must not rise: the threshold, minus the reach, and what keeps the part from the joint."""
-    near = np.nan_to_num(found.lo - scene.sides.a)
-    creep = np.where(np.isfinite(found.creep), found.creep, 0.0)
-    return np.concatenate([[found.threshold(side), -found.hi[side]], -near, -creep])
+    near = np.nan_to_num(intervals.lo - scene.sides.a)
+    creep = np.where(np.isfinite(intervals.creep), intervals.creep, 0.0)
+    return np.concatenate([[intervals.threshold(side), -intervals.hi[side]], -near, -creep])
 
 
 class _Fed:
@@ -264,11 +264,11 @@ class _Fed:
         # over a surface at the joint's height nothing is proved: jogs there move a part neither out nor in
         if corner is None or not corner.surface_height * self.scene.surface_height > 0.0:
             return math.inf, -math.inf
-        found = _kept(corner, self.start, landing)
-        if found is None or not np.isfinite(found.hi[self.side]):
+        intervals = _kept(corner, self.start, landing)
+        if intervals is None or not np.isfinite(intervals.hi[self.side]):
             return math.inf, -math.inf
         # the farthest place that landings always off inward still lead to
-        return found.threshold(self.side), float(found.hi[self.side]) - 2.0 * landing
+        return intervals.threshold(self.side), float(intervals.hi[self.side]) - 2.0 * landing
 
     def all(self, factor: float, loaded: list[Signs]) -> tuple[float, float, Signs | None]:
         """Threshold and reach over corners, and the corner at which they cross, which moves to the front."""
@@ -343,10 +343,10 @@ def estimated(
     for k in range(len(tolerance.deviations)):
         sizes = [float(j == k) for j in range(len(tolerance.deviations))]
         corner = tolerance.scene_at(scene, 1.0, sizes)
-        found = _kept(corner, fed.start, 0.0)
-        if corner is None or found is None:
+        intervals = _kept(corner, fed.start, 0.0)
+        if corner is None or intervals is None:
             return bare
-        falls[k] = _ways(corner, found, side) - ways
+        falls[k] = _ways(corner, intervals, side) - ways
     effects = {
         name: (float(abs(falls[k, 0])), float(abs(falls[k, 1])))
         for k, name in enumerate(tolerance.deviations)
@@ -358,12 +358,14 @@ def estimated(
     loaded = list(hard or [])
     loaded += [worst_corner(row) for row in falls.T]
     spare, top = reach - threshold, min(linear, 1e3)
-    margin, x = _sought(fed, list(dict.fromkeys(loaded)), top, above, spare, steps, close)
+    margin, x = _sought(
+        fed, list(dict.fromkeys(loaded)), top, above=above, spare=spare, steps=steps, close=close
+    )
     return Estimate(margin, x, threshold, reach, nominal, effects)
 
 
-def failing(scene: Scene, tolerance: Tolerance, side: int, found: Estimate, factor: float) -> list[Signs]:
-    """Give the corners of the box, stretched by a factor, at which parts are not fed at `found.x`.
+def failing(scene: Scene, tolerance: Tolerance, side: int, estimate: Estimate, factor: float) -> list[Signs]:
+    """Give the corners of the box, stretched by a factor, at which parts are not fed at `estimate.x`.
 
     Examples
     --------
@@ -375,11 +377,11 @@ def failing(scene: Scene, tolerance: Tolerance, side: int, found: Estimate, fact
     >>> [failing(scene, tolerance, 2, estimated(scene, tolerance, 2), factor) for factor in (3.0, 9.0)]
     [[], [(-1,), (1,)]]
     """
-    fed = _Fed(scene, tolerance, side, _start(found, side))
+    fed = _Fed(scene, tolerance, side, _start(estimate, side))
     wrong = []
     for signs in corners(len(tolerance.deviations)):
         threshold, reach = fed.spare(factor, signs)
-        if not threshold <= found.x <= reach:
+        if not threshold <= estimate.x <= reach:
             wrong.append(signs)
     return wrong
 
@@ -400,18 +402,22 @@ def on_all_corners(
     """
     first = list(hard)
     while True:
-        found = estimated(scene, tolerance, side, hard=first, steps=FINE, close=FINELY)
-        if found is None or not found.margin > 0.0:
-            return found
-        new = [signs for signs in failing(scene, tolerance, side, found, found.margin) if signs not in first]
+        estimate = estimated(scene, tolerance, side, hard=first, steps=FINE, close=FINELY)
+        if estimate is None or not estimate.margin > 0.0:
+            return estimate
+        new = [
+            signs
+            for signs in failing(scene, tolerance, side, estimate, estimate.margin)
+            if signs not in first
+        ]
         if not new:
-            return found
+            return estimate
         first = new + first
 
 
-def _start(found: Estimate, side: int) -> tuple[float, int]:
+def _start(estimate: Estimate, side: int) -> tuple[float, int]:
     """Give a place in the limit set, near its end: from farther in an orbit may be lost that never comes back there."""
-    return found.reach - 0.02 * (found.reach - found.threshold), side
+    return estimate.reach - 0.02 * (estimate.reach - estimate.threshold), side
 
 
 def _sought(

@@ -158,14 +158,14 @@ def _slack_of(goal: Goal, highest: Sequence[float]) -> list[float]:
 
 
 def _proved_slack(query: Query, piece: SceneBox | None) -> Array:
-    """Say what slack is proved; of a place to be reached, nothing of the kind is."""
+    """Give the proved slack of each goal; 0 for a place to be reached, whose slack these cells do not prove."""
     extents = query.cells(piece, STEP).cells.extents()
     sides = range(query.scene.sides.a.size)
     highest = [max((hi for _, hi in extents.get(side, ())), default=-math.inf) for side in sides]
-    found: list[float] = []
+    slacks: list[float] = []
     for goal in query.goals:
-        found += [0.0] if isinstance(goal, Reaches) else _slack_of(goal, highest)
-    return np.array(found)
+        slacks += [0.0] if isinstance(goal, Reaches) else _slack_of(goal, highest)
+    return np.array(slacks)
 
 
 # ----------------------------------------------------------------
@@ -277,16 +277,16 @@ class Subdivision:
             guess = self.judge(part)
             # the whole box is worth a try whatever is guessed: two throws with the same parameters may settle it
             worth = part.number == 0 or guess.left > WORTH * guess.at_corner
-            found = self._try(part, guess.left) if worth else None
-            if found is not None and found.verdict == "proved":
-                self.proved.append((part, found))
+            outcome = self._try(part, guess.left) if worth else None
+            if outcome is not None and outcome.verdict == "proved":
+                self.proved.append((part, outcome))
                 self.cost = max(LEAST_COST, self.cost * 0.99)
                 tell(self.done(waiting))
                 continue
-            if found is not None and self.sensitivity.slack.size:
+            if outcome is not None and self.sensitivity.slack.size:
                 self.cost = min(MOST_COST, self.cost * 1.03)
-            k, at = self._where(part, guess, found)
-            why = self._stop(part, k, found, waiting, time.perf_counter() > end)
+            k, at = self._where(part, guess, outcome)
+            why = self._stop(part, k, outcome, waiting, time.perf_counter() > end)
             if why:
                 failed.append((part.near, why))
                 continue
@@ -295,20 +295,22 @@ class Subdivision:
             number += 2
         return min(failed, default=(Fraction(1), ""))
 
-    def _where(self, part: _SubBox, guess: _Guess, found: Outcome | None) -> tuple[int, Fraction]:
+    def _where(self, part: _SubBox, guess: _Guess, outcome: Outcome | None) -> tuple[int, Fraction]:
         """Say along which quantity to cut a part, and where.
 
         Where nothing attracts, or no part is proved to rest, what a quantity costs elsewhere says little: the widest.
         """
-        cells = None if found is None else found.found
-        if not part.low or found is None or (cells is not None and (cells.component >= 0).any()):
+        cells = None if outcome is None else outcome.found
+        if not part.low or outcome is None or (cells is not None and (cells.component >= 0).any()):
             return guess.k, guess.at
         widths = np.array([float(hi - lo) for lo, hi in zip(part.low, part.high, strict=True)])
         cost = self.sensitivity.cost.max(axis=0, initial=0.0)
         k = int(np.argmax(widths * np.maximum(cost / max(cost.max(initial=0.0), 1e-300), LEAST_SHARE)))
         return k, (part.low[k] + part.high[k]) / 2
 
-    def _stop(self, part: _SubBox, k: int, found: Outcome | None, waiting: list[_SubBox], late: bool) -> str:
+    def _stop(
+        self, part: _SubBox, k: int, outcome: Outcome | None, waiting: list[_SubBox], late: bool
+    ) -> str:
         """Say why a part is given up; empty if it is to be cut."""
         if late:
             return (
@@ -319,23 +321,25 @@ class Subdivision:
         if part.low and part.high[k] - part.low[k] > NARROWEST:
             return ""
         return (
-            found.reason if found else ""
+            outcome.reason if outcome else ""
         ) or "a piece of the box of all quantities is too narrow to be cut"
 
     def within(self, share: Fraction) -> list[Outcome]:
         """Return what proves a share of the box: parts that reach beyond are cut back, their cells serve for less."""
         kept = []
-        for part, found in self.proved:
+        for part, outcome in self.proved:
             low = tuple(max(x, -share) for x in part.low)
             high = tuple(min(x, share) for x in part.high)
-            if any(a >= b for a, b in zip(low, high, strict=True)) or found.found is None:
+            if any(a >= b for a, b in zip(low, high, strict=True)) or outcome.found is None:
                 continue
             piece = self.tolerance.piece(low, high, self.factor)
             if piece is not None:
-                cover = found.found.cover
+                cover = outcome.found.cover
                 box = replace(cover.box, scene=piece.tree())
-                found = replace(found, found=replace(found.found, cover=replace(cover, box=box)), piece=piece)
-            kept.append(found)
+                outcome = replace(
+                    outcome, found=replace(outcome.found, cover=replace(cover, box=box)), piece=piece
+                )
+            kept.append(outcome)
         return kept
 
     def joined(self, share: Fraction) -> tuple[Fraction, str]:
@@ -438,52 +442,52 @@ def joint_margin(
     closed = bad is not None and bad - proved <= share * bad
     reason = reason or "no orbit is found that violates it nearer to what is proved"
     return Margin(
-        "joint",
-        "tolerance",
-        goals,
-        float(proved),
-        None if bad is None else float(bad),
-        "",
-        None,
-        "" if closed else reason,
-        closed,
-        time.perf_counter() - begin,
-        query.scene,
-        dict(texts),
-        vector.texts(proved) if proved else {},
-        noise if proved else {},
-        tuple(pieces),
-        at_corners.against,
+        quantity="joint",
+        reading="tolerance",
+        goals=goals,
+        proved=float(proved),
+        refuted=None if bad is None else float(bad),
+        unit="",
+        nominal=None,
+        reason="" if closed else reason,
+        closed=closed,
+        seconds=time.perf_counter() - begin,
+        scene=query.scene,
+        tolerance=dict(texts),
+        deviations=vector.texts(proved) if proved else {},
+        noise=noise if proved else {},
+        pieces=tuple(pieces),
+        against=at_corners.against,
     )
 
 
 def _at_corners(query: Query, tolerance: Tolerance, sensitivity: Sensitivity, width: Fraction) -> Bracket:
     """Bracket the factor at the worst corners, as single scenes."""
-    count, found, proved = len(tolerance.scales), Bracket(), list[Fraction]()
+    count, bracket, proved = len(tolerance.scales), Bracket(), list[Fraction]()
     for signs in (sensitivity.corners() or [(1,) * count, (-1,) * count])[:CORNERS]:
-        own = _at_one(Ray(query, tolerance, signs), width, found.refuted)
+        own = _at_one(Ray(query, tolerance, signs), width, bracket.refuted)
         proved.append(own.proved)
-        if own.refuted is not None and (found.refuted is None or own.refuted < found.refuted):
-            found.refuted, found.against = own.refuted, own.against
-        found.reason = found.reason or own.reason
-    found.proved = min(proved)
-    return found
+        if own.refuted is not None and (bracket.refuted is None or own.refuted < bracket.refuted):
+            bracket.refuted, bracket.against = own.refuted, own.against
+        bracket.reason = bracket.reason or own.reason
+    bracket.proved = min(proved)
+    return bracket
 
 
 def _at_one(ray: Ray, width: Fraction, known: Fraction | None) -> Bracket:
     """Bracket the factor at one corner, where it is below one that is known."""
-    factor, found = known or SMALL, ray.found
+    factor, bracket = known or SMALL, ray.bracket
     while ray.proves(factor):
         if known is not None or factor > MOST:
-            return found
+            return bracket
         factor *= 2
-    _, top = halved(found.proved, factor, ray.proves, width, LEAST, rounded)
+    _, top = halved(bracket.proved, factor, ray.proves, width, LEAST, rounded)
     beyond = (rounded(each) for each in a_little_beyond(top, Fraction(1, 400), 10))
     bad = next((each for each in beyond if ray.refutes(each)), None)
     if bad is not None:
         # what is not proved need not fail: it may hold for fewer starts than all
         halved(top, bad, lambda middle: not ray.refutes(middle), width, rounded=rounded)
-    return found
+    return bracket
 
 
 def rounded(value: Fraction) -> Fraction:

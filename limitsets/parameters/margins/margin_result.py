@@ -76,7 +76,7 @@ def bound_above(value: float) -> str:
 
 
 def reach_of(pieces: Sequence[Outcome]) -> float | None:
-    """Say how far out the cells reach that attract in all of what was proved together; None where nothing was."""
+    """Give the farthest x of the attracting cells of all proved pieces; None if no piece is proved."""
     cells = [piece.found.cells.extents() for piece in pieces if piece.found is not None]
     return max((hi for each in cells for parts in each.values() for _, hi in parts), default=None)
 
@@ -229,9 +229,9 @@ class Margin(Tabled):
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         stem, written = self.stem, []
-        found = tuple(piece.found for piece in self.pieces if piece.found is not None)
-        for goal, claim in zip(self.goals if found else (), joined_claims(self.pieces), strict=True):
-            proof = Proof(self.scene, self.noise, self.deviations, found, (claim,), self.seconds)
+        attractions = tuple(piece.found for piece in self.pieces if piece.found is not None)
+        for goal, claim in zip(self.goals if attractions else (), joined_claims(self.pieces), strict=True):
+            proof = Proof(self.scene, self.noise, self.deviations, attractions, (claim,), self.seconds)
             last = f"-{goal.kind.replace('_', '-')}" if len(self.goals) > 1 else ""
             written.append(proof.save(folder / f"{stem}{last}.proof.zip", recheck=recheck))
         against = self.against

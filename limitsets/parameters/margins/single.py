@@ -57,17 +57,17 @@ def _goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple
             raise AnswerError("the goal", None, "a scene with [goal], or goal=", "say what has to hold")
         return (scene.goal,)
     several = list(goal) if isinstance(goal, Sequence) else [goal]
-    found: list[Goal] = []
+    goals: list[Goal] = []
     for one in several:
         if isinstance(one, Goal):
-            found.append(one)
+            goals.append(one)
         elif callable(one):
-            found.append(Predicate(one, getattr(one, "__name__", "the predicate")))
+            goals.append(Predicate(one, getattr(one, "__name__", "the predicate")))
         else:
             raise unknown_goal(one)
-    if not found:
+    if not goals:
         raise AnswerError("the goal", "no goals", "one at least", "name one")
-    return tuple(found)
+    return tuple(goals)
 
 
 @shown_in_notebooks
@@ -138,7 +138,7 @@ def margin(
     else:
         todo = [*deviation_scales(query.scene, reading)]
         todo += ["joint"] if loaded.tolerance and reading is None else []
-    found = []
+    margins = []
     for number, one in enumerate(todo):
         label = one if isinstance(one, str) else f"{one.quantity} {one.reading}"
 
@@ -156,47 +156,69 @@ def margin(
             if len(todo) == 1:
                 raise
             answer = _failed(query, one, dict(loaded.text.get("tolerance", {})), failure(error))
-        found.append(answer)
-    return tuple(found)
+        margins.append(answer)
+    return tuple(margins)
 
 
 def _failed(query: Query, one: DeviationScale | str, tolerance: dict[str, str], reason: str) -> Margin:
     """Return what is left of a margin whose search ended with an error."""
     if isinstance(one, DeviationScale):
         return _of_bracket(query, one, Bracket(reason=reason), Fraction(1), 0.0)
-    about = "joint", "tolerance", query.goals, 0.0, None, "", None, reason, False, 0.0
-    return Margin(*about, query.scene, tolerance, {}, {}, (), None)
+    return Margin(
+        quantity="joint",
+        reading="tolerance",
+        goals=query.goals,
+        proved=0.0,
+        refuted=None,
+        unit="",
+        nominal=None,
+        reason=reason,
+        closed=False,
+        seconds=0.0,
+        scene=query.scene,
+        tolerance=tolerance,
+        deviations={},
+        noise={},
+        pieces=(),
+        against=None,
+    )
 
 
 def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[float], None]) -> Margin:
     begin = time.perf_counter()
     nominal = query.prove()
     if nominal.verdict != "proved":
-        found = _of_none(query, nominal)
+        bracket = _of_none(query, nominal)
     else:
         search = bracket_fixed if one.reading == "fixed" else bracket_per_throw
-        found = search(query, one, width, tell)
-    return _of_bracket(query, one, found, width, time.perf_counter() - begin)
+        bracket = search(query, one, width, tell)
+    return _of_bracket(query, one, bracket, width, time.perf_counter() - begin)
 
 
-def _of_bracket(query: Query, one: DeviationScale, found: Bracket, width: Fraction, seconds: float) -> Margin:
+def _of_bracket(
+    query: Query, one: DeviationScale, bracket: Bracket, width: Fraction, seconds: float
+) -> Margin:
+    deviations, noise = _texts(one, bracket.proved)
     return Margin(
-        one.quantity,
-        one.reading,
-        query.goals,
-        float(found.proved),
-        None if found.refuted is None else float(found.refuted),
-        one.unit,
-        _nominal(one),
-        found.reason,
-        found.closed(width),
-        seconds,
-        query.scene,
-        {},
-        *_texts(one, found.proved),
-        tuple(found.pieces),
-        found.against,
-        None if one.reading != "fixed" or not found.refuted else "more" if found.sign > 0 else "less",
+        quantity=one.quantity,
+        reading=one.reading,
+        goals=query.goals,
+        proved=float(bracket.proved),
+        refuted=None if bracket.refuted is None else float(bracket.refuted),
+        unit=one.unit,
+        nominal=_nominal(one),
+        reason=bracket.reason,
+        closed=bracket.closed(width),
+        seconds=seconds,
+        scene=query.scene,
+        tolerance={},
+        deviations=deviations,
+        noise=noise,
+        pieces=tuple(bracket.pieces),
+        against=bracket.against,
+        direction=("more" if bracket.sign > 0 else "less")
+        if one.reading == "fixed" and bracket.refuted
+        else None,
     )
 
 
@@ -350,7 +372,14 @@ def margins_beyond(
     proved = np.array([[one.proved for one in row] for row in rows])
     refuted = np.array([[np.nan if one.refuted is None else one.refuted for one in row] for row in rows])
     return MarginsBeyond(
-        loaded, side, at, names, tuple(one.unit for one in rows[0]), proved, refuted, tuple(rows)
+        scene=loaded,
+        side=side,
+        x=at,
+        names=names,
+        units=tuple(one.unit for one in rows[0]),
+        proved=proved,
+        refuted=refuted,
+        margins=tuple(rows),
     )
 
 
@@ -364,8 +393,8 @@ def _one(
 ) -> Margin:
     if name == "joint":
         return joint_margin(scene, goals, tolerance, width=width, seconds=seconds)
-    (found,) = margin(scene, name, goal=goals, width=width)
-    return found
+    (answer,) = margin(scene, name, goal=goals, width=width)
+    return answer
 
 
 def places_beyond(scene: Scene, side: int, places: int) -> NDArray[np.float64]:

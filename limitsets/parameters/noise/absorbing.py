@@ -208,8 +208,8 @@ def distribution(chain: Transfer, cells: Cells) -> tuple[Array, float, int]:
     """
     part = _Counted(chain, cells)
     even = chain.grid.measure[cells] / chain.grid.measure[cells].sum()
-    found = _arnoldi(part)
-    weight = even if found is None else found
+    eigenvector = _arnoldi(part)
+    weight = even if eigenvector is None else eigenvector
     residual, steps = np.inf, 0
     while residual > TOLERANCE and steps < MOST_STEPS:
         after = part.adjoint(weight)
@@ -238,15 +238,15 @@ def _described(chain: Transfer, cells: Cells, closed: bool) -> NoisyClass:
     shares = part @ chain.branches[cells]
     shares = shares / max(float(shares.sum()), 1e-300)
     return NoisyClass(
-        CellSet.of(chain.grid, cells),
-        closed,
-        weight,
-        0.0 if closed else sum(leads_to.values()),
-        leads_to,
-        sides,
-        {name: float(share) for name, share in zip(names, shares, strict=True)},
-        residual,
-        steps,
+        cells=CellSet.of(chain.grid, cells),
+        closed=closed,
+        weight=weight,
+        escape=0.0 if closed else sum(leads_to.values()),
+        leads_to=leads_to,
+        sides=sides,
+        branches={name: float(share) for name, share in zip(names, shares, strict=True)},
+        residual=residual,
+        steps=steps,
     )
 
 
@@ -279,10 +279,13 @@ def classes(chain: Transfer) -> tuple[NoisyClass, ...]:
     [(0.0, {0: [(0.5..., 0.5...), (0.7..., 0.8...)]})]
     """
     closed, open_ = recurrent_classes(chain, graph_of(chain))
-    found = [_described(chain, cells, closed=True) for cells in closed]
+    closed_classes = [_described(chain, cells, closed=True) for cells in closed]
     large = sorted((cells for cells in open_ if _may_be_slow(chain, cells)), key=len, reverse=True)
     left = [_described(chain, cells, closed=False) for cells in large[:MOST_LEFT]]
-    return (*found, *sorted((part for part in left if part.escape < SLOW), key=lambda part: part.escape))
+    return (
+        *closed_classes,
+        *sorted((part for part in left if part.escape < SLOW), key=lambda part: part.escape),
+    )
 
 
 # ----------------------------------------------------------------
@@ -357,15 +360,15 @@ class _Equations:
             return answer
         n = cells.size
         operator = LinearOperator((n, n), matvec=self._product, dtype=np.float64)
-        found = np.zeros(n)
+        solution = np.zeros(n)
         for _ in range(4):  # once more on what is left over: refines small answers
-            rest = b - self._product(found)
+            rest = b - self._product(solution)
             if np.abs(rest).max() <= RESIDUAL * size:
                 break
             step, _ = gmres(operator, rest, rtol=1e-12, restart=min(150, n), maxiter=20, M=self.inverse)
-            found = found + step
-        self.worst = max(self.worst, float(np.abs(b - self._product(found)).max()) / size)
-        answer[cells] = found
+            solution = solution + step
+        self.worst = max(self.worst, float(np.abs(b - self._product(solution)).max()) / size)
+        answer[cells] = solution
         return answer
 
 
@@ -572,5 +575,5 @@ def feeding(chain: Transfer, ends: Absorption, starts: Array) -> Feeding:
         np.array(arrived),
         share,
         mean,
-        {name: float(starts @ found) for name, found in ends.probability.items()},
+        {name: float(starts @ chances) for name, chances in ends.probability.items()},
     )

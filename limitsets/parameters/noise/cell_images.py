@@ -202,9 +202,9 @@ class BoxcarOperator:
             for at, sign in ((block.hi, 1.0), (block.lo, -1.0)):
                 k = np.minimum(at.astype(np.int64), size - 2)
                 upper = sign * rate * (at - k)
-                found = np.bincount(k, weights=sign * rate - upper, minlength=size)
-                found[1:] += np.bincount(k, weights=upper, minlength=size)[:-1]
-                ends[block.target] += found
+                arriving = np.bincount(k, weights=sign * rate - upper, minlength=size)
+                arriving[1:] += np.bincount(k, weights=upper, minlength=size)[:-1]
+                ends[block.target] += arriving
         # Height of the density in cell j: what ends beyond it.
         heights = [np.cumsum(end[::-1])[::-1][1:] for end in ends]
         parts = [np.diff(edges) * height for edges, height in zip(self.edges, heights, strict=True)]
@@ -252,7 +252,7 @@ Pieces = dict[int, tuple[BranchInterval, ...]]
 
 
 def _cut(params: Any, domain: Domain) -> Pieces:
-    found = {}
+    by_side = {}
     for side, pieces in monotone_pieces(params, domain).items():
         ends = [*(piece.lo for piece in pieces[1:]), np.inf]
         # The last float of a piece and the first of the next are neighbours: the gap between them is nothing.
@@ -260,10 +260,10 @@ def _cut(params: Any, domain: Domain) -> Pieces:
             end if np.nextafter(piece.hi, np.inf) == end else piece.hi
             for piece, end in zip(pieces, ends, strict=True)
         ]
-        found[side] = tuple(
+        by_side[side] = tuple(
             BranchInterval(p.lo, float(top), p.branch) for p, top in zip(pieces, tops, strict=True)
         )
-    return found
+    return by_side
 
 
 def _kinds(pieces: Pieces) -> dict[int, list[int]]:
@@ -316,15 +316,15 @@ class InterpolatedPieces:
             return self.known[int(np.flatnonzero(gap == 0.0)[0])]
         share = self.weights / gap
         share /= share.sum()
-        found = {}
+        by_side = {}
         for side, cuts in self.known[0].items():
             ends = np.array([[cut[:2] for cut in pieces[side]] for pieces in self.known])
             values = np.tensordot(share, ends, axes=1) if cuts else ends[0]
-            found[side] = tuple(
+            by_side[side] = tuple(
                 BranchInterval(float(lo), float(hi), cut.branch)
                 for (lo, hi), cut in zip(values, cuts, strict=True)
             )
-        return found
+        return by_side
 
     def at(self, value: float) -> Pieces:
         """Pieces of every side at one value of the parameter."""
@@ -411,30 +411,32 @@ def rows_of_points(
     samples = SAMPLES[dimension]
     cells = np.arange(grid.offset[side], grid.offset[side + 1])
     points = sample_points(grid, cells, side, samples)
-    found = images(map_of(mean), points, side)
-    width = np.zeros(found.code.size)
+    image = images(map_of(mean), points, side)
+    width = np.zeros(image.code.size)
     if dimension == 1:
-        width = _spread_of_points(map_of, mean, math.sqrt(3.0) * sd, points, side, found, samples)
+        width = _spread_of_points(
+            map_of, mean, math.sqrt(3.0) * sd, points=points, side=side, image=image, samples=samples
+        )
     source = np.repeat(cells, samples**dimension)
     share = np.full(source.size, weight * samples ** -float(dimension))
-    return source, found.x, found.side, found.code, share, width
+    return source, image.x, image.side, image.code, share, width
 
 
 def _spread_of_points(
-    map_of: MapOf, mean: float, half: float, points: Array, side: int, found: Any, samples: int
+    map_of: MapOf, mean: float, half: float, points: Array, side: int, image: Any, samples: int
 ) -> Array:
     """Width over which each point's image is spread: that of its part of the cell, and that of the noise."""
-    x, code = found.x.reshape(-1, samples), found.code.reshape(-1, samples)
+    x, code = image.x.reshape(-1, samples), image.code.reshape(-1, samples)
     gap = np.abs(np.diff(x, axis=1))
-    same = (np.diff(code, axis=1) == 0) & (np.diff(found.side.reshape(-1, samples), axis=1) == 0)
+    same = (np.diff(code, axis=1) == 0) & (np.diff(image.side.reshape(-1, samples), axis=1) == 0)
     gap = np.where(same, gap, np.inf)
     left, right = np.pad(gap, ((0, 0), (1, 0)), mode="edge"), np.pad(gap, ((0, 0), (0, 1)), mode="edge")
     part = np.minimum(left, right)
     width: Array = np.where(np.isfinite(part), part, 0.0).ravel()
     if half > 0.0:
         ends = [images(map_of(mean + d), points, side) for d in (-half, half)]
-        alike = (ends[0].code == found.code) & (ends[1].code == found.code)
-        alike &= (ends[0].side == found.side) & (ends[1].side == found.side)
+        alike = (ends[0].code == image.code) & (ends[1].code == image.code)
+        alike &= (ends[0].side == image.side) & (ends[1].side == image.side)
         noise = np.where(alike, np.abs(ends[1].x - ends[0].x), 0.0)
         width = np.hypot(width, noise)
     return width

@@ -39,8 +39,8 @@ def binomial_interval(successes: int, trials: int, confidence: float = 0.95) -> 
     """
     from scipy.stats import binomtest
 
-    found = binomtest(successes, trials).proportion_ci(confidence, method="exact")
-    return float(found.low), float(found.high)
+    interval = binomtest(successes, trials).proportion_ci(confidence, method="exact")
+    return float(interval.low), float(interval.high)
 
 
 # ----------------------------------------------------------------
@@ -181,7 +181,15 @@ def throw_many(
     fed, arrived = _to_goal(ManyParts(scattering_map(scene, scatter, seed + 1), x, side), goal)
     answers = {**long_run, **fed}
     numbers, errors = ({name: pair[k] for name, pair in answers.items()} for k in (0, 1))
-    return SampledStatistics(rounds * parts, numbers, errors, density, borders, arrived, parts)
+    return SampledStatistics(
+        throws=rounds * parts,
+        numbers=numbers,
+        errors=errors,
+        density=density,
+        bins=borders,
+        arrived=arrived,
+        parts=parts,
+    )
 
 
 def uniform_starts(
@@ -223,7 +231,7 @@ def _long_run(
     on_side, by_branch = np.zeros((sides, count)), np.zeros((len(names), count))
     beyond, wrong, alive = np.zeros(count), np.zeros(count), np.ones(count, dtype=bool)
     borders = tuple(np.linspace(float(a), scene.arm_length, bins + 1) for a in scene.sides.a)
-    found = [np.zeros(bins) for _ in borders]
+    histograms = [np.zeros(bins) for _ in borders]
     for done in range(rounds):
         code = many.throw()
         alive &= code >= 0
@@ -233,7 +241,7 @@ def _long_run(
         for k in range(sides):
             here = (many.side == k) & alive
             on_side[k] += here
-            found[k] += np.histogram(many.x[here], borders[k])[0]
+            histograms[k] += np.histogram(many.x[here], borders[k])[0]
         for k in range(len(names)):
             by_branch[k] += (code == k) & alive
         if progress is not None:
@@ -244,7 +252,7 @@ def _long_run(
     answers["wrong beyond"] = _ratio(wrong, beyond)
     answers["time beyond"] = _ratio(beyond, total)
     seen = float(total.sum())
-    density = (counts / seen / np.diff(edges) for counts, edges in zip(found, borders, strict=True))
+    density = (counts / seen / np.diff(edges) for counts, edges in zip(histograms, borders, strict=True))
     return answers, tuple(density), borders
 
 

@@ -135,13 +135,17 @@ def solve(problem: ChainProblem, scatter: Scattering) -> ChainSolution:
     parts = classes(chain)
     kept = [np.flatnonzero(part.cells.mask) for part in parts if part.escape < KEPT]
     settling = absorption(chain, np.zeros(cover.n_cells, dtype=bool), classes=kept)
-    settles = {name: float(starts @ found) for name, found in settling.probability.items() if name != "goal"}
+    settles = {
+        name: float(starts @ chances) for name, chances in settling.probability.items() if name != "goal"
+    }
     ends = absorption(chain, goal)
     fed = feeding(chain, ends, starts)
     first = absorption(chain, goal, other=beyond & ~goal).probability["other"]
     numbers = {**_long_run(chain, parts, settles, beyond, goal), **_from_starts(chain, fed)}
     numbers["first beyond is wrong"] = float(starts @ first)
-    return ChainSolution(cover, chain.cut, parts, settles, ends, fed, numbers)
+    return ChainSolution(
+        grid=cover, cut=chain.cut, classes=parts, settles=settles, ends=ends, feeding=fed, numbers=numbers
+    )
 
 
 def _main(parts: Sequence[NoisyClass], settles: dict[str, float]) -> NoisyClass | None:
@@ -219,11 +223,11 @@ def slopes_of(problem: ChainProblem, noise: Scattering, name: str) -> dict[str, 
     wide = _differences(problem, noise, name, STEP)
     narrow = _differences(problem, noise, name, 0.5 * STEP)
     coarse = _differences(_half_cells(problem), noise, name, 0.5 * STEP)
-    found = {}
+    slopes = {}
     for key, value in narrow.items():
         unsure = abs(value - wide.get(key, math.nan)) + abs(value - coarse.get(key, math.nan))
-        found[key] = LevelSensitivity((4.0 * value - wide.get(key, math.nan)) / 3.0, unsure)
-    return found
+        slopes[key] = LevelSensitivity((4.0 * value - wide.get(key, math.nan)) / 3.0, unsure)
+    return slopes
 
 
 def _differences(problem: ChainProblem, noise: Scattering, name: str, step: float) -> dict[str, float]:
@@ -402,16 +406,16 @@ def noise_statistics(
     stages = 3 + 6 * len(names)
     tell = progress or (lambda stage, done, total: None)
     tell("noise", 0, stages)
-    found = solve(problem, noise)
+    solution = solve(problem, noise)
     tell("noise", 1, stages)
-    errors = errors_of(problem, noise, found.numbers)
+    errors = errors_of(problem, noise, solution.numbers)
     slopes = {}
     for number, name in enumerate(names):
         tell("noise", 3 + 6 * number, stages)
         slopes[name] = slopes_of(problem, noise, name)
     tell("noise", stages, stages)
     return NoiseStatistics(
-        **vars(found),
+        **vars(solution),
         **picked(problem, "goal", "starts", "strata"),
         **picked(problem.scene, "unit"),
         scene=problem.scene.name,

@@ -47,19 +47,19 @@ MOST_BEYOND = 2048
 
 def beyond(grid: Grid, reach: tuple[float, float]) -> tuple[Array, ...]:
     """Borders of the cells between the stages, which go on beyond the domain."""
-    found = []
+    borders = []
     for (edges,) in grid.edges:
         width = float(np.median(np.diff(edges)))
         parts = []
         for size, end, sign in ((max(reach[1], 0.0), edges[0], -1.0), (max(-reach[0], 0.0), edges[-1], 1.0)):
             count = min(math.ceil(size / width), MOST_BEYOND)
             parts.append(end + sign * size * np.arange(1, count + 1) / max(count, 1))
-        found.append(np.concatenate([parts[0][::-1], edges, parts[1]]))
-    return tuple(found)
+        borders.append(np.concatenate([parts[0][::-1], edges, parts[1]]))
+    return tuple(borders)
 
 
 def _sink_numbers(exits: dict[str, int]) -> tuple[int, int, int]:
-    """Columns of what lands below, above, and of what has no image."""
+    """Columns of the masses that land below, that land above, and that have no image."""
     number = {code: k for k, code in enumerate(exits.values())}
     outside = number.get(codes.OUTSIDE_MODEL, number.get(codes.OUTSIDE, 0))
     return number.get(codes.INWARD, number.get(codes.OUTSIDE, 0)), number.get(codes.OUTWARD, 0), outside
@@ -390,4 +390,13 @@ def transfer(
         ]
         sinks = sinks + np.stack(columns, axis=1)
         cut += added.cut
-    return Transfer(params, grid, throw, second, sinks, branches, reach, cut)
+    return Transfer(
+        map=params,
+        grid=grid,
+        throw=throw,
+        landing=second,
+        sinks=sinks,
+        branches=branches,
+        reach=reach,
+        cut=cut,
+    )

@@ -62,8 +62,10 @@ def regions(records: Sequence[Record], raster: NDArray[np.int64]) -> NDArray[np.
         if of(i) != of(j) and corresponds(records[i], records[j]):
             root[max(of(i), of(j))] = min(of(i), of(j))
     numbers: dict[int, int] = {}
-    found = [numbers.setdefault(of(k), len(numbers)) if each.blocks else -1 for k, each in enumerate(records)]
-    return np.array(found, dtype=np.int32)
+    labels = [
+        numbers.setdefault(of(k), len(numbers)) if each.blocks else -1 for k, each in enumerate(records)
+    ]
+    return np.array(labels, dtype=np.int32)
 
 
 def corresponds(one: Record, other: Record) -> bool:
@@ -321,7 +323,7 @@ class Pick(NamedTuple):
 def largest_square(
     scene: Scene, centre: Mapping[str, str], scales: Mapping[str, str], *, width: float = 0.01
 ) -> Margin:
-    """Bracket the largest square around a point for all parameters of which the scene's goal is proved.
+    """Bracket the largest square around a point such that the scene's goal is proved for all parameters in it.
 
     Parameters
     ----------

@@ -136,21 +136,21 @@ class Violation(NamedTuple):
     chain: Chain | None = None
 
 
-def violating_chain(found: Attraction, middle_box: ParameterBox, goal: OrientedBeyond) -> Violation:
+def violating_chain(attracting: Attraction, middle_box: ParameterBox, goal: OrientedBeyond) -> Violation:
     """Look for a periodic orbit that violates the goal, and prove that every map of the box has one.
 
     Parameters
     ----------
-    found : Attraction
+    attracting : Attraction
         The cells, for the whole box.
     middle_box : ParameterBox
         The scene in the middle of the box.
     goal : OrientedBeyond
         The goal.
     """
-    box = found.cover.box
+    box = attracting.cover.box
     map_now = middle_box.at_kappa(middle_box.middle_kappa)
-    start = orbit(map_now, *middle(found, found.cells.numbers()), SETTLING)
+    start = orbit(map_now, *middle(attracting, attracting.cells.numbers()), SETTLING)
     path = orbit(map_now, float(start.x[-1]), int(start.side[-1]), SEARCHED)
     if not goal.wrong()(path.x * MORE_THAN_ROUNDING, path.side).any():
         return Violation()
@@ -367,12 +367,12 @@ def certify_cell(
         coarse = _coarse(box, scene)
         first: Record | None = None
         for number in cells:
-            found = _finer(coarse, scene, number)
-            doubtful = _may_violate(found, scene)
-            against = _refuting(found, scene, middle) if doubtful and first is None else Violation()
-            # where these cells do not prove it finer ones are asked before two throws at once, which cost more
+            attracting = _finer(coarse, scene, number)
+            doubtful = _may_violate(attracting, scene)
+            against = _refuting(attracting, scene, middle) if doubtful and first is None else Violation()
+            # if these cells prove nothing, finer cells come before two throws at once, which cost more
             record = _record(
-                found, scene, ends, ask=not against.seen and (not doubtful or number == cells[-1])
+                attracting, scene, ends, ask=not against.seen and (not doubtful or number == cells[-1])
             )
             if against.chain is not None:
                 return replace(record, goal="refuted", reason="", chain=against.chain)
@@ -383,7 +383,7 @@ def certify_cell(
             first = record if first is None or not first.blocks else first
     except AnswerError as error:  # no such part or throw somewhere in the cell
         return Record(ends, "undecided" if scene.goal else "", str(error).splitlines()[0])
-    # of a cell that stays undecided the coarse cells say as much as the fine ones
+    # where a cell stays undecided, its coarse cells say as much as its fine ones
     return replace(first if first is not None and first.blocks else record, reason=record.reason)
 
 
@@ -391,27 +391,27 @@ def _coarse(box: ParameterBox, scene: Scene) -> tuple[Attraction, int]:
     """Find about where the attracting blocks are, and with how many cells a side."""
     wanted = cuts(() if scene.goal is None else (scene.goal,), box.lo.a.size)
     for number in COARSE:
-        found = attraction(cover(box, number, wanted, PIECES))
-        if (found.component >= 0).any():
+        attracting = attraction(cover(box, number, wanted, PIECES))
+        if (attracting.component >= 0).any():
             break
-    return found, number
+    return attracting, number
 
 
 def _finer(coarse: tuple[Attraction, int], scene: Scene, number: int) -> Attraction:
-    """Cut what attracts at multiples of a number-th of the arm, so that neighbours in the plane have such in common."""
-    found, base = coarse
-    extents, step = found.cells.extents(), float(found.cover.box.lo.arm_length) / number
+    """Cut the attracting cells at multiples of arm length / number, so that neighbours in the plane share borders."""
+    attracting, base = coarse
+    extents, step = attracting.cells.extents(), float(attracting.cover.box.lo.arm_length) / number
     if not extents:
-        return found
-    wanted = cuts(() if scene.goal is None else (scene.goal,), found.cover.grid.sides)
-    for side, (edges,) in enumerate(found.cover.grid.edges):
+        return attracting
+    wanted = cuts(() if scene.goal is None else (scene.goal,), attracting.cover.grid.sides)
+    for side, (edges,) in enumerate(attracting.cover.grid.edges):
         for lo, hi in extents.get(side, ()):
             at = np.arange(math.ceil(lo / step), math.floor(hi / step) + 1) * step
             k = np.clip(np.searchsorted(edges, at), 1, edges.size - 1)
-            # none so near to another border that the images of a cell had no room in the digits of x
+            # a cut too near to another border would leave the images of a cell no room in the digits of x
             apart = np.minimum(np.abs(at - edges[k - 1]), np.abs(edges[k] - at)) > APART * step
             wanted[side] += at[apart].tolist()
-    return attraction(cover(found.cover.box, base, wanted, PIECES))
+    return attraction(cover(attracting.cover.box, base, wanted, PIECES))
 
 
 def _middle(piece: SceneBox) -> SceneBox:
@@ -420,64 +420,64 @@ def _middle(piece: SceneBox) -> SceneBox:
 
 
 def _record(
-    found: Attraction, scene: Scene, spans: dict[str, tuple[Fraction, Fraction]], *, ask: bool
+    attracting: Attraction, scene: Scene, spans: dict[str, tuple[Fraction, Fraction]], *, ask: bool
 ) -> Record:
     """Put together what some cells prove; the goal is undecided where it is not asked for."""
-    basin = found.basin
-    if not (found.component >= 0).any():
-        return Record(spans, "undecided" if scene.goal else "", found.reason, shares=basin.shares)
+    basin = attracting.basin
+    if not (attracting.component >= 0).any():
+        return Record(spans, "undecided" if scene.goal else "", attracting.reason, shares=basin.shares)
     verdict, reason, section = "", basin.missing, dict[str, Any]()
     if scene.goal is not None and not ask:
         verdict = "undecided"
     elif scene.goal is not None:
-        answer = prove(found, scene, scene.goal)
+        answer = prove(attracting, scene, scene.goal)
         verdict = "proved" if answer.verdict == "proved" else "undecided"
         reason, section = answer.reason, dict(answer.section) if verdict == "proved" else {}
     counts: dict[str, Any] = {"thinning": basin.thinning, "near": basin.near}
     if basin.near:
-        counts["joint"] = [(near.q, *(near.fixed_point or (0.0, 0.0))) for near in found.joint]
+        counts["joint"] = [(near.q, *(near.fixed_point or (0.0, 0.0))) for near in attracting.joint]
     return Record(
-        spans,
-        verdict,
-        reason,
-        basin.starts,
-        basin.shares,
-        blocks_of(found),
-        section | counts,
-        arrays_of(found, ""),
+        spans=spans,
+        goal=verdict,
+        reason=reason,
+        starts=basin.starts,
+        shares=basin.shares,
+        blocks=blocks_of(attracting),
+        section=section | counts,
+        arrays=arrays_of(attracting, ""),
     )
 
 
-def _may_violate(found: Attraction, scene: Scene) -> bool:
-    """Whether a goal of single places is violated somewhere in the attracting cells, as far as these tell."""
+def _may_violate(attracting: Attraction, scene: Scene) -> bool:
+    """Whether the attracting cells reach a place that violates the goal."""
     wrong = None if scene.goal is None else scene.goal.wrong()
     if wrong is None:
         return False
     return any(
         wrong(np.array([hi]), np.array([side])).any()
-        for side, parts in found.cells.extents().items()
+        for side, parts in attracting.cells.extents().items()
         for _, hi in parts
     )
 
 
-def _refuting(found: Attraction, scene: Scene, middle: ParameterBox) -> Violation:
+def _refuting(attracting: Attraction, scene: Scene, middle: ParameterBox) -> Violation:
     """Look for a periodic orbit of all parameters that violates the goal."""
     goal = scene.goal
     if not isinstance(goal, OrientedBeyond) or goal.from_anywhere:
         return Violation()
-    return violating_chain(found, middle, goal)
+    return violating_chain(attracting, middle, goal)
 
 
 # ---------------------------------------------------------------- the blocks
 
 
-def blocks_of(found: Attraction) -> tuple[Block, ...]:
+def blocks_of(attracting: Attraction) -> tuple[Block, ...]:
     """Say of each attracting component what it is proved to be like."""
-    grid, arrays = found.cover.grid, arrays_of(found, "")
+    grid, arrays = attracting.cover.grid, arrays_of(attracting, "")
     jog, flip = arrays["jog"], arrays["flip"]
     blocks = []
-    for number in range(int(found.component.max(initial=-1)) + 1):
-        inside = found.component == number
+    for number in range(int(attracting.component.max(initial=-1)) + 1):
+        inside = attracting.component == number
         sides = []
         for side in range(grid.sides):
             own = np.zeros_like(inside)
@@ -486,7 +486,9 @@ def blocks_of(found: Attraction) -> tuple[Block, ...]:
         extents = CellSet(grid, inside).extents()
         visits = {side: visit(jog, flip, inside, own) for side, own in enumerate(sides)}
         jogs = {side: each for side, each in visits.items() if each is not None}
-        blocks.append(Block(extents, _bands(found, inside, extents), jogs, _order(extents, jogs, grid.sides)))
+        blocks.append(
+            Block(extents, _bands(attracting, inside, extents), jogs, _order(extents, jogs, grid.sides))
+        )
     return tuple(blocks)
 
 
@@ -499,10 +501,10 @@ def _order(extents: Mapping[int, Any], jogs: Mapping[int, Visit], sides: int) ->
 
 
 def _bands(
-    found: Attraction, inside: NDArray[np.bool_], extents: Mapping[int, list[tuple[float, float]]]
+    attracting: Attraction, inside: NDArray[np.bool_], extents: Mapping[int, list[tuple[float, float]]]
 ) -> dict[int, int]:
     """Count the intervals of each side to which every orbit of the block comes."""
-    grid = found.cover.grid
+    grid = attracting.cover.grid
     bands = {}
     for side, parts in extents.items():
         bands[side] = 0
@@ -510,5 +512,5 @@ def _bands(
         for lo, hi in parts:
             wanted = np.zeros_like(inside)
             wanted[grid.of_side(side)] = (low >= lo) & (low < hi)
-            bands[side] += not throws_to_reach(found, inside, wanted & inside)[1].size
+            bands[side] += not throws_to_reach(attracting, inside, wanted & inside)[1].size
     return bands

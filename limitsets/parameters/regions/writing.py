@@ -265,14 +265,14 @@ def _of_blocks(records: Sequence[Record], sides: int) -> Arrays:
 
 def _of_chains(records: Sequence[Record]) -> Arrays:
     """Write the orbits that refute: intervals, with cell, side and branch of each."""
-    found = [(k, record.chain) for k, record in enumerate(records) if record.chain is not None]
+    chains = [(k, record.chain) for k, record in enumerate(records) if record.chain is not None]
     word = [
         [k, side, branch]
-        for k, chain in found
+        for k, chain in chains
         for side, branch in zip(chain.side.tolist(), chain.branches.tolist(), strict=True)
     ]
     ends = [
-        [lo, hi] for _, chain in found for lo, hi in zip(chain.lo.tolist(), chain.hi.tolist(), strict=True)
+        [lo, hi] for _, chain in chains for lo, hi in zip(chain.lo.tolist(), chain.hi.tolist(), strict=True)
     ]
     return {
         "chain": np.array(word, dtype=np.int32).reshape(-1, 3),

@@ -247,8 +247,8 @@ class Checkpoint:
         assert self.folder is not None
         try:
             record = json.loads((self.folder / RECORD).read_text(encoding="utf-8"))
-            found = {"digests": dict(record["digests"]), "margins": list(record["margins"])}
-            return found | {"curve": record["curve"]}
+            fields = {"digests": dict(record["digests"]), "margins": list(record["margins"])}
+            return fields | {"curve": record["curve"]}
         except (OSError, ValueError, KeyError, TypeError):
             return {}
 
@@ -271,11 +271,11 @@ class Checkpoint:
 
     def find(self, quantity: str, reading: str, unit: str) -> Entry | None:
         """Return an entry of an earlier run, if it is in the unit asked for."""
-        found = self.entries.get(f"{quantity} {reading}")
-        if found is None or found.unit != unit:
+        entry = self.entries.get(f"{quantity} {reading}")
+        if entry is None or entry.unit != unit:
             return None
         self.again += 1
-        return found
+        return entry
 
     def add(self, margin: Margin) -> Entry:
         """Write a margin's files, and it into the record."""

@@ -104,22 +104,22 @@ class _SheetRun:
         todo = [one for one, entry in zip(self.todo, known, strict=True) if entry is None]
         first = next((entry for entry in known if entry is not None), None)
         answers = iter(self._answers(todo, width, verdict, first))
-        found: list[Entry] = []
+        entries: list[Entry] = []
         for one, entry in zip(self.todo, known, strict=True):
             with self.step(f"margin of {one.quantity}, {one.reading}"):
                 answer = entry or next(answers)
                 if isinstance(answer, str):
                     self.left_out[f"margin of {one.quantity}, {one.reading}"] = answer
                 else:
-                    found.append(entry or self.checkpoint.keep(answer))
-        return found
+                    entries.append(entry or self.checkpoint.keep(answer))
+        return entries
 
     def _answers(
         self, todo: Sequence[DeviationScale], width: float, verdict: str, first: Entry | None
     ) -> Iterator[Entry | str]:
         """Ask for margins, one after the other, or on the executor; it is not handed goals that are code.
 
-        Of one whose search ends with an error, say which.
+        A search that ends with an error answers with the text of the error.
         """
         folder, recheck = self.checkpoint.folder, self.checkpoint.recheck
         ask = partial(_single, self.scene, self.goals, width, folder, recheck)
@@ -156,14 +156,14 @@ class _SheetRun:
         told["laid"] = {int(on): pairs for on, pairs in by_side(self.goals[0].laid).items()} or None
         with self.step("margins against X"):
             try:
-                found, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
+                margins, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
             except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
                 self.left_out["curve"] = str(error) if isinstance(error, AnswerError) else failure(error)
                 return None
         if left:
             words = f"there was no time for {left} more places; the same command goes on with them"
             self.left_out["rest of the curve"] = words
-        return found
+        return margins
 
     def audit(self) -> Audit:
         """Ask which assumptions of the model the scene breaks."""
@@ -181,10 +181,10 @@ class _SheetRun:
             self.tell("noise", done / of)
 
         with self.step("noise"):
-            found = noise_statistics(scene, noise, goal=place, cells=cells, progress=told)
+            statistics = noise_statistics(scene, noise, goal=place, cells=cells, progress=told)
         with self.step("noise at other levels"):
             levels = noise_levels(scene, noise, goal=place, cells=max(cells // 2, 1))
-        return found, levels
+        return statistics, levels
 
 
 def _single(
@@ -198,8 +198,8 @@ def _single(
 ) -> Entry:
     """Find the margin of one quantity and write its files; called in other processes, too."""
     told = None if tell is None else lambda step, _, __: tell(step)
-    (found,) = margin(scene, one.quantity, reading=one.reading, goal=goals, width=width, progress=told)
-    return written(found, folder, recheck)
+    (answer,) = margin(scene, one.quantity, reading=one.reading, goal=goals, width=width, progress=told)
+    return written(answer, folder, recheck)
 
 
 def _tried(ask: Callable[..., Entry], *about: Any) -> Entry | str:
@@ -342,9 +342,27 @@ def robustness(
         recheck=recheck,
     )
     told = progress or (lambda step, done, of: None)
-    sheet = _SheetRun(quiet, goals, todo, vector, checkpoint, told, seconds, executor)
+    sheet = _SheetRun(
+        quiet,
+        goals,
+        todo,
+        tolerance=vector,
+        checkpoint=checkpoint,
+        progress=told,
+        seconds=seconds,
+        executor=executor,
+    )
     try:
-        return _filled(sheet, given, noise, law, width, cells, frozenset(leave_out), begin)
+        return _filled(
+            sheet,
+            given,
+            noise,
+            law=law,
+            width=width,
+            cells=cells,
+            leave_out=frozenset(leave_out),
+            begin=begin,
+        )
     except KeyboardInterrupt as error:
         if folder is not None:
             error.add_note(GOES_ON)
@@ -361,7 +379,7 @@ def _filled(
     leave_out: frozenset[str],
     begin: float,
 ) -> Robustness:
-    """Ask part by part; of those that there is nothing of, say why."""
+    """Compute the sheet part by part; for each part left out, say why."""
     scene, goals, place = sheet.scene, sheet.goals, _place(sheet.goals)
     missing = sheet.left_out
     missing |= {part: "it was not asked for" for part in PARTS if part in leave_out}
@@ -383,25 +401,25 @@ def _filled(
     joint = None if "joint" in missing else sheet.joint(width)
     entries += [] if joint is None else [joint]
     against = None if "curve" in missing or place is None else sheet.curve(place[1])
-    found, levels = None, None
+    statistics, levels = None, None
     if "noise" not in missing and noise is not None and place is not None:
-        found, levels = sheet.chance(given, noise, place, cells)
+        statistics, levels = sheet.chance(given, noise, place, cells)
     flagged = None if "audit" in missing else sheet.audit()
     return Robustness(
-        scene,
-        goals,
-        verdict if scene == given else f"{verdict} {WITHOUT_SCATTER}",
-        reach_of([nominal]) if verdict == "proved" else None,
-        tuple(entries),
-        sheet.tolerance,
-        against,
-        found,
-        levels,
-        law,
-        flagged,
-        missing,
-        width,
-        sheet.checkpoint.digests,
-        sheet.checkpoint.again,
-        time.perf_counter() - begin,
+        scene=scene,
+        goals=goals,
+        verdict=verdict if scene == given else f"{verdict} {WITHOUT_SCATTER}",
+        reach=reach_of([nominal]) if verdict == "proved" else None,
+        entries=tuple(entries),
+        tolerance=sheet.tolerance,
+        curve=against,
+        noise=statistics,
+        levels=levels,
+        law=law,
+        audit=flagged,
+        left_out=missing,
+        width=width,
+        digests=sheet.checkpoint.digests,
+        again=sheet.checkpoint.again,
+        seconds=time.perf_counter() - begin,
     )

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,7 +45,16 @@ def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
     names, units = tuple(table["quantities"]), tuple(table["units"])
     # null becomes nan
     x, proved, refuted = (np.array(table[key], dtype=np.float64) for key in ("x", "proved", "refuted"))
-    return MarginsBeyond(scene, table["side"], x, names, units, proved, refuted, ())
+    return MarginsBeyond(
+        scene=scene,
+        side=table["side"],
+        x=x,
+        names=names,
+        units=units,
+        proved=proved,
+        refuted=refuted,
+        margins=(),
+    )
 
 
 def _joined(one: MarginsBeyond | None, other: MarginsBeyond) -> MarginsBeyond:
@@ -127,10 +137,11 @@ def curve(
     words = {"tolerance": tolerance, "laid": laid, "width": COARSE}
     places = places_beyond(scene, side, PLACES)
     places = places[np.argsort(np.abs(places - places.mean()), kind="stable")]
-    found = None if known is None or known["side"] != side else curve_read(known, scene)
-    done = set() if found is None else {round(x, 9) for x in found.x.tolist()}
+    margins = None if known is None or known["side"] != side else curve_read(known, scene)
+    done = set() if margins is None else {round(x, 9) for x in margins.x.tolist()}
     waiting = [x for x in places.tolist() if round(x, 9) not in done]
     pool = executor or _Here()
+    margin_there = partial(_place, scene, side, names, words)
     # concurrent.futures has no public word for it; of an executor of another kind it is not known
     at_once = getattr(pool, "_max_workers", 1)
     begun: dict[Future[MarginsBeyond], float] = {}
@@ -140,21 +151,21 @@ def curve(
             now = time.perf_counter()
             dearest = max([dearest, *(now - since for since in begun.values())])
             # what would not end in time is left to a later run
-            if (found is not None or begun) and end - now < dearest:
+            if (margins is not None or begun) and end - now < dearest:
                 break
             x, each = waiting[0], at_once * (end - now) / len(waiting)
             tell(f"margin beyond x = {x:.4g}", 1.0 - len(waiting) / PLACES)
-            one = pool.submit(_place, scene, side, names, words, x, min(EACH, max(each, LEAST)))
+            one = pool.submit(margin_there, x, min(EACH, max(each, LEAST)))
             begun[one] = now
             del waiting[0]
         if not begun:
             break
         for one in wait(begun, return_when=FIRST_COMPLETED).done:
             dearest = max(dearest, time.perf_counter() - begun.pop(one))
-            found = _joined(found, one.result())
-            keep(found.to_json())
-    assert found is not None
-    return found, len(waiting)
+            margins = _joined(margins, one.result())
+            keep(margins.to_json())
+    assert margins is not None
+    return margins, len(waiting)
 
 
 # ----------------------------------------------------------------
@@ -211,7 +222,7 @@ def scattering_from(scene: Scene, texts: Mapping[str, str], law: str = "gaussian
     """
     if law not in LAWS:
         raise AnswerError("the law of the noise", law, " or ".join(LAWS), "correct the word")
-    found: dict[str, Any] = {}
+    fields: dict[str, Any] = {}
     for name, text in texts.items():
         find(name)
         if name not in FIELDS:
@@ -223,8 +234,8 @@ def scattering_from(scene: Scene, texts: Mapping[str, str], law: str = "gaussian
             size /= scene.value(name)
         if name == "gravity.tilt" and given.relative:
             size *= scene.value(name)
-        found[FIELDS[name]] = LAWS[law](size)
-    return Scattering(**found)
+        fields[FIELDS[name]] = LAWS[law](size)
+    return Scattering(**fields)
 
 
 # ----------------------------------------------------------------
@@ -304,8 +315,8 @@ class Robustness(Tabled):
         of = Model.of(self.scene)
         if self.audit is None:
             return of
-        found = (each for each in self.audit.on("limit-set") if each.called_for and not each.simulated)
-        return replace(of, broken=tuple(each.effect for each in found))
+        broken = (each for each in self.audit.on("limit-set") if each.called_for and not each.simulated)
+        return replace(of, broken=tuple(each.effect for each in broken))
 
     @property
     def singles(self) -> tuple[Entry, ...]:
@@ -333,23 +344,23 @@ class Robustness(Tabled):
         if nominal is not None and entry.unit not in ("%", entry.nominal_unit):
             nominal = float(Fraction(repr(nominal)) * exact_factor(entry.nominal_unit, entry.unit))
         return Margin(
-            entry.quantity,
-            entry.reading,
-            self.goals,
-            entry.proved,
-            entry.refuted,
-            entry.unit,
-            nominal,
-            entry.reason,
-            entry.closed,
-            entry.seconds,
-            self.scene,
-            self.tolerance if joint else {},
-            {},
-            {},
-            (),
-            None,
-            entry.direction,
+            quantity=entry.quantity,
+            reading=entry.reading,
+            goals=self.goals,
+            proved=entry.proved,
+            refuted=entry.refuted,
+            unit=entry.unit,
+            nominal=nominal,
+            reason=entry.reason,
+            closed=entry.closed,
+            seconds=entry.seconds,
+            scene=self.scene,
+            tolerance=self.tolerance if joint else {},
+            deviations={},
+            noise={},
+            pieces=(),
+            against=None,
+            direction=entry.direction,
         )
 
     def tables(self) -> tuple[Table, ...]:
