@@ -348,7 +348,7 @@ class Kept(Protocol):
         """Numbers of the chunks that are kept."""
         ...
 
-    def write(self, found: Any) -> None:
+    def write(self, answer: Any) -> None:
         """Keep the answer of a chunk."""
         ...
 
@@ -437,7 +437,7 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
 def _kept(work: Work, store: Kept, future: Future[Any], number: int, told: _Told) -> bool:
     """Write the answers of a chunk; False where the worker died."""
     try:
-        found = future.result()
+        answer = future.result()
     except BrokenExecutor:
         return False
     except LimitsetsError:
@@ -447,7 +447,7 @@ def _kept(work: Work, store: Kept, future: Future[Any], number: int, told: _Told
             work.task, f"{type(error).__name__}: {error}", "a task that answers",
             f"it failed in the chunk at {work.place(number)}",
         ) from error  # fmt: skip
-    store.write(found)
+    store.write(answer)
     told.points += work.size(number)
     return True
 
@@ -504,9 +504,9 @@ class TrialFile:
         """Numbers of the chunks of which every trial is kept."""
         return {k for k in range(self.chunks) if all(number in self.rows for number in self.numbers(k))}
 
-    def write(self, found: list[tuple[int, Row]]) -> None:
+    def write(self, trials: list[tuple[int, Row]]) -> None:
         """Keep trials."""
-        self.rows |= {number: as_plain(row) for number, row in found}
+        self.rows |= {number: as_plain(row) for number, row in trials}
         if self.path is None:
             return
         rows = {str(number): self.rows[number] for number in sorted(self.rows)}

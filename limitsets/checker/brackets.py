@@ -142,7 +142,7 @@ def read_laws(value: object) -> dict[str, str]:
 
 def read_places(value: object, where: str, scene: Scene) -> list[Place]:
     """Read places: side, from x, to x; null for the end of the arm."""
-    found: list[Place] = []
+    places: list[Place] = []
     where = plain(where)
     for row in rows(value, where, 1, 1000):
         number, lo, hi = rows(row, where, 3, 3)
@@ -151,8 +151,8 @@ def read_places(value: object, where: str, scene: Scene) -> list[Place]:
         last = scene.arm[0] if hi is None else length_of(hi, where, scene)
         on = first < last <= scene.arm[0] and bool(exact(first) > scene.sides[side].a)
         require(on, f"{where}: a place is not one of the arm")
-        found.append((side, first, last))
-    return found
+        places.append((side, first, last))
+    return places
 
 
 def length_of(value: object, where: str, scene: Scene) -> Fraction:
@@ -286,27 +286,27 @@ def check_within(chain: Chain, row: Rows, name: str, said: Array) -> tuple[str, 
     value = {each: float(name in (ANY, each)) for each in chain.absorbed}
     fixed = [chain.fixed({each: sign * v for each, v in value.items()}) for sign in (-1.0, 1.0)]
     bound = [chain.first(each) for each in fixed]
-    found = np.empty(said.shape)
+    brackets = np.empty(said.shape)
     for n in range(len(said)):
         if n:
             bound = [chain.above(values, each) for values, each in zip(bound, fixed, strict=True)]
-        found[n] = -mean_above(row, bound[0]), mean_above(row, bound[1])
+        brackets[n] = -mean_above(row, bound[0]), mean_above(row, bound[1])
     # to have ended is for ever: a lower bound holds later on, an upper one earlier
-    found[:, 0] = np.maximum(np.maximum.accumulate(found[:, 0]), 0.0)
-    found[:, 1] = np.minimum(np.minimum.accumulate(found[::-1, 1])[::-1], 1.0)
-    wrong = np.flatnonzero(~((said[:, 0] <= found[:, 0]) & (found[:, 1] <= said[:, 1])))
+    brackets[:, 0] = np.maximum(np.maximum.accumulate(brackets[:, 0]), 0.0)
+    brackets[:, 1] = np.minimum(np.minimum.accumulate(brackets[::-1, 1])[::-1], 1.0)
+    wrong = np.flatnonzero(~((said[:, 0] <= brackets[:, 0]) & (brackets[:, 1] <= said[:, 1])))
     if not len(wrong):
-        return "", found
+        return "", brackets
     n = int(wrong[0])
-    lo, hi = rounded(float(found[n, 0]), up=False), rounded(float(found[n, 1]), up=True)
+    lo, hi = rounded(float(brackets[n, 0]), up=False), rounded(float(brackets[n, 1]), up=True)
     claimed = f"[{float(said[n, 0])!r}, {float(said[n, 1])!r}]"
-    return f"P({plain(name)} within {n} throws): {claimed} is claimed, [{lo}, {hi}] is proved", found
+    return f"P({plain(name)} within {n} throws): {claimed} is claimed, [{lo}, {hi}] is proved", brackets
 
 
-def check_quantiles(c: Chances, found: dict[str, Array]) -> str:
+def check_quantiles(c: Chances, brackets: dict[str, Array]) -> str:
     """Check the quantiles by the brackets found; "" or the reason."""
     for name, share, lo, hi in c.quantiles:
-        low, high = found[name].T
+        low, high = brackets[name].T
         none_before = lo == 0 or (lo <= len(high) and Fraction(float(high[lo - 1])) < share)
         there = hi < len(low) and Fraction(float(low[hi])) >= share
         if not (none_before and there):
@@ -359,14 +359,14 @@ def check_chances(c: Chances, progress: Callable[[int, int], None] | None) -> tu
             progress(done, work)
 
     chain, row = chain_of(c.noisy, mesh, kinds, absorbed, told), start_row(c, mesh)
-    found: dict[str, Array] = {}
+    brackets: dict[str, Array] = {}
     bad = ""
     for name, said in c.within.items():
-        bad, found[name] = check_within(chain, row, name, said)
+        bad, brackets[name] = check_within(chain, row, name, said)
         told(len(mesh.place))
         if bad:
             break
-    bad = bad or check_quantiles(c, found)
+    bad = bad or check_quantiles(c, brackets)
     if not bad and c.mean is not None:
         bad = check_mean(chain, row, c.mean)
     if progress is not None:

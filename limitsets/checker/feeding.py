@@ -120,8 +120,8 @@ def cells_ahead(end: ArmEnd, scene: Scene, side: int) -> Array | None:
     if not bound < 1 or check_all_jog(s, scene.k_lo.union(scene.k_hi), arb(edge), bound):
         return None
     far = near_landing(s, scene.k_lo, scene.k_hi, edge)
-    found: Array = (c.side == side) & (c.lower() <= (float_above(far) if far.is_finite() else math.inf))
-    return found
+    ahead: Array = (c.side == side) & (c.lower() <= (float_above(far) if far.is_finite() else math.inf))
+    return ahead
 
 
 def thrown_into(end: ArmEnd, places: Array, gaps: list[bool]) -> Array:
@@ -231,8 +231,8 @@ def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: C
 def check_images_used(end: ArmEnd, scene: Scene, box: int, used: Array, crew: Crew) -> str:
     """Check the throws from the cells on which something rests; "" or the reason."""
     tasks = [freed(end.c, task) for task in tasks_of(end.c, scene, box, np.flatnonzero(used), None)]
-    found = crew.run(tasks)
-    return "" if found is None else f"{end.c.name(found[0])}: {found[1].text}"
+    failure = crew.run(tasks)
+    return "" if failure is None else f"{end.c.name(failure[0])}: {failure[1].text}"
 
 
 def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:

@@ -61,10 +61,10 @@ class Links(Landings):
             if not self.known(cell):
                 self.kinds[cell] = HARD
         live = np.flatnonzero(self.kinds == LIVE)
-        found = {cell: self.branch_of(cell) for cell in live.tolist()}
-        self.assign(found)
+        borders = {cell: self.branch_of(cell) for cell in live.tolist()}
+        self.assign(borders)
         for cell in live.tolist():
-            self.add_cell(cell, found[cell])
+            self.add_cell(cell, borders[cell])
         # a node between cells that have become hard just now has no bound of how far its throws may be off
         kept = np.flatnonzero(self.kinds == LIVE).tolist()
         self.at_cut = {node: self.at_cut[node] for cell in kept for node in (cell, cell + 1)}

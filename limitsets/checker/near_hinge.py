@@ -125,7 +125,7 @@ def check_thrown_out(scene: Scene, side: int, edge: float) -> str:
 
 def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
     """Find two angles, proved E < 0 at the first and E > 0 at the second for all parameters; None if Newton fails."""
-    found = []
+    angles = []
     for sign, a, d, h in (
         (-1, s.a.upper(), s.d.lower(), s.h.lower()),
         (1, s.a.lower(), s.d.upper(), s.h.upper()),
@@ -145,8 +145,8 @@ def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
                 break
         else:
             return None
-        found.append(r)
-    return found[0], found[1]
+        angles.append(r)
+    return angles[0], angles[1]
 
 
 def last_angle(s: Side, x: float, k_lo: Arb) -> Ratios | None:
@@ -331,10 +331,10 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array
     if bad:
         return bad
     cells = np.flatnonzero(left)
-    found = links_within(c, left, cells, kind)
-    if found is None:
+    links = links_within(c, left, cells, kind)
+    if links is None:
         return "there are too many targets"
-    source, to, group = found
+    source, to, group = links
     slots, slot = np.unique(to * (2 * len(cells) + 2) + group, return_inverse=True)
     owner = slots // (2 * len(cells) + 2)
     density: Array = left.astype(np.float64)

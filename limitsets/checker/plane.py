@@ -217,12 +217,12 @@ def check_plane_cells(
     pool = ProcessPoolExecutor(workers, get_context("spawn"), start_region_worker) if some else None
     try:
         with deaf_children():
-            found = (
+            failures = (
                 map(check_region_cell, claims_of_cells(plane))
                 if pool is None
                 else pool.map(check_region_cell, claims_of_cells(plane), chunksize=4)
             )
-        for k, bad in enumerate(found):
+        for k, bad in enumerate(failures):
             if bad:
                 return k, bad
             if progress is not None:
@@ -293,7 +293,7 @@ def blocks_correspond(plane: Plane, i: int, j: int) -> bool:
 
 def common_cells(plane: Plane, i: int, j: int) -> tuple[Array, Array]:
     """Cut the arm at the borders of both grids: the cell of each grid in which a piece lies, -1 outside."""
-    found: list[list[Array]] = [[], []]
+    cells: list[list[Array]] = [[], []]
     starts = [0, 0]
     grids = [plane.grids[int(plane.flat["grid"][k])] for k in (i, j)]
     for side in range(plane.n_sides):
@@ -302,9 +302,9 @@ def common_cells(plane: Plane, i: int, j: int) -> tuple[Array, Array]:
             edges = grid[side]
             at = np.searchsorted(edges, cuts[:-1], side="right") - 1
             inside = (at >= 0) & (at < len(edges) - 1)
-            found[own].append(np.where(inside, starts[own] + at, -1))
+            cells[own].append(np.where(inside, starts[own] + at, -1))
             starts[own] += len(edges) - 1
-    return np.concatenate(found[0]), np.concatenate(found[1])
+    return np.concatenate(cells[0]), np.concatenate(cells[1])
 
 
 def area_shares(plane: Plane) -> tuple[Fraction, Fraction, Fraction]:

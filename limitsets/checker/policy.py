@@ -420,12 +420,12 @@ def check_images(
     crew = Crew([each.scene.raw for each in policy.choices], policy.noise, workers, told)
     try:
         for k, some in enumerate(made):
-            found = crew.run(
+            failure = crew.run(
                 list(tasks_of(policy.cells[k], policy.choices[k].scene, k, np.flatnonzero(some), None))
             )
-            if found is not None:
+            if failure is not None:
                 name = f"the throw {policy.choices[k].name}"
-                return f"{name}, {policy.cells[k].name(found[0])}: {found[1].text}", crew.boxes
+                return f"{name}, {policy.cells[k].name(failure[0])}: {failure[1].text}", crew.boxes
     finally:
         crew.close()
     return "", crew.boxes

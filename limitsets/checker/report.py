@@ -403,8 +403,8 @@ def check_boxes(file: Certificate, crew: Crew, failed: dict[str, str]) -> None:
     for k, (scene, c) in enumerate(zip(file.scenes, file.cells, strict=True)):
         bad = over_halves(scene, check_parameters, file.parameters[k], f"box {k}")
         where = f"box {k}, " if len(file.scenes) > 1 else ""
-        found = [(list(claims), bad)] if bad else check_box_claims(scene, c, k, claims, crew)
-        for names, reason in found:
+        failures = [(list(claims), bad)] if bad else check_box_claims(scene, c, k, claims, crew)
+        for names, reason in failures:
             for name in names:
                 failed.setdefault(name, where + reason)
         scene.parts.clear()  # room

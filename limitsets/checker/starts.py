@@ -100,14 +100,14 @@ def read_laid(value: object, n_sides: int) -> list[list[Span]]:
     """Read by side the ranges in which parts are laid down: ascending, apart, and one at least."""
     known = table(value, "the ranges of the starts", "", " ".join(map(str, range(n_sides))))
     require(bool(known), "there are no ranges of the starts")
-    found: list[list[Span]] = []
+    ranges: list[list[Span]] = []
     for i in range(n_sides):
         pairs = rows(known[str(i)], "ranges", 1, 100) if str(i) in known else []
         ends = [hex_float(end, "a range") for pair in pairs for end in rows(pair, "a range", 2, 2)]
         ascending = all(a < b for a, b in itertools.pairwise(ends))
         require(ascending, "the ranges of the starts are empty, or do not ascend")
-        found.append(list(zip(ends[::2], ends[1::2], strict=True)))
-    return found
+        ranges.append(list(zip(ends[::2], ends[1::2], strict=True)))
+    return ranges
 
 
 def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: list[Pair | None]) -> None:
@@ -201,16 +201,16 @@ def share_of_ranges(c: Cells, laid: list[list[Span]], cells: Array, end: float) 
 
 def led_to(c: Cells, cells: Array) -> Array:
     """Find the cells given, and all to which some orbit from them may come, by the targets of the cells."""
-    found, new = cells.copy(), cells.copy()
+    reached, new = cells.copy(), cells.copy()
     while new.any():
-        marks = np.zeros(len(found) + 1, dtype=np.int64)
+        marks = np.zeros(len(reached) + 1, dtype=np.int64)
         for array in (c.jog, c.flip):
             q = np.flatnonzero((array[:, 0] >= 0) & new)
             np.add.at(marks, array[q, 0], 1)
             np.add.at(marks, array[q, 1] + 1, -1)
-        new = (np.cumsum(marks[:-1]) > 0) & ~found
-        found |= new
-    return found
+        new = (np.cumsum(marks[:-1]) > 0) & ~reached
+        reached |= new
+    return reached
 
 
 def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> str:
@@ -295,14 +295,14 @@ def check_passing(scene: Scene, side: int, phi: list[float]) -> str:
 
 def leading_to(c: Cells, cells: Array) -> Array:
     """Find the cells from which some orbit may lead to the cells given, and these cells."""
-    found, count = cells.copy(), -1
-    while count != int(found.sum()):
-        count = int(found.sum())
-        number = np.concatenate([[0], np.cumsum(found)])
+    leading, count = cells.copy(), -1
+    while count != int(leading.sum()):
+        count = int(leading.sum())
+        number = np.concatenate([[0], np.cumsum(leading)])
         for array in (c.jog, c.flip):
             q = np.flatnonzero(array[:, 0] >= 0)
-            found[q] |= number[array[q, 1] + 1] > number[array[q, 0]]
-    return found
+            leading[q] |= number[array[q, 1] + 1] > number[array[q, 0]]
+    return leading
 
 
 def check_lost(scene: Scene, side: int, end: float) -> str:

@@ -291,12 +291,12 @@ class Assembly(Tabled):
     @property
     def survived(self) -> dict[str, Rate]:
         """Assembled pairs that are whole after one more throw: with a standing cavity, and with one that is thrown."""
-        found = {}
+        rates = {}
         for name in ("standing", "carried"):
             known = [row[f"survives_{name}"] for row in self.rows if row.get(f"survives_{name}") is not None]
             if known:
-                found[name] = rate_of(sum(known), len(known))
-        return found
+                rates[name] = rate_of(sum(known), len(known))
+        return rates
 
     def example(self, outcome: str) -> int | None:
         """Give the number of the first trial that ended so."""

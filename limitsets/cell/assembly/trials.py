@@ -115,8 +115,8 @@ def _thrown(end: ArmEnd, params: Any, start: Start, shift: float) -> tuple[Start
     """Throw one part: where it lies, its fate if it has met one, and the side it comes to lie on."""
     if end.at_edge(*start):
         return start, "edge", start[1]
-    found = images(params, [start[0]], start[1])
-    x, side, code = float(found.x[0]) + shift, int(found.side[0]), int(found.code[0])
+    image = images(params, [start[0]], start[1])
+    x, side, code = float(image.x[0]) + shift, int(image.side[0]), int(image.code[0])
     scene = end.scene
     if code == codes.OUTSIDE_MODEL or not float(scene.sides.a[side]) < x <= scene.arm_length:
         return (x, side), "left", side

@@ -203,8 +203,8 @@ class Filled:
     def passes_to(self, share: float) -> int | None:
         """Give the passes after which this share of the last fraction is filled; None where it takes more, or is 0."""
         last = self.last[self.number]
-        found = np.flatnonzero((self.right >= share * last) & (last > 0.0))
-        return int(found[0]) if found.size else None
+        enough = np.flatnonzero((self.right >= share * last) & (last > 0.0))
+        return int(enough[0]) if enough.size else None
 
     def to_json(self) -> dict[str, Any]:
         """Give the numbers as JSON takes them."""
@@ -472,14 +472,14 @@ def tray(
     follow = (False, True) if histories else ()
     followed = tuple(_followed(asked, histories, passes, seed, back, executor, progress) for back in follow)
     chances = filled(counted, passes, random_of(seed, INTERVALS))
-    found = TrayFill(read, asked, counted, chances, followed, seed)
+    answer = TrayFill(read, asked, counted, chances, followed, seed)
     if pouring is None:
-        return found
+        return answer
     kept = TrialFile(None if file is None else Path(file), pouring.question(), batches, 1)
     name = f"{pouring.parts} parts at once"
     complete(kept, made, (pouring,), name, "batches", executor=executor, workers=workers, progress=progress)
     chain = filled(counted, passes, random_of(seed, INTERVALS), pouring.parts / pouring.depressions)
-    return replace(found, crowds=crowds_of(pouring, tuple(kept)), crowd_chain=chain)
+    return replace(answer, crowds=crowds_of(pouring, tuple(kept)), crowd_chain=chain)
 
 
 def _followed(

@@ -296,12 +296,12 @@ class TrayCrowd:
 
 def crowds_of(pouring: Pouring, rows: Sequence[Row]) -> tuple[TrayCrowd, ...]:
     """Count batches: of parts that push each other, and of parts that pass through each other."""
-    found = []
+    crowds = []
     for name in ("pushing", "passing"):
         kept = [row[name] for row in rows]
         states = np.array([each["states"] for each in kept], dtype=np.int64)
         right, covered, wrong = np.moveaxis(states, -1, 0)
-        found.append(
+        crowds.append(
             TrayCrowd(
                 pouring.parts,
                 pouring.depressions,
@@ -316,4 +316,4 @@ def crowds_of(pouring: Pouring, rows: Sequence[Row]) -> tuple[TrayCrowd, ...]:
                 pouring.seed,
             )
         )
-    return tuple(found)
+    return tuple(crowds)

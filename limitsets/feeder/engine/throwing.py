@@ -377,6 +377,6 @@ def _by_map(
     after, on, code = np.empty_like(x), np.empty_like(side), np.empty_like(side)
     for each in np.unique(side).tolist():
         here = side == each
-        found = images(scene.map, x[here], each)
-        after[here], on[here], code[here] = found.x, found.side, found.code
+        image = images(scene.map, x[here], each)
+        after[here], on[here], code[here] = image.x, image.side, image.code
     return after, on, code

@@ -75,17 +75,17 @@ def _compiled_helpers(function: Callable[..., Any], proof: bool) -> dict[str, An
 
 def _compiled_values(values: dict[str, Any], names: set[str], proof: bool) -> dict[str, Any]:
     """Those of the values in whose place another one has to stand."""
-    found = {}
+    compiled_values = {}
     for name, value in values.items():
         if _is_plain(value):
-            found[name] = _helper(value, proof)
+            compiled_values[name] = _helper(value, proof)
         elif isinstance(value, python_types.ModuleType) and value.__name__.split(".")[0] not in COMPILED:
             own = vars(value)
             inside = _compiled_values({key: own[key] for key in names & own.keys()}, names, proof)
             if inside:
-                found[name] = python_types.ModuleType(value.__name__)
-                vars(found[name]).update(own, **inside)
-    return found
+                compiled_values[name] = python_types.ModuleType(value.__name__)
+                vars(compiled_values[name]).update(own, **inside)
+    return compiled_values
 
 
 def _in_scope(function: Callable[..., Any], scope: dict[str, Any]) -> Any:
@@ -108,8 +108,8 @@ def with_helpers(function: Callable[..., Any], proof: bool) -> Callable[..., Any
     """Return a kernel whose plain helpers are compiled; itself where it has none, as all of the package."""
     if (function.__module__ or "").split(".")[0] == "limitsets":
         return function
-    found = _compiled_helpers(function, proof)
-    return _in_scope(function, {**function.__globals__, **found}) if found else function
+    helpers = _compiled_helpers(function, proof)
+    return _in_scope(function, {**function.__globals__, **helpers}) if helpers else function
 
 
 # What numba says around the cause of a failure.

@@ -163,8 +163,8 @@ def entropy_of(mass: Floats) -> Floats:
     """Entropy of each column."""
     with np.errstate(divide="ignore", invalid="ignore"):
         p = mass / mass.sum(axis=0)
-        found: Floats = np.where(p > 0.0, -p * np.log(p), 0.0).sum(axis=0)
-    return found
+        entropy: Floats = np.where(p > 0.0, -p * np.log(p), 0.0).sum(axis=0)
+    return entropy
 
 
 def least_entropy(mass: Floats, open_to: NDArray[np.bool_], rest: Floats) -> Floats:
@@ -375,7 +375,7 @@ def _of_boundary(each: Boxes) -> tuple[Floats, float, float, float]:
 def _measured(
     measure: Callable[[Boxes], tuple[Floats, float, float, float]],
     graph: TransitionGraph,
-    found: tuple[Attractor, ...],
+    attractors: tuple[Attractor, ...],
     box: int,
     starts: int | None,
     steps: int,
@@ -384,7 +384,7 @@ def _measured(
     most = int(graph.grid.shape.min())
     if not 2 <= box <= most:
         raise AnswerError("the cells along a box", box, f"an integer from 2 to {most}", "pass box=20")
-    parted, followed = colours(graph, found), None
+    parted, followed = colours(graph, attractors), None
     if starts is None:
         each = of_cells(parted, box)
         weight, value, lo, hi = measure(each)

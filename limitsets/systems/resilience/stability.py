@@ -589,12 +589,12 @@ def _border(parted: Colours, state: Floats, side: int) -> list[tuple[float, floa
     Below its lower border a state has left for certain only at the anchor, if there is one (a_i of the throw).
     """
     domain, ways = parted.grid.domain, list(parted.graph.exits.values())
-    target, found = Target.of(parted.grid, parted.graph.exits), []
+    target, shocks = Target.of(parted.grid, parted.graph.exits), []
     for axis, x in enumerate(state.tolist()):
         lo, hi = float(domain.lo[side, axis]), float(domain.hi[side, axis])
         foot = lo if domain.anchor is None else float(domain.anchor[side])
         for near, far, sink in ((lo, foot, target.sink_below), (hi, hi, target.sink_above)):
             push = np.zeros(state.size)
             push[axis] = far - x
-            found.append((abs(near - x), abs(far - x), push, ways[sink]))
-    return found
+            shocks.append((abs(near - x), abs(far - x), push, ways[sink]))
+    return shocks
