@@ -91,7 +91,6 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     strata = section["strata"]
     require(type(strata) is int and 1 <= strata <= MOST_STRATA, f"strata is not from 1 to {MOST_STRATA}")
     noisy = Noisy(still.sides, still.k_lo.union(still.k_hi), speed.lo, landing, strata)
-    n_sides = len(scene.sides)
     places = {
         plain(name): read_places(some, name, scene)
         for name, some in table_of(section["absorbing"], "absorbing").items()
@@ -103,7 +102,17 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     names = rows(section["names"], "names", 1, 100)
     known = all(isinstance(name, str) and name in (ANY, LEFT, *places) for name in names)
     require(known and len(set(names)) == len(names), "names are not those of places that absorb")
-    said = header["arrays"]
+    edges, within = read_brackets(header["arrays"], entries, names, scene)
+    quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
+    mean = None if section["mean"] is None else read_mean(section["mean"])
+    return Chances(scene.raw, laws, scene, noisy, starts, places, edges, within, quantiles, mean)
+
+
+def read_brackets(
+    said: Any, entries: dict[str, memoryview], names: list[str], scene: Scene
+) -> tuple[list[Array], dict[str, Array]]:
+    """Read the arrays: the edges of the cells of each side, and the brackets of each name."""
+    n_sides = len(scene.sides)
     wanted = {**{f"edges.{i}": 1 for i in range(n_sides)}, **{f"within.{k}": 2 for k in range(len(names))}}
     there = isinstance(said, dict) and set(said) == set(wanted)
     require(
@@ -118,9 +127,7 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     within = {name: read[f"within.{k}"] for k, name in enumerate(names)}
     lengths = {len(each) for each in within.values()}
     require(len(lengths) == 1 and 1 <= lengths.pop() <= MOST_BRACKETS + 1, "the brackets are not alike many")
-    quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
-    mean = None if section["mean"] is None else read_mean(section["mean"])
-    return Chances(scene.raw, laws, scene, noisy, starts, places, edges, within, quantiles, mean)
+    return edges, within
 
 
 def table_of(value: object, where: str) -> dict[str, Any]:

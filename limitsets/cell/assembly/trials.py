@@ -239,8 +239,10 @@ class _Watched:
         if any(rest.where == "unfinished" for rest in rests):
             return "unfinished"
         inside = [k for k, rest in enumerate(rests) if rest.where == "cavity"]
-        if not inside:
-            return "never"
+        return self._outcome_inside(rests, inside) if inside else "never"
+
+    def _outcome_inside(self, rests: list[Rest], inside: list[int]) -> str:
+        """Say why parts of which at least one lies in the cavity are not assembled."""
         sides = [end.side for end in self.pair.ends]
         if any(rests[k].side not in (sides[k], -1) for k in inside):
             return "wrong"

@@ -133,6 +133,15 @@ class FeedingProof(NamedTuple):
     attraction: Attraction
 
 
+def _cuts(end: ArmEnd) -> dict[int, list[float]]:
+    """Places, by side, at which cells have to end: the end of the arm, and the ends of where parts are laid down."""
+    borders = [below(end.x), above(end.x)]
+    return {
+        side: borders + [place for on, *ends in end.laid if on == side for place in ends]
+        for side in range(len(end.scene.sides))
+    }
+
+
 def proved_feeding(
     end: ArmEnd,
     noise: Mapping[str, str] | None = None,
@@ -170,11 +179,7 @@ def proved_feeding(
         )
     tell = progress or (lambda stage, done, of: None)
     every = joined(spelled_deviations(scene, noise), spelled_deviations(scene, scattered(scene)))
-    box, borders = parameter_box(scene, noise=every), [below(end.x), above(end.x)]
-    cuts = {
-        side: borders + [place for on, *ends in end.laid if on == side for place in ends]
-        for side in range(len(scene.sides))
-    }
+    box, cuts = parameter_box(scene, noise=every), _cuts(end)
     wrong = OrientedBeyond(end.x, end.side, from_anywhere=True).wrong()
     shown: tuple[State, ...] = ()
     never = Refutation()

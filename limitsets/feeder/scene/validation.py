@@ -169,8 +169,8 @@ def _contradictions(tree: Tree, file: str | None) -> Iterator[SceneError]:
 
 def _contradictions_of_mass(mass: Tree, file: str | None) -> Iterator[SceneError]:
     """Refuse a mass that is both measured and computed from a plate, or neither."""
-    measured = [name for name in ("center", "radius_of_gyration") if name in mass]
-    made = [name for name in ("plate_density", "plate_thickness", "points") if name in mass]
+    measured: list[str] = [name for name in ("center", "radius_of_gyration") if name in mass]
+    made: list[str] = [name for name in ("plate_density", "plate_thickness", "points") if name in mass]
     allowed = "center and radius_of_gyration, or plate_density and points"
     if measured and made:
         words = " and ".join(measured + made)
