@@ -552,11 +552,11 @@ def complete(
         kept.chunks,
         made,
         given,
-        lambda chunk: len(kept.numbers(chunk)),
-        lambda chunk: f"{points} {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
-        f"the {points}",
-        name,
-        points,
+        size=lambda chunk: len(kept.numbers(chunk)),
+        place=lambda chunk: f"{points} {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
+        task=f"the {points}",
+        name=name,
+        points=points,
     )
     here = executor is None and cluster is None and workers is None
     alone = nullcontext() if kept.path is None else locked(kept.path)

@@ -139,10 +139,10 @@ def slopes_over(s: Side, phi: Arb, kappa: Arb, factor: Arb) -> Slopes:
         1 + rate * one,
         rate * phi_k * by_d,
         turn * one**2 + rate * phi_xx,
-        (turn * one * phi_k + rate * phi_xk) * by_d,
-        (turn * phi_k**2 + rate * phi_kk) * by_d**2 + rate * phi_k * by_dd,
-        one,
-        phi_k,
+        xd=(turn * one * phi_k + rate * phi_xk) * by_d,
+        dd=(turn * phi_k**2 + rate * phi_kk) * by_d**2 + rate * phi_k * by_dd,
+        phi_x=one,
+        phi_k=phi_k,
     )
 
 

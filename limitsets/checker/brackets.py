@@ -105,7 +105,18 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     edges, within = read_brackets(header["arrays"], entries, names, scene)
     quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
     mean = None if section["mean"] is None else read_mean(section["mean"])
-    return Chances(scene.raw, laws, scene, noisy, starts, places, edges, within, quantiles, mean)
+    return Chances(
+        scene.raw,
+        laws,
+        scene,
+        noisy=noisy,
+        starts=starts,
+        absorbing=places,
+        edges=edges,
+        within=within,
+        quantiles=quantiles,
+        mean=mean,
+    )
 
 
 def read_brackets(

@@ -199,7 +199,16 @@ def check_cell(
     k_lo, k_hi = scene.k_lo, scene.k_hi
     s = scene.sides[side]
     first = Box(
-        scene, arb(x[0]), arb(x[1]), k_lo, k_hi, at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1])), 0, 0, 0
+        scene,
+        arb(x[0]),
+        arb(x[1]),
+        k0=k_lo,
+        k1=k_hi,
+        low=at_angle(s, arb(phi[0])),
+        high=at_angle(s, arb(phi[1])),
+        in_x=0,
+        in_k=0,
+        in_s=0,
     )
     bad = check_bracket(s, first)
     if bad and scene.loose > 0:

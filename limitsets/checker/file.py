@@ -374,8 +374,8 @@ def read_cells(entries: dict[str, memoryview], said: dict[str, Any], prefix: str
     edges = [read(f"edges.{i}", "<f8") for i in range(sides)]
     require(all(len(e) >= 2 for e in edges), "a side has no cells")
     cells = Cells(
-        edges, read("jog", "<i4", 2), read("flip", "<i4", 2), read("branch", "|i1"),
-        read("rank", "<i4"), read("component", "<i4"), read("phi", "<f8", 2),
+        edges, read("jog", "<i4", 2), read("flip", "<i4", 2), branch=read("branch", "|i1"),
+        rank=read("rank", "<i4"), component=read("component", "<i4"), phi=read("phi", "<f8", 2),
     )  # fmt: skip
     n = len(cells.side)
     arrays = (cells.jog, cells.flip, cells.branch, cells.rank, cells.component, cells.phi)

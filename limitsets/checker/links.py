@@ -283,5 +283,18 @@ def chain_of(
     curved, turned = np.unique(ends.at), np.unique(turns.at)
     beside = parts.hard.array("node", np.int64)
     return Chain(
-        mesh, rows, live, absorbed, table, cells, nodes, hard, beside, ends, inner, turns, curved, turned
+        mesh,
+        rows,
+        live,
+        absorbed=absorbed,
+        table=table,
+        cells=cells,
+        nodes=nodes,
+        hard=hard,
+        beside=beside,
+        ends=ends,
+        inner=inner,
+        turns=turns,
+        curved=curved,
+        turned=turned,
     )

@@ -123,7 +123,18 @@ def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
     require(
         read == set(said) and {f"{name}.npy" for name in read} == set(entries), "there are other arrays too"
     )
-    return Plane(raw, axes, n_sides, flat, tall, grids, first, blocks, chain, ends)
+    return Plane(
+        raw,
+        axes,
+        n_sides,
+        flat=flat,
+        tall=tall,
+        grids=grids,
+        first=first,
+        blocks=blocks,
+        chain=chain,
+        ends=ends,
+    )
 
 
 def read_axis(value: object, raw: dict[str, Any]) -> Axis:
@@ -186,14 +197,14 @@ def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
             raw,
             int(f["goal"][k]),
             plane.grids[grid] if grid >= 0 else None,
-            {name: each[rows_of] for name, each in plane.tall.items()},
-            STARTS_WORDS[int(f["starts"][k])],
-            f["from"][k].tolist(),
-            f["joint"][k].reshape(-1, 3).tolist() if f["near"][k] else None,
-            f["counts"][k].tolist(),
-            plane.blocks[blocks[k] : blocks[k + 1], 1:].tolist(),
-            plane.chain[orbit, 1:].tolist(),
-            plane.ends[orbit].tolist(),
+            arrays={name: each[rows_of] for name, each in plane.tall.items()},
+            starts=STARTS_WORDS[int(f["starts"][k])],
+            since=f["from"][k].tolist(),
+            near=f["joint"][k].reshape(-1, 3).tolist() if f["near"][k] else None,
+            counts=f["counts"][k].tolist(),
+            blocks=plane.blocks[blocks[k] : blocks[k + 1], 1:].tolist(),
+            chain=plane.chain[orbit, 1:].tolist(),
+            ends=plane.ends[orbit].tolist(),
         )
 
 

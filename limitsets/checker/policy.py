@@ -200,7 +200,15 @@ def read_arrays(
         require(len(jog) == len(flip) == len(phi) == n, "the images do not fit the cells")
         nothing = np.zeros(n, dtype=np.int64)
         cells.append(
-            Cells(edges, jog.astype(np.int64), flip.astype(np.int64), nothing, nothing, nothing, phi)
+            Cells(
+                edges,
+                jog.astype(np.int64),
+                flip.astype(np.int64),
+                branch=nothing,
+                rank=nothing,
+                component=nothing,
+                phi=phi,
+            )
         )
     throw, left, after = array("throw", "<i4"), array("left", "<i4"), array("after", "<i4", answers)
     belief = array("belief", "<i4", 3)

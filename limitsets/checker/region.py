@@ -99,7 +99,15 @@ def cells_of(claimed: Claimed) -> Cells:
     both = (jog[:, 0] >= 0) & (flip[:, 0] >= 0)
     branch = np.where(both, 2, np.where(flip[:, 0] >= 0, 1, 0))
     rank, component = a["rank"].astype(np.int64), a["component"].astype(np.int64)
-    return Cells(list(claimed.grid or ()), jog, flip, branch, rank, component, a["phi"].astype(np.float64))
+    return Cells(
+        list(claimed.grid or ()),
+        jog,
+        flip,
+        branch=branch,
+        rank=rank,
+        component=component,
+        phi=a["phi"].astype(np.float64),
+    )
 
 
 def starts_of(claimed: Claimed) -> Starts:

@@ -189,7 +189,17 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
     claims, unknown = read_claims(header["claims"], n_sides)
     parameters = [b["parameters"] for b in boxes]
     noise, tolerance = header["noise"], header["tolerance"]
-    return Certificate(model, raw, parameters, noise, tolerance, scenes, cells, claims, unknown)
+    return Certificate(
+        model,
+        raw,
+        parameters,
+        noise=noise,
+        tolerance=tolerance,
+        scenes=scenes,
+        cells=cells,
+        claims=claims,
+        unknown=unknown,
+    )
 
 
 def require_no_more_arrays(

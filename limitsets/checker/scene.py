@@ -177,13 +177,15 @@ def read_scene(raw: object, noise: object) -> Scene:
     sides = []
     for i, (a, d, long, shift) in enumerate(rests):
         require(bool(a > 0) and bool(a < long) and bool(d > 0), f"the part does not rest on side {i}")
-        side = Side(a, d, long, h, rho * rho, span(*ends), flight == "exact", flip == "signed")
+        side = Side(
+            a, d, long, h=h, rho2=rho * rho, arm=span(*ends), exact=flight == "exact", signed=flip == "signed"
+        )
         side.shift, side.landing = shift, scatter
         side.small_d = d if flight == "small-angle-2" else ZERO
         complete(side, k_lo)
         sides.append(side)
     require(all(bool(k_lo > side.small_d) for side in sides), "small-angle-2 needs kappa > d")
-    whole = Scene(sides, k_lo, k_hi, rho, ends, reach.unit, scene, noise)
+    whole = Scene(sides, k_lo, k_hi, rho=rho, arm=ends, unit=reach.unit, raw=scene, noise=noise)
     whole.end = read_end(scene.get("cavity"), unit)
     if whole.cuts():
         whole.loose = sum(float(ball.rad()) for s in sides for ball in (s.a, s.d, s.h, s.shift, whole.rho))

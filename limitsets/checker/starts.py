@@ -91,7 +91,9 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
     if "lost" in section:
         lost = [hex_float(each, "lost") for each in by_side(section["lost"], "lost", n_sides)]
     almost = goal["kind"] == "reaches" and not goal["every"]
-    starts = Starts(kind, x, thinning, near, lost, almost and kind == "cells" and laid is None, laid)
+    starts = Starts(
+        kind, x, thinning, near=near, lost=lost, only=almost and kind == "cells" and laid is None, laid=laid
+    )
     require_fitting(starts, goal, almost, [starts.fixed(i) for i in range(n_sides)])
     return starts
 

@@ -325,9 +325,9 @@ def push(
         outcome,
         (watched.throws[0], watched.throws[1]),
         (watched.entered[0], watched.entered[1]),
-        (watched.wall[0], watched.wall[1]),
-        watched.touched,
-        standing,
-        carried,
+        wall=(watched.wall[0], watched.wall[1]),
+        touched=watched.touched,
+        survives_standing=standing,
+        survives_carried=carried,
     )
     return made, crowd.recording()

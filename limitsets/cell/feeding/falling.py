@@ -406,7 +406,15 @@ def arm_end_of(scene: Scene, side: int | None = None, laid: LaidLike | None = No
             allowed = f"up to the end of the arm, {x:g} {scene.unit}"
             remedy = "lay parts down before it"
             raise AnswerError("the range", f"{lo:g} to {hi:g} on side {on}", allowed, remedy, key="laid")
-    return ArmEnd(scene, x, side, clear_beyond(scene, side), _edges(scene, x), starts_from(scene), ranges)
+    return ArmEnd(
+        scene,
+        x,
+        side,
+        clear=clear_beyond(scene, side),
+        edges=_edges(scene, x),
+        starts=starts_from(scene),
+        laid=ranges,
+    )
 
 
 def _edges(scene: Scene, x: float) -> NDArray[np.float64]:

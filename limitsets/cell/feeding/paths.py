@@ -285,7 +285,7 @@ class Paths:
         late = reach(ranges, parts, stay.astype(np.uint8)) > 0
         leaves = reach(ranges, parts, leaving.astype(np.uint8)) > 0
         steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
-        return cls(attraction, end, ~fed, ends_on, near, leaves, late, steps)
+        return cls(attraction, end, ~fed, ends_on=ends_on, near=near, leaves=leaves, late=late, steps=steps)
 
     def extents(self, some: Mask) -> Extents:
         """Intervals of the starts in some cells, by side."""

@@ -247,16 +247,16 @@ def filled(counts: Counts, passes: int, random: np.random.Generator, each: float
         now[:, chain.right],
         interval(nows[..., chain.right]),
         now[:, others].sum(axis=-1),
-        interval(nows[..., others].sum(axis=-1)),
-        ("empty", *(counts.states[k] for k in counts.met)),
-        chain.at_last(),
-        interval(drawn.at_last()),
-        stays,
-        chain.right,
-        float(capture),
-        float(release),
-        float(release) / float(capture + release) if capture + release else math.nan,
-        (low, high),
+        wrong_interval=interval(nows[..., others].sum(axis=-1)),
+        states=("empty", *(counts.states[k] for k in counts.met)),
+        last=chain.at_last(),
+        last_interval=interval(drawn.at_last()),
+        stays=stays,
+        number=chain.right,
+        capture=float(capture),
+        release=float(release),
+        rest=float(release) / float(capture + release) if capture + release else math.nan,
+        rest_interval=(low, high),
     )
 
 
@@ -470,7 +470,10 @@ def tray(
     kicks = max(drops // 2, 1) if kicks is None else kicks
     counted = count(asked, drops, kicks, seed, executor=executor, progress=progress)
     follow = (False, True) if histories else ()
-    followed = tuple(_followed(asked, histories, passes, seed, back, executor, progress) for back in follow)
+    followed = tuple(
+        _followed(asked, histories, passes, seed=seed, returning=back, executor=executor, progress=progress)
+        for back in follow
+    )
     chances = filled(counted, passes, random_of(seed, INTERVALS))
     answer = TrayFill(read, asked, counted, chances, followed, seed)
     if pouring is None:

@@ -306,14 +306,14 @@ def crowds_of(pouring: Pouring, rows: Sequence[Row]) -> tuple[TrayCrowd, ...]:
                 pouring.parts,
                 pouring.depressions,
                 name == "pushing",
-                right,
-                covered,
-                wrong,
-                np.array([each["met"] for each in kept]),
-                sum(each["unfinished"] for each in kept),
-                sum(each["moved"] for each in kept),
-                sum(each["seconds"] for each in kept),
-                pouring.seed,
+                right=right,
+                covered=covered,
+                wrong=wrong,
+                met=np.array([each["met"] for each in kept]),
+                unfinished=sum(each["unfinished"] for each in kept),
+                moved=sum(each["moved"] for each in kept),
+                seconds=sum(each["seconds"] for each in kept),
+                seed=pouring.seed,
             )
         )
     return tuple(crowds)

@@ -209,7 +209,17 @@ def throw(
         turned, on = turn_on_hinge(stage, struck, step, left)
     status = "rest" if on >= 0 else "unfinished"
     end, time = stage.body.position.x, flown + turned
-    return EngineThrow(end, on, status, struck, flown, time, seen.residual, seen.reverses, seen.rocks)
+    return EngineThrow(
+        end,
+        on,
+        status,
+        struck=struck,
+        phi=flown,
+        time=time,
+        residual=seen.residual,
+        reverses=seen.reverses,
+        rocks=seen.rocks,
+    )
 
 
 def _check_asked(contact: str, friction: float | None, threshold: float, rolls: bool, stroke: float) -> None:

@@ -165,7 +165,15 @@ def require_agreement(params: Any, domain: Domain, boxes: bool, upper: Any = Non
         if kind.has_image_on:
             _ask_forced(corner, points, side, (after, image.side, image.code), usable, size)
         if boxes and kind.has_image_box and rounding_is_sound():
-            _ask_boxes(ends, domain, points, side, (after, image.side, image.code), usable, size)
+            _ask_boxes(
+                ends,
+                domain,
+                points,
+                side=side,
+                seen=(after, image.side, image.code),
+                usable=usable,
+                size=size,
+            )
 
 
 def _ask_margin(params: Any, points: Floats, side: int, code: Any, count: int) -> None:
@@ -183,7 +191,7 @@ def _ask_margin(params: Any, points: Floats, side: int, code: Any, count: int) -
         remedy = "its sign is wrong everywhere: give its negative"
     got, want = (f"{each} ({names[each]})" for each in (int(sign[k]), int(code[k])))
     what = "the branch by the sign of the kernel margin"
-    _refuse(what, params, points[k], side, got, want, remedy)
+    _refuse(what, params, points[k], side=side, value=got, allowed=want, remedy=remedy)
 
 
 def _ask_forced(params: Any, starts: Any, side: int, seen: Any, usable: Any, size: Any) -> None:
@@ -222,7 +230,7 @@ def _ask_boxes(ends: Any, domain: Domain, starts: Any, side: int, seen: Any, usa
         inside |= held & (boxes.to[2 * slot] == to) & ((slot == 0) | (boxes.count == BOTH))
     undefined = np.isnan(after).any(axis=1)
     proved = boxes.count != NOTHING
-    _ask_exits(params, domain, starts, side, code, boxes, proved & ~usable & ~undefined)
+    _ask_exits(params, domain, starts, side=side, code=code, boxes=boxes, gone=proved & ~usable & ~undefined)
     for k in np.flatnonzero(proved & ((usable & ~inside) | undefined))[:1]:
         box = tuple((float(lo[k]), float(hi[k])) for lo, hi in zip(*boxes.slots[0], strict=True))
         got = (*box, int(boxes.to[0, k]))

@@ -42,10 +42,10 @@ class Target(NamedTuple):
             np.concatenate(axes),
             begin.reshape(shape),
             grid.shape,
-            np.array(rate).reshape(shape),
-            below,
-            above,
-            sink,
+            per_length=np.array(rate).reshape(shape),
+            sink_below=below,
+            sink_above=above,
+            sink_of_code=sink,
         )
 
 

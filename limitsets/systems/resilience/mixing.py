@@ -302,7 +302,7 @@ def basin_entropy(
     >>> found.how, found.lo <= found.value <= found.hi, round(found.value * 125, 2)  # ln 2 in one of 125 boxes
     ('proved', True, 0.69)
     """
-    return _measured(_of_all, graph, found, box, starts, steps, seed)
+    return _measured(_of_all, graph, found, box=box, starts=starts, steps=steps, seed=seed)
 
 
 @arguments_checked
@@ -346,7 +346,7 @@ def boundary_basin_entropy(
     >>> found.boxes, round(found.value, 2)  # 0 lies in the middle of a box: ln 2
     (1, 0.69)
     """
-    return _measured(_of_boundary, graph, found, box, starts, steps, seed)
+    return _measured(_of_boundary, graph, found, box=box, starts=starts, steps=steps, seed=seed)
 
 
 def _of_all(each: Boxes) -> tuple[Floats, float, float, float]:
@@ -406,7 +406,9 @@ def _measured(
     kept, boxes = best(float(np.clip(value, lo, hi)), each.undecided), int((weight > 0.0).sum())
     how = parted.how if starts is None else "sampled"
     lo, hi = max(lo - ROUNDING, 0.0), hi + ROUNDING
-    return BasinEntropy(kept, lo, hi, how, boxes, box, each.undecided, followed, cut)
+    return BasinEntropy(
+        kept, lo, hi, how=how, boxes=boxes, box=box, undecided=each.undecided, starts=followed, cut=cut
+    )
 
 
 def _mean(values: Floats, weights: Floats) -> float:

@@ -344,7 +344,16 @@ def basin_stability(
         shares, undecided, how = *_sampled(parted, starts, steps, seed), "sampled"
     exits = dict(zip(graph.exits, shares[len(found) :], strict=True))
     cut = starts is None and leaves_by_the_border(graph)
-    return BasinStability(how, tuple(shares[: len(found)]), exits, undecided, starts, cut, inner, outer)
+    return BasinStability(
+        how,
+        tuple(shares[: len(found)]),
+        exits,
+        undecided=undecided,
+        starts=starts,
+        cut=cut,
+        inner=inner,
+        outer=outer,
+    )
 
 
 def _counted(
@@ -536,7 +545,9 @@ def minimal_fatal_shock(
         width = CELLS * float(np.sqrt(((hi - lo) ** 2).sum(axis=1)).max())
         least, far = max(least - width, 0.0), far + width
     name = parted.names[int(np.flatnonzero(parted.codes == into)[0])]
-    return FatalShock(least, far, parted.how, state, side, parted.names[own], where, name, cut)
+    return FatalShock(
+        least, far, parted.how, x=state, side=side, basin=parted.names[own], shock=where, into=name, cut=cut
+    )
 
 
 def _place(parted: Colours, x: ArrayLike, side: int) -> tuple[Floats, int]:
@@ -580,7 +591,17 @@ def _sampled_pushes(
             push, least, into = x[nearest] - state, float(distance[nearest]), int(label[nearest])
     names = dict(zip(parted.codes.tolist(), parted.names, strict=True))
     goes = None if into is None else names[into]
-    return FatalShock(0.0, least, "sampled", state, side, names[int(own)], push, goes, into is None)
+    return FatalShock(
+        0.0,
+        least,
+        "sampled",
+        x=state,
+        side=side,
+        basin=names[int(own)],
+        shock=push,
+        into=goes,
+        cut=into is None,
+    )
 
 
 def _border(parted: Colours, state: Floats, side: int) -> list[tuple[float, float, Floats, int]]:

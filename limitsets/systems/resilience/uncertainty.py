@@ -206,12 +206,12 @@ def uncertainty_exponent(
         best(slope, undecided),
         best(error, undecided),
         apart,
-        shares,
-        fitted,
-        graph.grid.dimension,
-        undecided,
-        starts,
-        cut,
+        shares=shares,
+        fitted=fitted,
+        dimension=graph.grid.dimension,
+        undecided=undecided,
+        starts=starts,
+        cut=cut,
     )
 
 

@@ -178,12 +178,21 @@ def wada(
             _see(graph.grid, middle, seen, here)
         else:
             left = np.flatnonzero(~here[:, met].all(axis=1))
-            _look(parted, middle[left], left, parts, steps, rng, here, returning=starts is not None)
+            _look(
+                parted,
+                middle[left],
+                left,
+                parts=parts,
+                steps=steps,
+                rng=rng,
+                here=here,
+                returning=starts is not None,
+            )
         known = of and met.size > 2 and undecided <= MOST_UNDECIDED
         shares.append(float(here[:, met].all(axis=1).mean()) if known else np.nan)
     names = tuple(parted.names[k] for k in met)
     cut = starts is None and leaves_by_the_border(graph)
-    return Wada(tuple(shares), names, REFINEMENTS, middle.size, of, undecided, cut)
+    return Wada(tuple(shares), names, REFINEMENTS, boxes=middle.size, of=of, undecided=undecided, cut=cut)
 
 
 def _numbers(parted: Colours, label: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -343,10 +343,10 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
         graph.grid,
         labels,
         tuple(by_code[k] for k in range(len(found))),
-        by_code[codes.UNDECIDED],
-        {name: by_code[code] for name, code in graph.exits.items()},
-        _advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
-        graph.how,
+        undecided_between=by_code[codes.UNDECIDED],
+        exits={name: by_code[code] for name, code in graph.exits.items()},
+        advice=_advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
+        how=graph.how,
     )
 
 

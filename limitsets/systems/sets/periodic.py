@@ -110,7 +110,9 @@ def alphabet_of(params: Any, extents: Extents, domain: Sides) -> Alphabet:
     table = table[table[:, 2] <= table[:, 3]]
     sides, branches = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
     torn = any(piece.above == "jump" for row in pieces.values() for piece in row)
-    return Alphabet(params, sides, branches, table[:, 2].copy(), table[:, 3].copy(), scale, torn)
+    return Alphabet(
+        params, sides, branches, lo=table[:, 2].copy(), hi=table[:, 3].copy(), scale=scale, torn=torn
+    )
 
 
 def letters_alone(alphabet: Alphabet) -> Words:

@@ -301,10 +301,10 @@ def every_branch(
                     target,
                     cells[taken],
                     forced_to[taken, 0],
-                    lo.min(axis=1),
-                    hi.max(axis=1),
-                    samples.pad,
-                    True,
+                    lo=lo.min(axis=1),
+                    hi=hi.max(axis=1),
+                    pad=samples.pad,
+                    inside=True,
                 )
             )
         return boxes
@@ -315,7 +315,7 @@ def every_branch(
         lo = np.where(mine[..., None], real, np.inf).min(axis=1)[some]
         hi = np.where(mine[..., None], real, -np.inf).max(axis=1)[some]
         sides = np.full(int(some.sum()), key[1])
-        boxes.append(placed(target, cells[some], sides, lo, hi, samples.pad, True))
+        boxes.append(placed(target, cells[some], sides, lo=lo, hi=hi, pad=samples.pad, inside=True))
     return boxes
 
 
