@@ -353,7 +353,7 @@ class Kept(Protocol):
         ...
 
 
-class _Told:
+class _Pace:
     """What is said while chunks are computed: how many points a second, and how long it will take."""
 
     def __init__(self, work: Work, store: Kept, progress: Progress | None) -> None:
@@ -398,7 +398,7 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
     again: deque[int] = deque()
     deaths: Counter[int] = Counter()
     flight: dict[Future[Any], int] = {}
-    told = _Told(work, store, progress)
+    pace = _Pace(work, store, progress)
 
     def lost(number: int) -> None:
         deaths[number] += 1
@@ -412,7 +412,7 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
 
     try:
         while todo or again or flight:
-            told.tell()
+            pace.tell()
             alone = again or any(k in deaths for k in flight.values())
             while (todo or again) and len(flight) < (1 if alone else pool.window):
                 number = (again or todo).popleft()
@@ -422,7 +422,7 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
                     lost(number)
             for future in wait(flight, timeout=_SECONDS, return_when=FIRST_COMPLETED).done:
                 number = flight.pop(future)
-                if not _kept(work, store, future, number, told):
+                if not _kept(work, store, future, number, pace):
                     lost(number)
     except BaseException as error:
         for future in flight:
@@ -434,7 +434,7 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
     pool.end()
 
 
-def _kept(work: Work, store: Kept, future: Future[Any], number: int, told: _Told) -> bool:
+def _kept(work: Work, store: Kept, future: Future[Any], number: int, pace: _Pace) -> bool:
     """Write the answers of a chunk; False where the worker died."""
     try:
         answer = future.result()
@@ -448,7 +448,7 @@ def _kept(work: Work, store: Kept, future: Future[Any], number: int, told: _Told
             f"it failed in the chunk at {work.place(number)}",
         ) from error  # fmt: skip
     store.write(answer)
-    told.points += work.size(number)
+    pace.points += work.size(number)
     return True
 
 

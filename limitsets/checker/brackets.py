@@ -370,18 +370,18 @@ def check_chances(c: Chances, progress: Callable[[int, int], None] | None) -> tu
     kinds, absorbed = kinds_of(c, mesh)
     work, done = len(mesh.place) + len(c.within) * len(mesh.place), 0
 
-    def told(more: int) -> None:
+    def advance(more: int) -> None:
         nonlocal done
         done = min(done + more, work - 1)
         if progress is not None:
             progress(done, work)
 
-    chain, row = chain_of(c.noisy, mesh, kinds, absorbed, told), start_row(c, mesh)
+    chain, row = chain_of(c.noisy, mesh, kinds, absorbed, advance), start_row(c, mesh)
     brackets: dict[str, Array] = {}
     bad = ""
     for name, said in c.within.items():
         bad, brackets[name] = check_within(chain, row, name, said)
-        told(len(mesh.place))
+        advance(len(mesh.place))
         if bad:
             break
     bad = bad or check_quantiles(c, brackets)

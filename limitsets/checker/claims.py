@@ -22,7 +22,7 @@ from .refutations import (
     read_refutation,
     statement_of_refutation,
 )
-from .scene import Scene, over_halves
+from .scene import Scene, check_by_halves
 
 SECTIONS = {  # the known claims, and the keys of their sections
     "attracts-all": "near_joint max_rank",
@@ -132,7 +132,7 @@ def check_attracts_all(c: Cells, scene: Scene, section: dict[str, Any]) -> str:
         return bad
     for i, (q, said) in enumerate(zip(section["q"], section["fixed"], strict=True)):
         edge = float(c.edges[i][0])
-        near = over_halves(scene, check_below_cells, i, edge, q, said)
+        near = check_by_halves(scene, check_below_cells, i, edge, q, said)
         if near:
             return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
     return ""

@@ -30,7 +30,7 @@ from .model import (
     root_below,
     slope_over,
 )
-from .scene import Scene, Side, over_halves
+from .scene import Scene, Side, check_by_halves
 
 
 def read_near_hinge(value: object, n_sides: int) -> tuple[list[float], list[Pair | None]]:
@@ -109,7 +109,7 @@ def check_everywhere(c: Cells, scene: Scene) -> str:
         if Fraction(float(edges[-1])) < scene.arm[1]:
             return f"side {i}: the cells end before arm.length"
         edge = float(edges[0])
-        near = over_halves(scene, check_thrown_out, i, edge)
+        near = check_by_halves(scene, check_thrown_out, i, edge)
         if near:
             return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
     return ""
@@ -302,10 +302,10 @@ def steepness(
         since = root_below(s, arb(x0), k_hi, low, to.p)
         both = since.p.union(to.p)
         _, rise, f_slope = over_angles(s, both, arb(x0).union(arb(x1)), k_lo.union(k_hi))
-        told = slope_over(s, both, k_lo.union(k_hi), rise, f_slope)
-        if told is None:
+        enclosed = slope_over(s, both, k_lo.union(k_hi), rise, f_slope)
+        if enclosed is None:
             return 0.0
-        slope = float(told.lower())
+        slope = float(enclosed.lower())
         least = min(least, slope if slope > 0 else 0.0)
     return least
 
@@ -389,8 +389,8 @@ def check_null(c: Cells, scene: Scene, cells: Array, near: bool) -> str:
     rises = np.ones(len(c.side), dtype=bool)
     for k in np.flatnonzero(cells).tolist():
         s, x, phi = scene.sides[int(c.side[k])], (float(lower[k]), float(upper[k])), c.phi[k].tolist()
-        told = s, scene.k_lo, scene.k_hi, x, (phi[0], phi[1])
-        rises[k] = steepness(*told, 1) > 0 or steepness(*told) > 0
+        enclosed = s, scene.k_lo, scene.k_hi, x, (phi[0], phi[1])
+        rises[k] = steepness(*enclosed, 1) > 0 or steepness(*enclosed) > 0
     for i, s in enumerate(scene.sides if near else ()):
         bound = near_angle(s, scene.k_lo, scene.k_hi, float(c.edges[i][0]))
         phi = ZERO.union(bound)

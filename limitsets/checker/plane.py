@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .balls import Array
-from .cells import SMALL, deaf_children
+from .cells import SMALL, workers_ignore_interrupts
 from .file import KINDS, Quantity, plain, quantity, read_array, require, rows, table
 from .region import (
     GOAL_PROVED,
@@ -227,7 +227,7 @@ def check_plane_cells(
     some = workers > 1 and work > SMALL
     pool = ProcessPoolExecutor(workers, get_context("spawn"), start_region_worker) if some else None
     try:
-        with deaf_children():
+        with workers_ignore_interrupts():
             failures = (
                 map(check_region_cell, claims_of_cells(plane))
                 if pool is None

@@ -246,12 +246,12 @@ def question_in_words(policy: Policy) -> str:
     """Say what the sensor is asked, and how well it answers."""
     sensor = policy.sensor
     if sensor.place is not None and sensor.error is not None:
-        told = (
+        accuracy = (
             f", where it is farther from there than {sensor.error}; nearer any answer"
             if sensor.error.lo
             else ""
         )
-        return f"is the part beyond {sensor.place}?{told}"
+        return f"is the part beyond {sensor.place}?{accuracy}"
     return "nothing" if sensor.side is None else f"does the part lie on side {sensor.side}?"
 
 
@@ -424,8 +424,8 @@ def check_images(
 ) -> tuple[str, int]:
     """Check decision, landing and image of every cell from which a throw is made; "" or why, and the boxes."""
     total = sum(int(some.sum()) for some in made)
-    told = None if progress is None else (lambda done: progress(done, total))
-    crew = Crew([each.scene.raw for each in policy.choices], policy.noise, workers, told)
+    advance = None if progress is None else (lambda done: progress(done, total))
+    crew = Crew([each.scene.raw for each in policy.choices], policy.noise, workers, advance)
     try:
         for k, some in enumerate(made):
             failure = crew.run(

@@ -34,7 +34,7 @@ from .near_hinge import (
     near_landing,
     read_near_hinge,
 )
-from .scene import MOST_HALVES, Scene, Side, over_halves, quantities
+from .scene import MOST_HALVES, Scene, Side, check_by_halves, quantities
 
 MOST_COUNTED = 100_000  # throws, or rounds, that a goal may count
 # A stated kappa keeps this share of itself from the ends of its noise, which are known to 100 bits.
@@ -228,7 +228,7 @@ def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> s
     if since is not None and near is None and not since >= first:
         return f"side {side}: starts are claimed that lie before the cells"
     if near is not None:
-        bad = over_halves(scene, check_below_cells, side, first, near[0][side], near[1][side])
+        bad = check_by_halves(scene, check_below_cells, side, first, near[0][side], near[1][side])
         if bad:
             return f"side {side}, near the joint, x in (a, {first!r}]: {bad}"
         needed |= edges[:-1] <= float_above(near_landing(scene.sides[side], scene.k_lo, scene.k_hi, first))
@@ -236,7 +236,7 @@ def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> s
         cell = int(c.start[side]) + int(np.argmax(needed & ~own))
         return f"{c.name(cell)}: nothing is claimed of starts in it: its rank is -1"
     if starts.lost is not None:
-        bad = over_halves(scene, check_lost, side, starts.lost[side])
+        bad = check_by_halves(scene, check_lost, side, starts.lost[side])
         if bad:
             return f"side {side}, starts up to x = {starts.lost[side]!r}: {bad}"
     return ""
@@ -281,7 +281,7 @@ def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
             alone[q[some]] &= range_max(c.rank, lo[some], hi[some]) < c.rank[q[some]]
     bad = first_bad(c, checks)
     for k in np.flatnonzero(level & alone).tolist() if not bad else ():
-        level[k] = bool(over_halves(scene, check_passing, int(c.side[k]), c.phi[k].tolist()))
+        level[k] = bool(check_by_halves(scene, check_passing, int(c.side[k]), c.phi[k].tolist()))
     return level, bad
 
 

@@ -132,10 +132,10 @@ class Fed:
         """Put it in words."""
         words = _words(self.verdict)
         if self.never_fed:
-            told = " -> ".join(f"{state.lo:.5g} ({state.side})" for state in self.never_fed[:4])
+            orbit = " -> ".join(f"{state.lo:.5g} ({state.side})" for state in self.never_fed[:4])
             period = len(self.never_fed) - 1
             progress = [
-                f"progress of every start: {words}, an orbit of period {period} is never fed: {told} -> ..."
+                f"progress of every start: {words}, an orbit of period {period} is never fed: {orbit} -> ..."
             ]
         elif self.throws is None:
             progress = [f"progress: {words}, {self.reason}"]

@@ -234,13 +234,13 @@ def _run(
     task: Callable[[Any], list[Rest]],
     trials: int,
     executor: Executor | None,
-    told: Callable[[int], None],
+    advance: Callable[[int], None],
 ) -> list[Rest]:
     blocks = [range(lo, min(lo + BLOCK, trials)) for lo in range(0, trials, BLOCK)]
     rests: list[Rest] = []
     for block_rests in spread_over(executor, task, blocks):
         rests += block_rests
-        told(len(rests))
+        advance(len(rests))
     return rests
 
 
@@ -276,10 +276,10 @@ def count(
         raise AnswerError("the drops and kicks", (drops, kicks), "1 or more", "let some parts fall")
     states = len(passes.states)
 
-    def told(stage: str, of: int) -> Callable[[int], None]:
+    def reporter(stage: str, of: int) -> Callable[[int], None]:
         return lambda done: None if progress is None else progress(stage, min(done, of - 1), of)
 
-    rests = _run(functools.partial(_arrivals, passes, seed), drops, executor, told("drops", drops))
+    rests = _run(functools.partial(_arrivals, passes, seed), drops, executor, reporter("drops", drops))
     captured = _tally(rests, states, "that came by")
     kicked = np.zeros((states, states), dtype=np.int64)
     poses: dict[int, list[Pose]] = {passes.right: []}
@@ -292,7 +292,7 @@ def count(
     while waiting:
         state = waiting.pop(0)
         task = functools.partial(_kicks, passes, seed, state, poses[state])
-        after = _run(task, kicks, executor, told(f"kicks, {passes.states[state]}", kicks))
+        after = _run(task, kicks, executor, reporter(f"kicks, {passes.states[state]}", kicks))
         kicked[state] = _tally(after, states, f"kicked from {passes.states[state]}")
         every += after
         fresh: dict[int, list[Pose]] = {}

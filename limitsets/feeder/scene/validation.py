@@ -98,7 +98,7 @@ def respelled(tree: Tree, file: str | None) -> tuple[Tree, list[SceneError]]:
     """Tell of all unknown keys, each under the name that it is like, where that is free, or else left out."""
     model, _, wrong = _read(tree)
     unknown = [problem for problem in wrong if problem["type"] == "extra_forbidden"]
-    told = [_refusal(problem, model, tree, file) for problem in unknown]
+    errors = [_refusal(problem, model, tree, file) for problem in unknown]
     tree = copy.deepcopy(tree)
     for problem in unknown:
         meant = _meant(problem["loc"], model, tree)
@@ -106,7 +106,7 @@ def respelled(tree: Tree, file: str | None) -> tuple[Tree, list[SceneError]]:
         value = node.pop(problem["loc"][-1])
         if meant:
             node[meant] = value
-    return tree, told
+    return tree, errors
 
 
 def _table_of(path: tuple[str | int, ...], tree: Tree) -> Any:

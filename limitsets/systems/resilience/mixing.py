@@ -42,9 +42,9 @@ from limitsets.systems.resilience.orbits import (
     Colours,
     best,
     colours,
+    full_caption,
     labelled_lattice,
     leaves_by_the_border,
-    told,
 )
 from limitsets.systems.sets import Attractor
 
@@ -241,7 +241,7 @@ class BasinEntropy(Tabled):
             "cells along a box",
             Column("undecided share", show=".4f"),
         )
-        caption = told("Basin entropy, natural logarithm", self.undecided, self.cut)
+        caption = full_caption("Basin entropy, natural logarithm", self.undecided, self.cut)
         return (Table(columns, [row], caption, how_found(self.how)),)
 
     def to_json(self) -> dict[str, Any]:

@@ -129,7 +129,7 @@ def best(value: float, undecided: float) -> float:
     return value if undecided <= MOST_UNDECIDED else np.nan
 
 
-def told(caption: str, undecided: float, cut: bool = False) -> str:
+def full_caption(caption: str, undecided: float, cut: bool = False) -> str:
     """Write what is beside a number into the caption of its table: what is left out, and where orbits were cut off."""
     words = [caption]
     if undecided > MOST_UNDECIDED:

@@ -30,9 +30,9 @@ from limitsets.systems.resilience.orbits import (
     best,
     colours,
     follow,
+    full_caption,
     leaves_by_the_border,
     random_starts,
-    told,
 )
 from limitsets.systems.sets import Attractor
 from limitsets.systems.sets.basin import longest_stays
@@ -119,7 +119,7 @@ class ConvergenceTimes(Tabled):
             Table(
                 ("to", "starts", *means, *proved),
                 rows,
-                told("Convergence times", self.undecided),
+                full_caption("Convergence times", self.undecided),
                 how_found(self.how),
             ),
         )
@@ -283,7 +283,11 @@ class BasinStability(Tabled):
             ("undecided", self.undecided, None),
         ]
         columns = ("basin", Column("share", show=".6f"), Column("bracket", show=".6f", ends=True))
-        return (Table(columns, rows, told("Basin stability", self.undecided, self.cut), how_found(self.how)),)
+        return (
+            Table(
+                columns, rows, full_caption("Basin stability", self.undecided, self.cut), how_found(self.how)
+            ),
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Give the shares as JSON takes them."""

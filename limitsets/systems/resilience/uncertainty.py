@@ -36,10 +36,10 @@ from limitsets.systems.resilience.orbits import (
     best,
     colours,
     follow,
+    full_caption,
     labelled_starts,
     leaves_by_the_border,
     random_cells,
-    told,
 )
 from limitsets.systems.sets import Attractor
 
@@ -117,7 +117,7 @@ class UncertaintyExponent(Tabled):
             caption = (
                 f"Uncertainty exponent: none, {self.fitted.sum()} distances to fit; more starts=... give more"
             )
-        caption = told(caption, self.undecided, self.cut)
+        caption = full_caption(caption, self.undecided, self.cut)
         columns = (Column("apart", "cells", ".6g"), Column("uncertain share", show=".6f"), "fitted")
         return (Table(columns, rows, caption, how_found(self.how)),)
 

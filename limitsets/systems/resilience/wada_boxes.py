@@ -31,11 +31,11 @@ from limitsets.systems.resilience.orbits import (
     Colours,
     colours,
     follow,
+    full_caption,
     labelled_starts,
     leaves_by_the_border,
     random_cells,
     starts_in,
-    told,
 )
 from limitsets.systems.sets import Attractor
 
@@ -89,7 +89,7 @@ class Wada(Tabled):
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = list(zip(self.refinements, self.shares, strict=False))
         columns = ("starts per cell and axis", Column("share of boxes that meet all basins", show=".6f"))
-        caption = told(f"Wada: {self.boxes} of {self.of} boxes", self.undecided, self.cut)
+        caption = full_caption(f"Wada: {self.boxes} of {self.of} boxes", self.undecided, self.cut)
         return (Table(columns, rows, caption, f"{self.how}, not proved"),)
 
     def to_json(self) -> dict[str, Any]:

@@ -168,7 +168,7 @@ def _rests(
 
 
 @kernel
-def _told(u: Unions, out: Any) -> None:
+def _note_reach(u: Unions, out: Any) -> None:
     for k in range(u.size[SET]):
         side = u.side[SET, k]
         if not out[side] >= u.hi[SET, k]:
@@ -202,7 +202,7 @@ def _reaches(
             cycle = t.period[i, a] > 0
             followed = followed and _rests(one, two, joined, cycle, scale, r, w.pieces, v.pieces, w.unions)
             if followed:
-                _told(w.unions, out[k])
+                _note_reach(w.unions, out[k])
         if not followed:
             out[k] = np.inf
 
