@@ -348,12 +348,12 @@ class Kept(Protocol):
         """Numbers of the chunks that are kept."""
         ...
 
-    def write(self, found: Any) -> None:
+    def write(self, answer: Any) -> None:
         """Keep the answer of a chunk."""
         ...
 
 
-class _Told:
+class _Pace:
     """What is said while chunks are computed: how many points a second, and how long it will take."""
 
     def __init__(self, work: Work, store: Kept, progress: Progress | None) -> None:
@@ -398,7 +398,7 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
     again: deque[int] = deque()
     deaths: Counter[int] = Counter()
     flight: dict[Future[Any], int] = {}
-    told = _Told(work, store, progress)
+    pace = _Pace(work, store, progress)
 
     def lost(number: int) -> None:
         deaths[number] += 1
@@ -412,7 +412,7 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
 
     try:
         while todo or again or flight:
-            told.tell()
+            pace.tell()
             alone = again or any(k in deaths for k in flight.values())
             while (todo or again) and len(flight) < (1 if alone else pool.window):
                 number = (again or todo).popleft()
@@ -422,7 +422,7 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
                     lost(number)
             for future in wait(flight, timeout=_SECONDS, return_when=FIRST_COMPLETED).done:
                 number = flight.pop(future)
-                if not _kept(work, store, future, number, told):
+                if not _kept(work, store, future, number, pace):
                     lost(number)
     except BaseException as error:
         for future in flight:
@@ -434,10 +434,10 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
     pool.end()
 
 
-def _kept(work: Work, store: Kept, future: Future[Any], number: int, told: _Told) -> bool:
+def _kept(work: Work, store: Kept, future: Future[Any], number: int, pace: _Pace) -> bool:
     """Write the answers of a chunk; False where the worker died."""
     try:
-        found = future.result()
+        answer = future.result()
     except BrokenExecutor:
         return False
     except LimitsetsError:
@@ -447,8 +447,8 @@ def _kept(work: Work, store: Kept, future: Future[Any], number: int, told: _Told
             work.task, f"{type(error).__name__}: {error}", "a task that answers",
             f"it failed in the chunk at {work.place(number)}",
         ) from error  # fmt: skip
-    store.write(found)
-    told.points += work.size(number)
+    store.write(answer)
+    pace.points += work.size(number)
     return True
 
 
@@ -504,9 +504,9 @@ class TrialFile:
         """Numbers of the chunks of which every trial is kept."""
         return {k for k in range(self.chunks) if all(number in self.rows for number in self.numbers(k))}
 
-    def write(self, found: list[tuple[int, Row]]) -> None:
+    def write(self, trials: list[tuple[int, Row]]) -> None:
         """Keep trials."""
-        self.rows |= {number: as_plain(row) for number, row in found}
+        self.rows |= {number: as_plain(row) for number, row in trials}
         if self.path is None:
             return
         rows = {str(number): self.rows[number] for number in sorted(self.rows)}
@@ -552,11 +552,11 @@ def complete(
         kept.chunks,
         made,
         given,
-        lambda chunk: len(kept.numbers(chunk)),
-        lambda chunk: f"{points} {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
-        f"the {points}",
-        name,
-        points,
+        size=lambda chunk: len(kept.numbers(chunk)),
+        place=lambda chunk: f"{points} {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
+        task=f"the {points}",
+        name=name,
+        points=points,
     )
     here = executor is None and cluster is None and workers is None
     alone = nullcontext() if kept.path is None else locked(kept.path)

@@ -139,10 +139,10 @@ def slopes_over(s: Side, phi: Arb, kappa: Arb, factor: Arb) -> Slopes:
         1 + rate * one,
         rate * phi_k * by_d,
         turn * one**2 + rate * phi_xx,
-        (turn * one * phi_k + rate * phi_xk) * by_d,
-        (turn * phi_k**2 + rate * phi_kk) * by_d**2 + rate * phi_k * by_dd,
-        one,
-        phi_k,
+        xd=(turn * one * phi_k + rate * phi_xk) * by_d,
+        dd=(turn * phi_k**2 + rate * phi_kk) * by_d**2 + rate * phi_k * by_dd,
+        phi_x=one,
+        phi_k=phi_k,
     )
 
 
@@ -174,8 +174,8 @@ def deciding_slopes(s: Side, phi: Arb, x: Arb, kappa: Arb, factor: Arb) -> tuple
         if not s.a * cos - s.d * sin > 0:  # past the vertex every part flips
             return arb("nan"), arb("nan")
     unit = [[ONE if j == k else ZERO for j in range(3)] for k in range(3)]
-    found = deciding(s, Rising(phi, unit[0]), Rising(x, unit[1]), Rising(kappa, unit[2]))
-    by_phi, by_x, by_kappa = found.by
+    decision = deciding(s, Rising(phi, unit[0]), Rising(x, unit[1]), Rising(kappa, unit[2]))
+    by_phi, by_x, by_kappa = decision.by
     along = slopes_over(s, phi, kappa, factor)
     return by_x + by_phi * along.phi_x, (by_kappa + by_phi * along.phi_k) * (-2 * kappa / factor)
 
@@ -187,9 +187,9 @@ def decides(s: Side, x: tuple[float, float], kappa: Arb, most: Arb, hits: tuple[
     """
     box, deviations = arb(x[0]).union(arb(x[1])), (-most).union(most)
     whole, phi = kappa_at(kappa, deviations), hits[0].before.union(hits[1].after)
-    found = int(over_angles(s, phi, box, whole)[0])
-    if found != 2:
-        return found
+    branch = int(over_angles(s, phi, box, whole)[0])
+    if branch != 2:
+        return branch
     middle = arb(0.5 * (x[0] + x[1]))
     by_x, by_d = deciding_slopes(s, phi, box, whole, 1 + deviations)
     at = decided_at(s, float(middle), kappa, ZERO)
@@ -221,9 +221,9 @@ def guess_border(s: Side, x: Array, kappa: float, most: float, rises: Array) -> 
         phi = guess_angles(s, x, k)
         up = (deciding_floats(s, phi, x, k) > 0.0) == rises
         hi, lo = np.where(up, middle, hi), np.where(up, lo, middle)
-    found = 0.5 * (lo + hi)
+    border = 0.5 * (lo + hi)
     near = 1e-12 * most
-    return np.where(found > most - near, most, np.where(found < near - most, -most, found))
+    return np.where(border > most - near, most, np.where(border < near - most, -most, border))
 
 
 def deciding_floats(s: Side, phi: Array, x: Array, kappa: Array) -> Array:
@@ -262,13 +262,13 @@ class Mesh(NamedTuple):
 
     def cells(self, side: Array, y: Array) -> Array:
         """Find the cells, by their left nodes, in which places lie."""
-        found = np.empty(len(y), dtype=np.int64)
+        left_nodes = np.empty(len(y), dtype=np.int64)
         for k in range(len(self.first) - 1):
             here = side == k
             row = self.place[self.first[k] : self.first[k + 1]]
             at = np.searchsorted(row, y[here], side="right") - 1
-            found[here] = self.first[k] + np.clip(at, 0, len(row) - 2)
-        return found
+            left_nodes[here] = self.first[k] + np.clip(at, 0, len(row) - 2)
+        return left_nodes
 
     def size(self) -> float:
         """Return the largest place but the far ones."""
@@ -441,9 +441,9 @@ class Table:
         for k in range(len(self.first) - 1):
             here, last = side == k, int(self.first[k + 1] - self.first[k]) - 2
             row = self.where[self.first[k] : self.first[k + 1]]
-            for found, y in ((begin, lo - self.pad), (end, hi + self.pad)):
+            for index, y in ((begin, lo - self.pad), (end, hi + self.pad)):
                 at = np.searchsorted(row, y[here], side="right") - 1
-                found[here] = self.first[k] + np.clip(at, 0, last)
+                index[here] = self.first[k] + np.clip(at, 0, last)
         shares = []
         for at, y in ((begin, lo), (end, hi)):
             gap = self.where[at + 1] - self.where[at]

@@ -91,7 +91,6 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     strata = section["strata"]
     require(type(strata) is int and 1 <= strata <= MOST_STRATA, f"strata is not from 1 to {MOST_STRATA}")
     noisy = Noisy(still.sides, still.k_lo.union(still.k_hi), speed.lo, landing, strata)
-    n_sides = len(scene.sides)
     places = {
         plain(name): read_places(some, name, scene)
         for name, some in table_of(section["absorbing"], "absorbing").items()
@@ -103,7 +102,28 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     names = rows(section["names"], "names", 1, 100)
     known = all(isinstance(name, str) and name in (ANY, LEFT, *places) for name in names)
     require(known and len(set(names)) == len(names), "names are not those of places that absorb")
-    said = header["arrays"]
+    edges, within = read_brackets(header["arrays"], entries, names, scene)
+    quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
+    mean = None if section["mean"] is None else read_mean(section["mean"])
+    return Chances(
+        scene.raw,
+        laws,
+        scene,
+        noisy=noisy,
+        starts=starts,
+        absorbing=places,
+        edges=edges,
+        within=within,
+        quantiles=quantiles,
+        mean=mean,
+    )
+
+
+def read_brackets(
+    said: Any, entries: dict[str, memoryview], names: list[str], scene: Scene
+) -> tuple[list[Array], dict[str, Array]]:
+    """Read the arrays: the edges of the cells of each side, and the brackets of each name."""
+    n_sides = len(scene.sides)
     wanted = {**{f"edges.{i}": 1 for i in range(n_sides)}, **{f"within.{k}": 2 for k in range(len(names))}}
     there = isinstance(said, dict) and set(said) == set(wanted)
     require(
@@ -118,9 +138,7 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     within = {name: read[f"within.{k}"] for k, name in enumerate(names)}
     lengths = {len(each) for each in within.values()}
     require(len(lengths) == 1 and 1 <= lengths.pop() <= MOST_BRACKETS + 1, "the brackets are not alike many")
-    quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
-    mean = None if section["mean"] is None else read_mean(section["mean"])
-    return Chances(scene.raw, laws, scene, noisy, starts, places, edges, within, quantiles, mean)
+    return edges, within
 
 
 def table_of(value: object, where: str) -> dict[str, Any]:
@@ -142,7 +160,7 @@ def read_laws(value: object) -> dict[str, str]:
 
 def read_places(value: object, where: str, scene: Scene) -> list[Place]:
     """Read places: side, from x, to x; null for the end of the arm."""
-    found: list[Place] = []
+    places: list[Place] = []
     where = plain(where)
     for row in rows(value, where, 1, 1000):
         number, lo, hi = rows(row, where, 3, 3)
@@ -151,8 +169,8 @@ def read_places(value: object, where: str, scene: Scene) -> list[Place]:
         last = scene.arm[0] if hi is None else length_of(hi, where, scene)
         on = first < last <= scene.arm[0] and bool(exact(first) > scene.sides[side].a)
         require(on, f"{where}: a place is not one of the arm")
-        found.append((side, first, last))
-    return found
+        places.append((side, first, last))
+    return places
 
 
 def length_of(value: object, where: str, scene: Scene) -> Fraction:
@@ -286,27 +304,27 @@ def check_within(chain: Chain, row: Rows, name: str, said: Array) -> tuple[str, 
     value = {each: float(name in (ANY, each)) for each in chain.absorbed}
     fixed = [chain.fixed({each: sign * v for each, v in value.items()}) for sign in (-1.0, 1.0)]
     bound = [chain.first(each) for each in fixed]
-    found = np.empty(said.shape)
+    brackets = np.empty(said.shape)
     for n in range(len(said)):
         if n:
             bound = [chain.above(values, each) for values, each in zip(bound, fixed, strict=True)]
-        found[n] = -mean_above(row, bound[0]), mean_above(row, bound[1])
+        brackets[n] = -mean_above(row, bound[0]), mean_above(row, bound[1])
     # to have ended is for ever: a lower bound holds later on, an upper one earlier
-    found[:, 0] = np.maximum(np.maximum.accumulate(found[:, 0]), 0.0)
-    found[:, 1] = np.minimum(np.minimum.accumulate(found[::-1, 1])[::-1], 1.0)
-    wrong = np.flatnonzero(~((said[:, 0] <= found[:, 0]) & (found[:, 1] <= said[:, 1])))
+    brackets[:, 0] = np.maximum(np.maximum.accumulate(brackets[:, 0]), 0.0)
+    brackets[:, 1] = np.minimum(np.minimum.accumulate(brackets[::-1, 1])[::-1], 1.0)
+    wrong = np.flatnonzero(~((said[:, 0] <= brackets[:, 0]) & (brackets[:, 1] <= said[:, 1])))
     if not len(wrong):
-        return "", found
+        return "", brackets
     n = int(wrong[0])
-    lo, hi = rounded(float(found[n, 0]), up=False), rounded(float(found[n, 1]), up=True)
+    lo, hi = rounded(float(brackets[n, 0]), up=False), rounded(float(brackets[n, 1]), up=True)
     claimed = f"[{float(said[n, 0])!r}, {float(said[n, 1])!r}]"
-    return f"P({plain(name)} within {n} throws): {claimed} is claimed, [{lo}, {hi}] is proved", found
+    return f"P({plain(name)} within {n} throws): {claimed} is claimed, [{lo}, {hi}] is proved", brackets
 
 
-def check_quantiles(c: Chances, found: dict[str, Array]) -> str:
+def check_quantiles(c: Chances, brackets: dict[str, Array]) -> str:
     """Check the quantiles by the brackets found; "" or the reason."""
     for name, share, lo, hi in c.quantiles:
-        low, high = found[name].T
+        low, high = brackets[name].T
         none_before = lo == 0 or (lo <= len(high) and Fraction(float(high[lo - 1])) < share)
         there = hi < len(low) and Fraction(float(low[hi])) >= share
         if not (none_before and there):
@@ -352,21 +370,21 @@ def check_chances(c: Chances, progress: Callable[[int, int], None] | None) -> tu
     kinds, absorbed = kinds_of(c, mesh)
     work, done = len(mesh.place) + len(c.within) * len(mesh.place), 0
 
-    def told(more: int) -> None:
+    def advance(more: int) -> None:
         nonlocal done
         done = min(done + more, work - 1)
         if progress is not None:
             progress(done, work)
 
-    chain, row = chain_of(c.noisy, mesh, kinds, absorbed, told), start_row(c, mesh)
-    found: dict[str, Array] = {}
+    chain, row = chain_of(c.noisy, mesh, kinds, absorbed, advance), start_row(c, mesh)
+    brackets: dict[str, Array] = {}
     bad = ""
     for name, said in c.within.items():
-        bad, found[name] = check_within(chain, row, name, said)
-        told(len(mesh.place))
+        bad, brackets[name] = check_within(chain, row, name, said)
+        advance(len(mesh.place))
         if bad:
             break
-    bad = bad or check_quantiles(c, found)
+    bad = bad or check_quantiles(c, brackets)
     if not bad and c.mean is not None:
         bad = check_mean(chain, row, c.mean)
     if progress is not None:

@@ -32,7 +32,7 @@ from .model import (
     root_below,
     slope_over,
 )
-from .scene import DEPTH, Scene, Side, over_halves, read_scene
+from .scene import DEPTH, Scene, Side, check_by_halves, read_scene
 
 MOST_BOXES = 20_000  # pieces of one cell: a certificate that needs more is refused
 CHUNK = 2_000  # cells handed to a worker at once
@@ -199,11 +199,20 @@ def check_cell(
     k_lo, k_hi = scene.k_lo, scene.k_hi
     s = scene.sides[side]
     first = Box(
-        scene, arb(x[0]), arb(x[1]), k_lo, k_hi, at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1])), 0, 0, 0
+        scene,
+        arb(x[0]),
+        arb(x[1]),
+        k0=k_lo,
+        k1=k_hi,
+        low=at_angle(s, arb(phi[0])),
+        high=at_angle(s, arb(phi[1])),
+        in_x=0,
+        in_k=0,
+        in_s=0,
     )
     bad = check_bracket(s, first)
     if bad and scene.loose > 0:
-        bad = over_halves(scene, lambda half: check_bracket(half.sides[side], first.of(half, side)))
+        bad = check_by_halves(scene, lambda half: check_bracket(half.sides[side], first.of(half, side)))
     if bad:
         return Failure("image", bad), 1
     stack, boxes = [first], 0
@@ -337,7 +346,7 @@ def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | Non
 
 
 @contextmanager
-def deaf_children() -> Iterator[None]:
+def workers_ignore_interrupts() -> Iterator[None]:
     """Start processes that leave Ctrl-C to this one."""
     if threading.current_thread() is not threading.main_thread():  # only the main thread may set a signal
         yield
@@ -368,7 +377,7 @@ class Crew:
             context = multiprocessing.get_context("forkserver" if method == "forkserver" else "spawn")
             self.pool = ProcessPoolExecutor(self.workers, context, prepare, self.setup)
         try:
-            with deaf_children():
+            with workers_ignore_interrupts():
                 results = map(check_task, tasks) if self.pool is None else self.pool.map(check_task, tasks)
             for task, (cell, failure, boxes) in zip(tasks, results, strict=True):
                 self.done += len(task.cells)

@@ -22,7 +22,7 @@ from .refutations import (
     read_refutation,
     statement_of_refutation,
 )
-from .scene import Scene, over_halves
+from .scene import Scene, check_by_halves
 
 SECTIONS = {  # the known claims, and the keys of their sections
     "attracts-all": "near_joint max_rank",
@@ -132,7 +132,7 @@ def check_attracts_all(c: Cells, scene: Scene, section: dict[str, Any]) -> str:
         return bad
     for i, (q, said) in enumerate(zip(section["q"], section["fixed"], strict=True)):
         edge = float(c.edges[i][0])
-        near = over_halves(scene, check_below_cells, i, edge, q, said)
+        near = check_by_halves(scene, check_below_cells, i, edge, q, said)
         if near:
             return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
     return ""
@@ -150,21 +150,21 @@ def check_throws_of_cells(
     failed: list[Failed] = []
     least = claims["expanding"]["least"] if "expanding" in claims else None
     inside = np.flatnonzero(c.component >= 0)
-    found = crew.run(list(tasks_of(c, scene, box, inside, least)))
-    if found is not None and found[1].kind == "slope":
-        failed.append((["expanding"], f"{c.name(found[0])}: {found[1].text}"))
-        found = crew.run(list(tasks_of(c, scene, box, inside, None)))
-    if found is not None:
-        return [*failed, (list(claims), f"{c.name(found[0])}: {found[1].text}")]
+    failure = crew.run(list(tasks_of(c, scene, box, inside, least)))
+    if failure is not None and failure[1].kind == "slope":
+        failed.append((["expanding"], f"{c.name(failure[0])}: {failure[1].text}"))
+        failure = crew.run(list(tasks_of(c, scene, box, inside, None)))
+    if failure is not None:
+        return [*failed, (list(claims), f"{c.name(failure[0])}: {failure[1].text}")]
     for name, check in (("end-points", check_ends), ("cycles", check_orbits)):
         bad = check(scene, c, claims[name]) if name in claims else ""
         failed += [([name], bad)] if bad else []
     wide, some = about
     for names, mask in ((wide + some, c.rank >= 0), (wide, c.rank < 0)):
         chosen = np.flatnonzero((c.component < 0) & mask)
-        found = crew.run(list(tasks_of(c, scene, box, chosen, None))) if names else None
-        if found is not None:
-            return [*failed, (names, f"{c.name(found[0])}: {found[1].text}")]
+        failure = crew.run(list(tasks_of(c, scene, box, chosen, None))) if names else None
+        if failure is not None:
+            return [*failed, (names, f"{c.name(failure[0])}: {failure[1].text}")]
     return failed
 
 

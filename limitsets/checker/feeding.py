@@ -82,7 +82,7 @@ def at_borders(c: Cells, array: Array) -> tuple[Array, Array]:
     return free & np.isin(array[:, 0], c.start[:-1]), free & np.isin(array[:, 1] + 1, c.start[1:])
 
 
-def freed(c: Cells, task: Task) -> Task:
+def with_open_borders(c: Cells, task: Task) -> Task:
     """Let images that may leave the cells be anywhere beyond their borders."""
     table = task.rows.copy()
     for column, array in ((4, c.jog), (6, c.flip)):
@@ -120,8 +120,8 @@ def cells_ahead(end: ArmEnd, scene: Scene, side: int) -> Array | None:
     if not bound < 1 or check_all_jog(s, scene.k_lo.union(scene.k_hi), arb(edge), bound):
         return None
     far = near_landing(s, scene.k_lo, scene.k_hi, edge)
-    found: Array = (c.side == side) & (c.lower() <= (float_above(far) if far.is_finite() else math.inf))
-    return found
+    ahead: Array = (c.side == side) & (c.lower() <= (float_above(far) if far.is_finite() else math.inf))
+    return ahead
 
 
 def thrown_into(end: ArmEnd, places: Array, gaps: list[bool]) -> Array:
@@ -143,7 +143,7 @@ def late_within(end: ArmEnd, throws: int) -> Array:
     return late
 
 
-def leading_off(end: ArmEnd) -> Array:
+def cells_that_may_leave(end: ArmEnd) -> Array:
     """Find the cells from which a part may come to one that may leave, and these."""
     leaves, count = end.leaving.copy(), -1
     while count != int(leaves.sum()):
@@ -230,9 +230,11 @@ def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: C
 
 def check_images_used(end: ArmEnd, scene: Scene, box: int, used: Array, crew: Crew) -> str:
     """Check the throws from the cells on which something rests; "" or the reason."""
-    tasks = [freed(end.c, task) for task in tasks_of(end.c, scene, box, np.flatnonzero(used), None)]
-    found = crew.run(tasks)
-    return "" if found is None else f"{end.c.name(found[0])}: {found[1].text}"
+    tasks = [
+        with_open_borders(end.c, task) for task in tasks_of(end.c, scene, box, np.flatnonzero(used), None)
+    ]
+    failure = crew.run(tasks)
+    return "" if failure is None else f"{end.c.name(failure[0])}: {failure[1].text}"
 
 
 def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
@@ -282,7 +284,7 @@ def check_almost(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str,
     if "almost" not in feeds:
         return "", np.zeros_like(end.before)
     since, rounds = feeds["almost"]
-    leaves = leading_off(end)
+    leaves = cells_that_may_leave(end)
     begin = feeds["begin"]
     bad = check_named(end, scene, since, leaves, "a part may leave the arm", begin)
     stay = late_within(end, len(leaves)) & ~leaves

@@ -131,15 +131,15 @@ def number_and_unit(text: str, kinds: str, where: str) -> tuple[Fraction, str]:
     words = text if len(text) <= LONGEST_TEXT else ""
     tidy = words == " ".join(words.split()) != ""
     require(tidy, f"{where}: {plain(text)} is not text of at most {LONGEST_TEXT} signs, with single blanks")
-    found = NUMBER.fullmatch(words)
-    require(found is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
-    assert found is not None
-    size = abs(Fraction(found[1]))
+    parts = NUMBER.fullmatch(words)
+    require(parts is not None, f"{where}: {plain(text)} is not a decimal number and a unit")
+    assert parts is not None
+    size = abs(Fraction(parts[1]))
     ordinary = size == 0 or Fraction(1, 10**300) <= size <= 10**12
     require(ordinary, f"{where}: {plain(text)} is not 0 or of a size from 1e-300 to 1e12")
-    factors = [UNITS[kind][found[2]] for kind in kinds.split() if found[2] in UNITS[kind]]
-    require(len(factors) == 1, f"{where}: {plain(found[2])} is not a unit of {kinds}")
-    return Fraction(found[1]) * factors[0], found[2]
+    factors = [UNITS[kind][parts[2]] for kind in kinds.split() if parts[2] in UNITS[kind]]
+    require(len(factors) == 1, f"{where}: {plain(parts[2])} is not a unit of {kinds}")
+    return Fraction(parts[1]) * factors[0], parts[2]
 
 
 def quantity(value: object, kinds: str, where: str) -> Quantity:
@@ -374,8 +374,8 @@ def read_cells(entries: dict[str, memoryview], said: dict[str, Any], prefix: str
     edges = [read(f"edges.{i}", "<f8") for i in range(sides)]
     require(all(len(e) >= 2 for e in edges), "a side has no cells")
     cells = Cells(
-        edges, read("jog", "<i4", 2), read("flip", "<i4", 2), read("branch", "|i1"),
-        read("rank", "<i4"), read("component", "<i4"), read("phi", "<f8", 2),
+        edges, read("jog", "<i4", 2), read("flip", "<i4", 2), branch=read("branch", "|i1"),
+        rank=read("rank", "<i4"), component=read("component", "<i4"), phi=read("phi", "<f8", 2),
     )  # fmt: skip
     n = len(cells.side)
     arrays = (cells.jog, cells.flip, cells.branch, cells.rank, cells.component, cells.phi)

@@ -140,18 +140,18 @@ class Chain:
 
     def fixed(self, value: dict[str, float]) -> Array:
         """Return the largest value on places that absorb, -inf where there is none."""
-        found = np.full(len(self.mesh.place), -np.inf)
+        largest = np.full(len(self.mesh.place), -np.inf)
         for name, nodes in self.absorbed.items():
-            found[nodes] = np.maximum(found[nodes], value[name])
-        return found
+            largest[nodes] = np.maximum(largest[nodes], value[name])
+        return largest
 
     def first(self, fixed: Array) -> Array:
         """Return the function that is 0 where throws are made."""
-        found = fixed.copy()
+        bounds = fixed.copy()
         for at in (self.live, self.hard.at):
             for nodes in (at, at + 1):
-                found[nodes] = np.maximum(found[nodes], 0.0)
-        return found
+                bounds[nodes] = np.maximum(bounds[nodes], 0.0)
+        return bounds
 
     def above(self, values: Array, fixed: Array, more: float = 0.0) -> Array:
         """Bound `more` and the mean of V after a throw from above; on places that absorb V is fixed."""
@@ -161,16 +161,16 @@ class Chain:
         at = self.nodes.at
         mean[at] = np.minimum(mean[at] + INFLATE * self.nodes.much * (high - low), high + more)
         deficit = INFLATE * self.deficits(values)[self.live] + 2.0**-50 * size
-        found = fixed.copy()
+        bounds = fixed.copy()
         for nodes in (self.live, self.live + 1):
-            found[nodes] = np.maximum(found[nodes], mean[nodes] + deficit)
+            bounds[nodes] = np.maximum(bounds[nodes], mean[nodes] + deficit)
         least, most = self.hard.ends(values)
         near = np.isfinite(self.hard.much)  # hardly farther than what is thrown from that node
         beside = mean[self.beside] + INFLATE * np.where(near, self.hard.much, 0.0) * (most - least)
         bound = np.where(near, np.minimum(most + more, beside), most + more) + 2.0**-50 * size
         for nodes in (self.hard.at, self.hard.at + 1):
-            np.maximum.at(found, nodes, bound)
-        return found
+            np.maximum.at(bounds, nodes, bound)
+        return bounds
 
     def deficits(self, values: Array) -> Array:
         """How far the mean may lie above the chord, by the left nodes of the cells."""
@@ -284,11 +284,11 @@ class Landings:
         ends = (float(self.x[cell]), float(self.x[cell + 1]))
         phi, _ = self.box(cell)
         hits = (self.outer[cell][0], self.outer[cell + 1][1])
-        found = decides(self.side, ends, self.noisy.kappa, self.most, hits)
+        branch = decides(self.side, ends, self.noisy.kappa, self.most, hits)
         last = float(self.deltas[-1])
         none = (hits[0].place, hits[1].place)
-        if found != 2:
-            return Border((last, last), found, found, 0.0, phi, none)
+        if branch != 2:
+            return Border((last, last), branch, branch, 0.0, phi, none)
         border = None if self.certain else self.border_of(cell, ends)
         return border or Border((last, last), 0, 1, 1.0, phi, none)
 
@@ -333,7 +333,7 @@ class Landings:
         if whole > 0 or whole < 0:
             return whole
         cuts = np.linspace(-float(self.deltas[-1]), float(self.deltas[-1]), PIECES + 1).tolist()
-        found = []
+        slopes = []
         for k, (low, high) in enumerate(itertools.pairwise(cuts)):
             first, last = self.hit_at(ends[0], low), self.hit_at(ends[1], high)
             if first is None or last is None:
@@ -345,9 +345,11 @@ class Landings:
             after = self.outer[cell + 1][1].after if k == PIECES - 1 else last.after
             some = low_end.union(high_end)
             angles = before.union(after)
-            found.append(deciding_slopes(self.side, angles, x, kappa_at(self.noisy.kappa, some), 1 + some)[1])
-        together = found[0]
-        for each in found[1:]:
+            slopes.append(
+                deciding_slopes(self.side, angles, x, kappa_at(self.noisy.kappa, some), 1 + some)[1]
+            )
+        together = slopes[0]
+        for each in slopes[1:]:
             together = together.union(each)
         return together
 
@@ -389,14 +391,14 @@ class Landings:
         """Enclose a throw with some kappa."""
         return land(self.side, arb(x), kappa, guess_angle(self.side, x, float(kappa.mid())))
 
-    def assign(self, found: dict[int, Border]) -> None:
+    def assign(self, borders: dict[int, Border]) -> None:
         """Choose how throws from each node are reckoned: as on a cell beside it, best on one with a border."""
 
         def known(item: tuple[int, Border]) -> int:
             _, border = item
             return 1 if border.below == border.above else 2 if border.gap < 1.0 else 0
 
-        for cell, border in sorted(found.items(), key=known):
+        for cell, border in sorted(borders.items(), key=known):
             for end, node in enumerate((cell, cell + 1)):
                 self.cut[node], self.below[node], self.above[node] = (
                     border.cut[end],

@@ -49,22 +49,22 @@ class Links(Landings):
         self.bend = np.zeros(len(self.x))  # of T with delta, the largest near each node
         self.spread: list[tuple[int, float, int, float, float]] = []
 
-    def run(self, told: Callable[[int], None]) -> None:
+    def run(self, advance: Callable[[int], None]) -> None:
         """Prove everything of the side; cells of which something is missing become hard."""
         live = np.flatnonzero(self.kinds == LIVE)
         nodes = np.unique(np.concatenate([live, live + 1])).astype(int)
         for j, kappa in enumerate(self.kappas):
             guess = guess_angles(self.side, self.x[nodes], np.full(len(nodes), float(kappa.mid())))
             self.hit_all(nodes, guess, j, kappa)
-            told(len(nodes) // len(self.kappas))
+            advance(len(nodes) // len(self.kappas))
         for cell in live.tolist():
             if not self.known(cell):
                 self.kinds[cell] = HARD
         live = np.flatnonzero(self.kinds == LIVE)
-        found = {cell: self.branch_of(cell) for cell in live.tolist()}
-        self.assign(found)
+        borders = {cell: self.branch_of(cell) for cell in live.tolist()}
+        self.assign(borders)
         for cell in live.tolist():
-            self.add_cell(cell, found[cell])
+            self.add_cell(cell, borders[cell])
         # a node between cells that have become hard just now has no bound of how far its throws may be off
         kept = np.flatnonzero(self.kinds == LIVE).tolist()
         self.at_cut = {node: self.at_cut[node] for cell in kept for node in (cell, cell + 1)}
@@ -264,13 +264,13 @@ class Links(Landings):
 
 
 def chain_of(
-    noisy: Noisy, mesh: Mesh, kinds: Array, absorbed: dict[str, Array], told: Callable[[int], None]
+    noisy: Noisy, mesh: Mesh, kinds: Array, absorbed: dict[str, Array], advance: Callable[[int], None]
 ) -> Chain:
     """Prove the throws of all sides, and put together what a step needs."""
     parts, spread = Parts(), list[tuple[int, float, int, float, float]]()
     for number in range(len(noisy.sides)):
         links = Links(noisy, number, mesh, kinds, parts)
-        links.run(told)
+        links.run(advance)
         spread += links.spread
     e = float(noisy.landing)
     table = Table(mesh, e)
@@ -283,5 +283,18 @@ def chain_of(
     curved, turned = np.unique(ends.at), np.unique(turns.at)
     beside = parts.hard.array("node", np.int64)
     return Chain(
-        mesh, rows, live, absorbed, table, cells, nodes, hard, beside, ends, inner, turns, curved, turned
+        mesh,
+        rows,
+        live,
+        absorbed=absorbed,
+        table=table,
+        cells=cells,
+        nodes=nodes,
+        hard=hard,
+        beside=beside,
+        ends=ends,
+        inner=inner,
+        turns=turns,
+        curved=curved,
+        turned=turned,
     )

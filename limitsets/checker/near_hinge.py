@@ -30,7 +30,7 @@ from .model import (
     root_below,
     slope_over,
 )
-from .scene import Scene, Side, over_halves
+from .scene import Scene, Side, check_by_halves
 
 
 def read_near_hinge(value: object, n_sides: int) -> tuple[list[float], list[Pair | None]]:
@@ -109,7 +109,7 @@ def check_everywhere(c: Cells, scene: Scene) -> str:
         if Fraction(float(edges[-1])) < scene.arm[1]:
             return f"side {i}: the cells end before arm.length"
         edge = float(edges[0])
-        near = over_halves(scene, check_thrown_out, i, edge)
+        near = check_by_halves(scene, check_thrown_out, i, edge)
         if near:
             return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
     return ""
@@ -125,7 +125,7 @@ def check_thrown_out(scene: Scene, side: int, edge: float) -> str:
 
 def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
     """Find two angles, proved E < 0 at the first and E > 0 at the second for all parameters; None if Newton fails."""
-    found = []
+    angles = []
     for sign, a, d, h in (
         (-1, s.a.upper(), s.d.lower(), s.h.lower()),
         (1, s.a.lower(), s.d.upper(), s.h.upper()),
@@ -145,8 +145,8 @@ def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
                 break
         else:
             return None
-        found.append(r)
-    return found[0], found[1]
+        angles.append(r)
+    return angles[0], angles[1]
 
 
 def last_angle(s: Side, x: float, k_lo: Arb) -> Ratios | None:
@@ -302,10 +302,10 @@ def steepness(
         since = root_below(s, arb(x0), k_hi, low, to.p)
         both = since.p.union(to.p)
         _, rise, f_slope = over_angles(s, both, arb(x0).union(arb(x1)), k_lo.union(k_hi))
-        told = slope_over(s, both, k_lo.union(k_hi), rise, f_slope)
-        if told is None:
+        enclosed = slope_over(s, both, k_lo.union(k_hi), rise, f_slope)
+        if enclosed is None:
             return 0.0
-        slope = float(told.lower())
+        slope = float(enclosed.lower())
         least = min(least, slope if slope > 0 else 0.0)
     return least
 
@@ -331,10 +331,10 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array
     if bad:
         return bad
     cells = np.flatnonzero(left)
-    found = links_within(c, left, cells, kind)
-    if found is None:
+    links = links_within(c, left, cells, kind)
+    if links is None:
         return "there are too many targets"
-    source, to, group = found
+    source, to, group = links
     slots, slot = np.unique(to * (2 * len(cells) + 2) + group, return_inverse=True)
     owner = slots // (2 * len(cells) + 2)
     density: Array = left.astype(np.float64)
@@ -389,8 +389,8 @@ def check_null(c: Cells, scene: Scene, cells: Array, near: bool) -> str:
     rises = np.ones(len(c.side), dtype=bool)
     for k in np.flatnonzero(cells).tolist():
         s, x, phi = scene.sides[int(c.side[k])], (float(lower[k]), float(upper[k])), c.phi[k].tolist()
-        told = s, scene.k_lo, scene.k_hi, x, (phi[0], phi[1])
-        rises[k] = steepness(*told, 1) > 0 or steepness(*told) > 0
+        enclosed = s, scene.k_lo, scene.k_hi, x, (phi[0], phi[1])
+        rises[k] = steepness(*enclosed, 1) > 0 or steepness(*enclosed) > 0
     for i, s in enumerate(scene.sides if near else ()):
         bound = near_angle(s, scene.k_lo, scene.k_hi, float(c.edges[i][0]))
         phi = ZERO.union(bound)

@@ -176,13 +176,13 @@ def read_plate(
 
 def read_lengths(part: object, unit: Fraction) -> list[tuple[int, str, Arb]]:
     """List the lengths of the part that are intervals, in the order in which they are read: id, name and ball."""
-    found: dict[int, tuple[int, str, Arb]] = {}
+    lengths: dict[int, tuple[int, str, Arb]] = {}
 
     def look(value: object, where: str) -> Arb:
         lo, hi = ends_of(value, where, unit)
         if lo < hi and not where.endswith(".mass"):
-            found.setdefault(id(value), (id(value), where, span(lo, hi)))
+            lengths.setdefault(id(value), (id(value), where, span(lo, hi)))
         return span(lo, hi)
 
     read_part(part, unit, look)
-    return list(found.values())
+    return list(lengths.values())

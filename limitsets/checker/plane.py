@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .balls import Array
-from .cells import SMALL, deaf_children
+from .cells import SMALL, workers_ignore_interrupts
 from .file import KINDS, Quantity, plain, quantity, read_array, require, rows, table
 from .region import (
     GOAL_PROVED,
@@ -123,7 +123,18 @@ def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
     require(
         read == set(said) and {f"{name}.npy" for name in read} == set(entries), "there are other arrays too"
     )
-    return Plane(raw, axes, n_sides, flat, tall, grids, first, blocks, chain, ends)
+    return Plane(
+        raw,
+        axes,
+        n_sides,
+        flat=flat,
+        tall=tall,
+        grids=grids,
+        first=first,
+        blocks=blocks,
+        chain=chain,
+        ends=ends,
+    )
 
 
 def read_axis(value: object, raw: dict[str, Any]) -> Axis:
@@ -186,14 +197,14 @@ def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
             raw,
             int(f["goal"][k]),
             plane.grids[grid] if grid >= 0 else None,
-            {name: each[rows_of] for name, each in plane.tall.items()},
-            STARTS_WORDS[int(f["starts"][k])],
-            f["from"][k].tolist(),
-            f["joint"][k].reshape(-1, 3).tolist() if f["near"][k] else None,
-            f["counts"][k].tolist(),
-            plane.blocks[blocks[k] : blocks[k + 1], 1:].tolist(),
-            plane.chain[orbit, 1:].tolist(),
-            plane.ends[orbit].tolist(),
+            arrays={name: each[rows_of] for name, each in plane.tall.items()},
+            starts=STARTS_WORDS[int(f["starts"][k])],
+            since=f["from"][k].tolist(),
+            near=f["joint"][k].reshape(-1, 3).tolist() if f["near"][k] else None,
+            counts=f["counts"][k].tolist(),
+            blocks=plane.blocks[blocks[k] : blocks[k + 1], 1:].tolist(),
+            chain=plane.chain[orbit, 1:].tolist(),
+            ends=plane.ends[orbit].tolist(),
         )
 
 
@@ -216,13 +227,13 @@ def check_plane_cells(
     some = workers > 1 and work > SMALL
     pool = ProcessPoolExecutor(workers, get_context("spawn"), start_region_worker) if some else None
     try:
-        with deaf_children():
-            found = (
+        with workers_ignore_interrupts():
+            failures = (
                 map(check_region_cell, claims_of_cells(plane))
                 if pool is None
                 else pool.map(check_region_cell, claims_of_cells(plane), chunksize=4)
             )
-        for k, bad in enumerate(found):
+        for k, bad in enumerate(failures):
             if bad:
                 return k, bad
             if progress is not None:
@@ -293,7 +304,7 @@ def blocks_correspond(plane: Plane, i: int, j: int) -> bool:
 
 def common_cells(plane: Plane, i: int, j: int) -> tuple[Array, Array]:
     """Cut the arm at the borders of both grids: the cell of each grid in which a piece lies, -1 outside."""
-    found: list[list[Array]] = [[], []]
+    cells: list[list[Array]] = [[], []]
     starts = [0, 0]
     grids = [plane.grids[int(plane.flat["grid"][k])] for k in (i, j)]
     for side in range(plane.n_sides):
@@ -302,9 +313,9 @@ def common_cells(plane: Plane, i: int, j: int) -> tuple[Array, Array]:
             edges = grid[side]
             at = np.searchsorted(edges, cuts[:-1], side="right") - 1
             inside = (at >= 0) & (at < len(edges) - 1)
-            found[own].append(np.where(inside, starts[own] + at, -1))
+            cells[own].append(np.where(inside, starts[own] + at, -1))
             starts[own] += len(edges) - 1
-    return np.concatenate(found[0]), np.concatenate(found[1])
+    return np.concatenate(cells[0]), np.concatenate(cells[1])
 
 
 def area_shares(plane: Plane) -> tuple[Fraction, Fraction, Fraction]:

@@ -200,7 +200,15 @@ def read_arrays(
         require(len(jog) == len(flip) == len(phi) == n, "the images do not fit the cells")
         nothing = np.zeros(n, dtype=np.int64)
         cells.append(
-            Cells(edges, jog.astype(np.int64), flip.astype(np.int64), nothing, nothing, nothing, phi)
+            Cells(
+                edges,
+                jog.astype(np.int64),
+                flip.astype(np.int64),
+                branch=nothing,
+                rank=nothing,
+                component=nothing,
+                phi=phi,
+            )
         )
     throw, left, after = array("throw", "<i4"), array("left", "<i4"), array("after", "<i4", answers)
     belief = array("belief", "<i4", 3)
@@ -238,12 +246,12 @@ def question_in_words(policy: Policy) -> str:
     """Say what the sensor is asked, and how well it answers."""
     sensor = policy.sensor
     if sensor.place is not None and sensor.error is not None:
-        told = (
+        accuracy = (
             f", where it is farther from there than {sensor.error}; nearer any answer"
             if sensor.error.lo
             else ""
         )
-        return f"is the part beyond {sensor.place}?{told}"
+        return f"is the part beyond {sensor.place}?{accuracy}"
     return "nothing" if sensor.side is None else f"does the part lie on side {sensor.side}?"
 
 
@@ -416,16 +424,16 @@ def check_images(
 ) -> tuple[str, int]:
     """Check decision, landing and image of every cell from which a throw is made; "" or why, and the boxes."""
     total = sum(int(some.sum()) for some in made)
-    told = None if progress is None else (lambda done: progress(done, total))
-    crew = Crew([each.scene.raw for each in policy.choices], policy.noise, workers, told)
+    advance = None if progress is None else (lambda done: progress(done, total))
+    crew = Crew([each.scene.raw for each in policy.choices], policy.noise, workers, advance)
     try:
         for k, some in enumerate(made):
-            found = crew.run(
+            failure = crew.run(
                 list(tasks_of(policy.cells[k], policy.choices[k].scene, k, np.flatnonzero(some), None))
             )
-            if found is not None:
+            if failure is not None:
                 name = f"the throw {policy.choices[k].name}"
-                return f"{name}, {policy.cells[k].name(found[0])}: {found[1].text}", crew.boxes
+                return f"{name}, {policy.cells[k].name(failure[0])}: {failure[1].text}", crew.boxes
     finally:
         crew.close()
     return "", crew.boxes

@@ -102,15 +102,15 @@ def prove_orbit(throws: Throws, cells: Intervals | None, orbit: Orbit) -> Follow
     prove(first[0] == orbit.side, "it ends on another side")
     grows = bool(first[2] < lo and last[1] > hi)
     prove(grows or bool(first[1] > lo and last[2] < hi), "that it comes back is not proved")
-    found = follow(throws, orbit, lo, hi)
+    followed = follow(throws, orbit, lo, hi)
     period = len(orbit.word)
     for k in range(1, period):
-        apart = period % k or not meets(found.states[k], found.states[0])
+        apart = period % k or not meets(followed.states[k], followed.states[0])
         prove(bool(apart), f"its period may be {k}")
     least, most = orbit.multiplier
-    within = bool(found.slope >= least and found.slope <= most)
-    prove(within, f"its multiplier, {found.slope.str(10)}, is not proved to be as claimed")
-    return found
+    within = bool(followed.slope >= least and followed.slope <= most)
+    prove(within, f"its multiplier, {followed.slope.str(10)}, is not proved to be as claimed")
+    return followed
 
 
 def meets(one: tuple[int, Arb, Arb], other: tuple[int, Arb, Arb]) -> bool:
@@ -126,15 +126,15 @@ def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
         name = f"period {len(orbit.word)}, side {orbit.side}, x in [{orbit.lo!r}, {orbit.hi!r}]"
         try:
             prove(all(s.concave for s in scene.sides), "kappa > ell is not proved")
-            found = prove_orbit(throws, cells, orbit)
+            followed = prove_orbit(throws, cells, orbit)
         except UnprovedError as error:
             return f"{name}: {error}"
         for other in proved:
-            if len(other.states) == len(found.states) and any(
-                meets(state, found.states[0]) for state in other.states
+            if len(other.states) == len(followed.states) and any(
+                meets(state, followed.states[0]) for state in other.states
             ):
                 return f"{name}: it may be the same orbit as another one"
-        proved.append(found)
+        proved.append(followed)
     return ""
 
 
@@ -177,7 +177,7 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     same = isinstance(nominal, dict) and isinstance(tolerance, dict) and set(nominal) == set(tolerance)
     fits = same and len(nominal) <= 64
     require(fits, "refuted: nominal values and tolerance do not name the same quantities")
-    found = {
+    refutation = {
         "goal": read_goal(goal, n_sides),
         "nominal": nominal,
         "tolerance": tolerance,
@@ -187,13 +187,13 @@ def read_refutation(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     if "recurs" in section:
         recurs = table(section["recurs"], "refuted.recurs", "", " ".join(RECURS))
         require(len(recurs) == 1, "refuted.recurs is not one of cycle, closed and once")
-        (found["why"],) = recurs
-        if found["why"] == "cycle":
+        (refutation["why"],) = recurs
+        if refutation["why"] == "cycle":
             require(not {"start", "throws"} & set(section), "refuted: a cycle has no start and no throws")
             (orbit,) = read_orbits({"cycles": [recurs["cycle"]], "complete": False}, n_sides)["orbits"]
-            return found | {"orbit": orbit}
-        require(recurs[found["why"]] is True, "refuted.recurs is not true")
-    return found | read_passing(section, found["why"], n_sides)
+            return refutation | {"orbit": orbit}
+        require(recurs[refutation["why"]] is True, "refuted.recurs is not true")
+    return refutation | read_passing(section, refutation["why"], n_sides)
 
 
 def read_broken_goal(value: object, n_sides: int) -> tuple[dict[str, Any], list[list[Span]] | None]:

@@ -99,7 +99,15 @@ def cells_of(claimed: Claimed) -> Cells:
     both = (jog[:, 0] >= 0) & (flip[:, 0] >= 0)
     branch = np.where(both, 2, np.where(flip[:, 0] >= 0, 1, 0))
     rank, component = a["rank"].astype(np.int64), a["component"].astype(np.int64)
-    return Cells(list(claimed.grid or ()), jog, flip, branch, rank, component, a["phi"].astype(np.float64))
+    return Cells(
+        list(claimed.grid or ()),
+        jog,
+        flip,
+        branch=branch,
+        rank=rank,
+        component=component,
+        phi=a["phi"].astype(np.float64),
+    )
 
 
 def starts_of(claimed: Claimed) -> Starts:
@@ -187,13 +195,13 @@ def marked(targets: Array, cells: Array) -> Array:
     return np.asarray(np.cumsum(steps[:-1]) > 0)
 
 
-def check_visits(found: tuple[int, int] | None, least: int, most: int) -> str:
+def check_visits(jogs: tuple[int, int] | None, least: int, most: int) -> str:
     """Check bounds of the jogs of a visit: -1 -1 where no flip leads to the side; `most` is -1 if none is claimed."""
-    if found is None:
+    if jogs is None:
         return "" if (least, most) == (-1, -1) else "no flip leads to it"
-    if not 0 <= least <= found[0]:
+    if not 0 <= least <= jogs[0]:
         return "the least number of jogs of a visit is not proved"
-    right = most == -1 or 0 <= found[1] <= most
+    right = most == -1 or 0 <= jogs[1] <= most
     return "" if right else "the largest number of jogs of a visit is not proved"
 
 
@@ -213,7 +221,7 @@ def comes_round(c: Cells, inside: Array, visits: list[tuple[int, int] | None]) -
     sides = [bool((inside & (c.side == i)).any()) for i in range(len(visits))]
     if sum(sides) == 1 and not any(visits):
         return not (c.flip[inside, 0] >= 0).any()
-    return all(sides) and all(found is not None and found[1] >= 0 for found in visits)
+    return all(sides) and all(jogs is not None and jogs[1] >= 0 for jogs in visits)
 
 
 # ------------------------------------------------------------------------------------------------- the orbit

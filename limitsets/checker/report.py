@@ -49,10 +49,10 @@ from .plane import (
 from .policy import Policy, check_policy, holds_policy, policy_in_words, read_policy
 from .scene import (
     Scene,
+    check_by_halves,
     check_parameters,
     check_tolerance,
     left_out,
-    over_halves,
     quantities,
     read_scene,
 )
@@ -189,7 +189,17 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
     claims, unknown = read_claims(header["claims"], n_sides)
     parameters = [b["parameters"] for b in boxes]
     noise, tolerance = header["noise"], header["tolerance"]
-    return Certificate(model, raw, parameters, noise, tolerance, scenes, cells, claims, unknown)
+    return Certificate(
+        model,
+        raw,
+        parameters,
+        noise=noise,
+        tolerance=tolerance,
+        scenes=scenes,
+        cells=cells,
+        claims=claims,
+        unknown=unknown,
+    )
 
 
 def require_no_more_arrays(
@@ -254,8 +264,8 @@ def check_certificate(
     own = goal_of_scene(file.raw[0], len(file.scenes[0].sides))
     failed = failed_at_once(file, gap, own)
     work = work_of(file)
-    told = None if progress is None else (lambda done: progress(min(done, work), work))
-    crew = Crew(list(file.raw), file.noise, workers, told)
+    advance = None if progress is None else (lambda done: progress(min(done, work), work))
+    crew = Crew(list(file.raw), file.noise, workers, advance)
     try:
         check_boxes(file, crew, failed)
     finally:
@@ -401,10 +411,10 @@ def check_boxes(file: Certificate, crew: Crew, failed: dict[str, str]) -> None:
     """Check all claims for box after box, until all have failed; `failed` gets the first reason of each."""
     claims = file.claims
     for k, (scene, c) in enumerate(zip(file.scenes, file.cells, strict=True)):
-        bad = over_halves(scene, check_parameters, file.parameters[k], f"box {k}")
+        bad = check_by_halves(scene, check_parameters, file.parameters[k], f"box {k}")
         where = f"box {k}, " if len(file.scenes) > 1 else ""
-        found = [(list(claims), bad)] if bad else check_box_claims(scene, c, k, claims, crew)
-        for names, reason in found:
+        failures = [(list(claims), bad)] if bad else check_box_claims(scene, c, k, claims, crew)
+        for names, reason in failures:
             for name in names:
                 failed.setdefault(name, where + reason)
         scene.parts.clear()  # room

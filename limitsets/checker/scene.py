@@ -142,7 +142,7 @@ def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
         yield tree
 
 
-def over_halves(scene: Scene, check: Callable[..., str], *more: Any) -> str:
+def check_by_halves(scene: Scene, check: Callable[..., str], *more: Any) -> str:
     """Check a statement about all parameters, half by half where the check fails for the whole; "" or the reason."""
     stack, tried = [(scene, 0)], 0
     while stack:
@@ -177,13 +177,15 @@ def read_scene(raw: object, noise: object) -> Scene:
     sides = []
     for i, (a, d, long, shift) in enumerate(rests):
         require(bool(a > 0) and bool(a < long) and bool(d > 0), f"the part does not rest on side {i}")
-        side = Side(a, d, long, h, rho * rho, span(*ends), flight == "exact", flip == "signed")
+        side = Side(
+            a, d, long, h=h, rho2=rho * rho, arm=span(*ends), exact=flight == "exact", signed=flip == "signed"
+        )
         side.shift, side.landing = shift, scatter
         side.small_d = d if flight == "small-angle-2" else ZERO
         complete(side, k_lo)
         sides.append(side)
     require(all(bool(k_lo > side.small_d) for side in sides), "small-angle-2 needs kappa > d")
-    whole = Scene(sides, k_lo, k_hi, rho, ends, reach.unit, scene, noise)
+    whole = Scene(sides, k_lo, k_hi, rho=rho, arm=ends, unit=reach.unit, raw=scene, noise=noise)
     whole.end = read_end(scene.get("cavity"), unit)
     if whole.cuts():
         whole.loose = sum(float(ball.rad()) for s in sides for ball in (s.a, s.d, s.h, s.shift, whole.rho))
@@ -370,22 +372,24 @@ def check_tolerance(raw: list[Any], tolerance: object) -> tuple[dict[str, str], 
     assert isinstance(tolerance, dict)
     flat = [dict(quantities(scene)) for scene in raw]
     ranges: dict[str, list[Quantity]] = {}
-    told: dict[str, str] = {}
+    covered_values: dict[str, str] = {}
     for name, text in tolerance.items():
         dev = quantity(text, KINDS, "tolerance")
         key, own = values_in_boxes(flat, name, dev)
         require(key not in ranges, "tolerance names one quantity twice")
         ranges[key] = own
         lo, hi = hull(own)
-        told[key] = str(own[0]._replace(lo=lo, hi=hi)) if lo < hi else f"every value in [{own[0]}, {own[0]}]"
-        if not as_wide_as(dev, own[0], lo, hi, name, key):
-            return told, f"the boxes do not cover the tolerance of {plain(name)}"
+        covered_values[key] = (
+            str(own[0]._replace(lo=lo, hi=hi)) if lo < hi else f"every value in [{own[0]}, {own[0]}]"
+        )
+        if not covers_deviation(dev, own[0], lo, hi, name, key):
+            return covered_values, f"the boxes do not cover the tolerance of {plain(name)}"
     if not same_but_for(list(ranges), raw, flat):
-        return told, "the boxes differ in something else than the tolerance"
+        return covered_values, "the boxes differ in something else than the tolerance"
     boxes = [[(own[b].lo, own[b].hi) for own in ranges.values()] for b in range(len(raw))]
     if not covered([hull(own) for own in ranges.values()], boxes):
-        return told, "the boxes leave a gap in the tolerance"
-    return told, ""
+        return covered_values, "the boxes leave a gap in the tolerance"
+    return covered_values, ""
 
 
 def hull(values: list[Quantity]) -> tuple[Fraction, Fraction]:
@@ -406,7 +410,7 @@ def values_in_boxes(flat: list[dict[str, object]], name: str, dev: Quantity) -> 
     return key, own
 
 
-def as_wide_as(dev: Quantity, value: Quantity, lo: Fraction, hi: Fraction, name: str, key: str) -> bool:
+def covers_deviation(dev: Quantity, value: Quantity, lo: Fraction, hi: Fraction, name: str, key: str) -> bool:
     """Whether [lo, hi] holds every deviation up to `dev` from some middle; kappa deviates with the speed's square."""
     if dev.unit == "%":
         lo, hi = (lo, hi) if lo > 0 else (-hi, -lo)

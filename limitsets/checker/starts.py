@@ -34,7 +34,7 @@ from .near_hinge import (
     near_landing,
     read_near_hinge,
 )
-from .scene import MOST_HALVES, Scene, Side, over_halves, quantities
+from .scene import MOST_HALVES, Scene, Side, check_by_halves, quantities
 
 MOST_COUNTED = 100_000  # throws, or rounds, that a goal may count
 # A stated kappa keeps this share of itself from the ends of its noise, which are known to 100 bits.
@@ -91,7 +91,9 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
     if "lost" in section:
         lost = [hex_float(each, "lost") for each in by_side(section["lost"], "lost", n_sides)]
     almost = goal["kind"] == "reaches" and not goal["every"]
-    starts = Starts(kind, x, thinning, near, lost, almost and kind == "cells" and laid is None, laid)
+    starts = Starts(
+        kind, x, thinning, near=near, lost=lost, only=almost and kind == "cells" and laid is None, laid=laid
+    )
     require_fitting(starts, goal, almost, [starts.fixed(i) for i in range(n_sides)])
     return starts
 
@@ -100,14 +102,14 @@ def read_laid(value: object, n_sides: int) -> list[list[Span]]:
     """Read by side the ranges in which parts are laid down: ascending, apart, and one at least."""
     known = table(value, "the ranges of the starts", "", " ".join(map(str, range(n_sides))))
     require(bool(known), "there are no ranges of the starts")
-    found: list[list[Span]] = []
+    ranges: list[list[Span]] = []
     for i in range(n_sides):
         pairs = rows(known[str(i)], "ranges", 1, 100) if str(i) in known else []
         ends = [hex_float(end, "a range") for pair in pairs for end in rows(pair, "a range", 2, 2)]
         ascending = all(a < b for a, b in itertools.pairwise(ends))
         require(ascending, "the ranges of the starts are empty, or do not ascend")
-        found.append(list(zip(ends[::2], ends[1::2], strict=True)))
-    return found
+        ranges.append(list(zip(ends[::2], ends[1::2], strict=True)))
+    return ranges
 
 
 def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: list[Pair | None]) -> None:
@@ -201,16 +203,16 @@ def share_of_ranges(c: Cells, laid: list[list[Span]], cells: Array, end: float) 
 
 def led_to(c: Cells, cells: Array) -> Array:
     """Find the cells given, and all to which some orbit from them may come, by the targets of the cells."""
-    found, new = cells.copy(), cells.copy()
+    reached, new = cells.copy(), cells.copy()
     while new.any():
-        marks = np.zeros(len(found) + 1, dtype=np.int64)
+        marks = np.zeros(len(reached) + 1, dtype=np.int64)
         for array in (c.jog, c.flip):
             q = np.flatnonzero((array[:, 0] >= 0) & new)
             np.add.at(marks, array[q, 0], 1)
             np.add.at(marks, array[q, 1] + 1, -1)
-        new = (np.cumsum(marks[:-1]) > 0) & ~found
-        found |= new
-    return found
+        new = (np.cumsum(marks[:-1]) > 0) & ~reached
+        reached |= new
+    return reached
 
 
 def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> str:
@@ -226,7 +228,7 @@ def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> s
     if since is not None and near is None and not since >= first:
         return f"side {side}: starts are claimed that lie before the cells"
     if near is not None:
-        bad = over_halves(scene, check_below_cells, side, first, near[0][side], near[1][side])
+        bad = check_by_halves(scene, check_below_cells, side, first, near[0][side], near[1][side])
         if bad:
             return f"side {side}, near the joint, x in (a, {first!r}]: {bad}"
         needed |= edges[:-1] <= float_above(near_landing(scene.sides[side], scene.k_lo, scene.k_hi, first))
@@ -234,7 +236,7 @@ def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> s
         cell = int(c.start[side]) + int(np.argmax(needed & ~own))
         return f"{c.name(cell)}: nothing is claimed of starts in it: its rank is -1"
     if starts.lost is not None:
-        bad = over_halves(scene, check_lost, side, starts.lost[side])
+        bad = check_by_halves(scene, check_lost, side, starts.lost[side])
         if bad:
             return f"side {side}, starts up to x = {starts.lost[side]!r}: {bad}"
     return ""
@@ -279,7 +281,7 @@ def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
             alone[q[some]] &= range_max(c.rank, lo[some], hi[some]) < c.rank[q[some]]
     bad = first_bad(c, checks)
     for k in np.flatnonzero(level & alone).tolist() if not bad else ():
-        level[k] = bool(over_halves(scene, check_passing, int(c.side[k]), c.phi[k].tolist()))
+        level[k] = bool(check_by_halves(scene, check_passing, int(c.side[k]), c.phi[k].tolist()))
     return level, bad
 
 
@@ -295,14 +297,14 @@ def check_passing(scene: Scene, side: int, phi: list[float]) -> str:
 
 def leading_to(c: Cells, cells: Array) -> Array:
     """Find the cells from which some orbit may lead to the cells given, and these cells."""
-    found, count = cells.copy(), -1
-    while count != int(found.sum()):
-        count = int(found.sum())
-        number = np.concatenate([[0], np.cumsum(found)])
+    leading, count = cells.copy(), -1
+    while count != int(leading.sum()):
+        count = int(leading.sum())
+        number = np.concatenate([[0], np.cumsum(leading)])
         for array in (c.jog, c.flip):
             q = np.flatnonzero(array[:, 0] >= 0)
-            found[q] |= number[array[q, 1] + 1] > number[array[q, 0]]
-    return found
+            leading[q] |= number[array[q, 1] + 1] > number[array[q, 0]]
+    return leading
 
 
 def check_lost(scene: Scene, side: int, end: float) -> str:

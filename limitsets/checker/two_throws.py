@@ -167,10 +167,10 @@ def weigh(at: Array, slopes: Array) -> list[float]:
     three = np.array([t for t in itertools.combinations(range(lines.shape[1]), 3) if t[0] <= AT_SECOND])
     matrix = np.moveaxis(lines[1:, three], 0, 2)
     good = abs(np.linalg.det(matrix)) > 1e-300
-    found = np.linalg.solve(matrix[good], -lines[0, three[good]][:, :, None])[:, :, 0]
-    found = np.concatenate([[[0.0, 0.0, 0.0]], found[(found[:, :2] >= 0).all(axis=1)]])
-    cost = at[0] + found @ at[1:] + abs(slopes[0] + found @ slopes[1:]).sum(axis=1)
-    return [float(w) for w in found[int(np.nanargmin(cost))]]
+    weights = np.linalg.solve(matrix[good], -lines[0, three[good]][:, :, None])[:, :, 0]
+    weights = np.concatenate([[[0.0, 0.0, 0.0]], weights[(weights[:, :2] >= 0).all(axis=1)]])
+    cost = at[0] + weights @ at[1:] + abs(slopes[0] + weights @ slopes[1:]).sum(axis=1)
+    return [float(w) for w in weights[int(np.nanargmin(cost))]]
 
 
 def bound_of_sum(

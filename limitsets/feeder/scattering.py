@@ -207,8 +207,8 @@ class Given:
         lo, hi = (float(end) for end in law.support())
         lo = lo if math.isfinite(lo) else float(law.ppf(TAIL))
         hi = hi if math.isfinite(hi) else float(law.isf(TAIL))
-        found, by = _strata(law, lo, hi, count), self.factor
-        return found._replace(mean=found.mean * by, sd=found.sd * by, lo=lo * by, hi=hi * by)
+        pieces, by = _strata(law, lo, hi, count), self.factor
+        return pieces._replace(mean=pieces.mean * by, sd=pieces.sd * by, lo=lo * by, hi=hi * by)
 
     def scaled(self, factor: float) -> Given:
         """Return the law of `factor` times the deviation."""
@@ -398,8 +398,8 @@ def _tilted(deviation: Strata, scene: Scene) -> Strata:
     tilt = scene.value("gravity.tilt")
     if not (tilt + deviation.lo > 0.0 and tilt + deviation.hi <= 0.5 * math.pi):
         allowed = "tilts above 0 and up to 90 deg"
-        found = (tilt + deviation.lo, tilt + deviation.hi)
-        raise SceneError("the range of the tilt [rad]", found, allowed, "lower its noise")
+        span = (tilt + deviation.lo, tilt + deviation.hi)
+        raise SceneError("the range of the tilt [rad]", span, allowed, "lower its noise")
     return transformed(deviation, lambda tau: np.log(np.sin(tilt + tau) / math.sin(tilt)))
 
 

@@ -208,7 +208,7 @@ def test_what_may_leave_does_not_arrive(made_up):
     c.jog[50] = 40
     end = checker.arm_end.arm_end(c, scene)
     assert np.flatnonzero(checker.arm_end.late_within(end, 9)).tolist() == [40, 50]
-    assert np.flatnonzero(checker.arm_end.leading_off(end)).tolist() == [40, 50]
+    assert np.flatnonzero(checker.arm_end.cells_that_may_leave(end)).tolist() == [40, 50]
 
 
 # ------------------------------------------------------------------------------ what is denied

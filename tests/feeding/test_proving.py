@@ -230,10 +230,10 @@ def test_what_lands_before_the_first_cells_goes_on_from_there():
     box = parameter_box(end.scene, noise={"landing.x": f"{noise} in"})
     paths = Paths.of(attraction(cover(box, 2048, dict.fromkeys(range(3), (20.0,)))), end)
     random = np.random.default_rng(3)
-    for side, (edges,) in enumerate(paths.found.cover.grid.edges):
+    for side, (edges,) in enumerate(paths.attraction.cover.grid.edges):
         short = edges[1:] - a[side] < 0.5 * noise
         assert short.sum() > 100
-        bits = paths.ends_on[paths.found.cover.grid.of_side(side)][short]
+        bits = paths.ends_on[paths.attraction.cover.grid.of_side(side)][short]
         assert (bits & paths.near[side] == paths.near[side]).all()
         x, on = np.full(200, a[side] + 1e-7), np.full(200, side)
         for _ in range(600):

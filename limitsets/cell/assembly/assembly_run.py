@@ -138,7 +138,15 @@ def joint_of(rows: Sequence[TrialRow]) -> Joint:
     # each marginal at 97.5 %, so that both hold at 95 %
     ends = [binomial_interval(rate.count, of, 0.975) for rate in (first, second)]
     serial = ends[0][0] * ends[1][0], ends[0][1] * ends[1][1]
-    return Joint(table, (first, second), both, product, error, (error - spread, error + spread), serial)
+    return Joint(
+        table,
+        (first, second),
+        both,
+        product=product,
+        error=error,
+        error_interval=(error - spread, error + spread),
+        serial=serial,
+    )
 
 
 # ----------------------------------------------------------------
@@ -291,12 +299,12 @@ class Assembly(Tabled):
     @property
     def survived(self) -> dict[str, Rate]:
         """Assembled pairs that are whole after one more throw: with a standing cavity, and with one that is thrown."""
-        found = {}
+        rates = {}
         for name in ("standing", "carried"):
             known = [row[f"survives_{name}"] for row in self.rows if row.get(f"survives_{name}") is not None]
             if known:
-                found[name] = rate_of(sum(known), len(known))
-        return found
+                rates[name] = rate_of(sum(known), len(known))
+        return rates
 
     def example(self, outcome: str) -> int | None:
         """Give the number of the first trial that ended so."""
@@ -430,7 +438,14 @@ def assemble(
     one, two = (json.dumps(each.as_dict()) for each in pair.scenes)
     side_by_side = bool(how if apart is None else apart)
     series = Series(
-        (one, two), pair.scatter, how, carried and pair.contact, side_by_side, given, seed, trials
+        (one, two),
+        pair.scatter,
+        how,
+        carried=carried and pair.contact,
+        apart=side_by_side,
+        starts=given,
+        seed=seed,
+        trials=trials,
     )
     kept = TrialFile(None if file is None else Path(file), series.question(), trials, CHUNK)
     where: dict[str, Any] = {"executor": executor, "cluster": cluster, "workers": workers}

@@ -349,7 +349,7 @@ def way_of(scene: Scene, params: Any, start: Start, side: int) -> Way:
     reach = max(math.dist(corner, scene.centre) for corner in scene.vertices.tolist())
     height = scene.surface_height + float(scene.sides.d[before])
     if not math.isfinite(phi):  # outside the model: it stays where it is
-        return Way(scene, start, kappa, 0.0, 0, (0.0,), 0.0, 0.0)
+        return Way(scene, start, kappa, phi=0.0, struck=0, turns=(0.0,), in_flight=0.0, turning=0.0)
     landed = _in_flight(scene, start, kappa, phi)
     # the left corner, unless the scene lets another one land before it
     count = len(landed)
@@ -365,7 +365,16 @@ def way_of(scene: Scene, params: Any, start: Start, side: int) -> Way:
     turned = sum(float(scene.sides.corner[(before + k) % count]) for k in range(sides))
     turns, fastest = _turned(turned - phi, rate, (right, above), inertia, kappa)
     in_flight = math.hypot(height, max(abs(x), abs(x - kappa * phi))) + reach
-    return Way(scene, start, kappa, phi, struck, turns, in_flight, 2.0 * reach * fastest)
+    return Way(
+        scene,
+        start,
+        kappa,
+        phi=phi,
+        struck=struck,
+        turns=turns,
+        in_flight=in_flight,
+        turning=2.0 * reach * fastest,
+    )
 
 
 def _turned(

@@ -115,8 +115,8 @@ def _thrown(end: ArmEnd, params: Any, start: Start, shift: float) -> tuple[Start
     """Throw one part: where it lies, its fate if it has met one, and the side it comes to lie on."""
     if end.at_edge(*start):
         return start, "edge", start[1]
-    found = images(params, [start[0]], start[1])
-    x, side, code = float(found.x[0]) + shift, int(found.side[0]), int(found.code[0])
+    image = images(params, [start[0]], start[1])
+    x, side, code = float(image.x[0]) + shift, int(image.side[0]), int(image.code[0])
     scene = end.scene
     if code == codes.OUTSIDE_MODEL or not float(scene.sides.a[side]) < x <= scene.arm_length:
         return (x, side), "left", side
@@ -239,8 +239,10 @@ class _Watched:
         if any(rest.where == "unfinished" for rest in rests):
             return "unfinished"
         inside = [k for k, rest in enumerate(rests) if rest.where == "cavity"]
-        if not inside:
-            return "never"
+        return self._outcome_inside(rests, inside) if inside else "never"
+
+    def _outcome_inside(self, rests: list[Rest], inside: list[int]) -> str:
+        """Say why parts of which at least one lies in the cavity are not assembled."""
         sides = [end.side for end in self.pair.ends]
         if any(rests[k].side not in (sides[k], -1) for k in inside):
             return "wrong"
@@ -323,9 +325,9 @@ def push(
         outcome,
         (watched.throws[0], watched.throws[1]),
         (watched.entered[0], watched.entered[1]),
-        (watched.wall[0], watched.wall[1]),
-        watched.touched,
-        standing,
-        carried,
+        wall=(watched.wall[0], watched.wall[1]),
+        touched=watched.touched,
+        survives_standing=standing,
+        survives_carried=carried,
     )
     return made, crowd.recording()

@@ -181,13 +181,13 @@ def run_crowd(
         parts,
         between,
         contact,
-        np.array(fates),
-        np.array(made),
-        np.array(spilled),
-        np.array(met),
-        sum(thrown),
-        sum(seconds),
-        seed,
+        fates=np.array(fates),
+        throws=np.array(made),
+        spilled=np.array(spilled),
+        met=np.array(met),
+        thrown=sum(thrown),
+        seconds=sum(seconds),
+        seed=seed,
     )
 
 

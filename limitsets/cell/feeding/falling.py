@@ -130,8 +130,8 @@ def _kept(scene: Scene, side: int, beyond: Array) -> Array:
     """Give the rate about the end, for 1 at which the side comes down about its left corner."""
     a, d = float(scene.sides.a[side]), float(scene.sides.d[side])
     own = scene.radius_of_gyration**2 + d * d
-    found: Array = (own + a * beyond) / (own + beyond * beyond)
-    return found
+    ratio: Array = (own + a * beyond) / (own + beyond * beyond)
+    return ratio
 
 
 def _speed(scene: Scene) -> float:
@@ -406,7 +406,15 @@ def arm_end_of(scene: Scene, side: int | None = None, laid: LaidLike | None = No
             allowed = f"up to the end of the arm, {x:g} {scene.unit}"
             remedy = "lay parts down before it"
             raise AnswerError("the range", f"{lo:g} to {hi:g} on side {on}", allowed, remedy, key="laid")
-    return ArmEnd(scene, x, side, clear_beyond(scene, side), _edges(scene, x), starts_from(scene), ranges)
+    return ArmEnd(
+        scene,
+        x,
+        side,
+        clear=clear_beyond(scene, side),
+        edges=_edges(scene, x),
+        starts=starts_from(scene),
+        laid=ranges,
+    )
 
 
 def _edges(scene: Scene, x: float) -> NDArray[np.float64]:

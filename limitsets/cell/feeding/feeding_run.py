@@ -115,16 +115,16 @@ class Feeding(Tabled):
         """Whether every start is fed, and after how many throws, proved; None where it was not asked for."""
         return None if self.proof is None else self._said(self.proof.fed)
 
-    def _said(self, found: Verdict) -> Verdict:
+    def _said(self, claim: Verdict) -> Verdict:
         """Give a verdict as what it is about: normal deviations have no bound, and no proof holds with them."""
-        return without_scatter(found) if self.end.scene.effects.spread == "gaussian" else found
+        return without_scatter(claim) if self.end.scene.effects.spread == "gaussian" else claim
 
     @property
     def model(self) -> Model:
         """Of which model safety and progress are, and which facts of the scene that leaves out."""
         if self.proof is None:
             return Model.of(self.end.scene)
-        return Model.of(_proved_of(self.end).scene, self.proof.found.cover.box.noise)
+        return Model.of(_proved_of(self.end).scene, self.proof.attraction.cover.box.noise)
 
     @property
     def vacuous(self) -> bool:
@@ -201,7 +201,7 @@ class Feeding(Tabled):
             Column("95 % interval", show=".4f", ends=True),
         )
         name = self.end.scene.name
-        found = [Table(columns, rows, f"{name}: what is fed", "sampled, not proved")]
+        answer = [Table(columns, rows, f"{name}: what is fed", "sampled, not proved")]
         if self.safe is not None and self.fed is not None:
             lines = [
                 ("only the wanted side is fed", self.safe.verdict),
@@ -210,10 +210,10 @@ class Feeding(Tabled):
             lines += [("almost every start is fed", self.fed.almost_every)] if self.fed.almost_every else []
             left_out = ", ".join(self.model.left_out) or None
             heads, of = ("claim", "verdict", "not simulated"), self.model.sentence
-            found.append(Table(heads, [(*line, left_out) for line in lines], "Proofs", of))
+            answer.append(Table(heads, [(*line, left_out) for line in lines], "Proofs", of))
         if self.brackets is not None:
-            found += self.brackets.tables()
-        return tuple(found)
+            answer += self.brackets.tables()
+        return tuple(answer)
 
     def to_json(self) -> dict[str, Any]:
         """Give it as JSON takes it: docs/json.md."""
@@ -357,10 +357,10 @@ def feed(
         end,
         {number: clear_beyond(read, number) for number in range(len(read.sides))},
         proof,
-        dict(noise or {}),
-        scatter,
-        curve,
-        run_trials(end, scatter, count, seed=seed, progress=progress),
-        None if brackets is None else fate_brackets(end, scatter, brackets, progress=progress),
-        crowds,
+        noise=dict(noise or {}),
+        scatter=scatter,
+        curve=curve,
+        trials=run_trials(end, scatter, count, seed=seed, progress=progress),
+        brackets=None if brackets is None else fate_brackets(end, scatter, brackets, progress=progress),
+        crowds=crowds,
     )

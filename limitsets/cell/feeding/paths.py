@@ -132,19 +132,19 @@ class Fed:
         """Put it in words."""
         words = _words(self.verdict)
         if self.never_fed:
-            told = " -> ".join(f"{state.lo:.5g} ({state.side})" for state in self.never_fed[:4])
+            orbit = " -> ".join(f"{state.lo:.5g} ({state.side})" for state in self.never_fed[:4])
             period = len(self.never_fed) - 1
-            found = [
-                f"progress of every start: {words}, an orbit of period {period} is never fed: {told} -> ..."
+            progress = [
+                f"progress of every start: {words}, an orbit of period {period} is never fed: {orbit} -> ..."
             ]
         elif self.throws is None:
-            found = [f"progress: {words}, {self.reason}"]
+            progress = [f"progress: {words}, {self.reason}"]
         else:
             whole = "every start on the arm is fed, " if self.share >= 1.0 else ""
             within = f"every start beyond {_places(self.beyond, unit)} within {self.throws} throws"
             if not self.beyond:
                 whole, within = "", f"every start that is laid down is fed within {self.throws} throws"
-            found = [f"progress: {words}, {whole}{within}"]
+            progress = [f"progress: {words}, {whole}{within}"]
         if self.almost_every is not None:
             words = _words(self.almost_every)
             places = (
@@ -152,8 +152,8 @@ class Fed:
                 if isinstance(self.almost_from, dict)
                 else ""
             )
-            found.append(f"progress of almost every start{places}: {words}")
-        return found
+            progress.append(f"progress of almost every start{places}: {words}")
+        return progress
 
     def to_json(self) -> dict[str, Any]:
         """Give it as JSON takes it."""
@@ -176,7 +176,7 @@ def _words(verdict: str) -> str:
     return f"{word.upper().replace('-', ' ')} {of}".rstrip()
 
 
-def without_scatter(found: Answer) -> Answer:
+def without_scatter(claim: Answer) -> Answer:
     """Say in the verdicts that they are of the scene without its scatter.
 
     Examples
@@ -184,9 +184,9 @@ def without_scatter(found: Answer) -> Answer:
     >>> without_scatter(Safe("proved", {}, {}, 1.0, 0.0)).lines(2)
     ['safety: PROVED of the scene without its scatter, no start on the arm feeds another side than 2']
     """
-    said = {name: getattr(found, name, None) for name in ("verdict", "almost_every")}
+    said = {name: getattr(claim, name, None) for name in ("verdict", "almost_every")}
     changes: dict[str, Any] = {name: f"{word} {WITHOUT_SCATTER}" for name, word in said.items() if word}
-    return replace(found, **changes)
+    return replace(claim, **changes)
 
 
 def _places(beyond: Mapping[Any, float], unit: str) -> str:
@@ -217,7 +217,7 @@ class Paths:
 
     Attributes
     ----------
-    found : Attraction
+    attraction : Attraction
         Cells and images.
     end : ArmEnd
         Where the arm ends.
@@ -235,7 +235,7 @@ class Paths:
         Throws until the end, where it is not late.
     """
 
-    found: Attraction
+    attraction: Attraction
     end: ArmEnd
     starts: Mask
     ends_on: Bits
@@ -247,12 +247,12 @@ class Paths:
     @property
     def begins(self) -> Mask:
         """Cells in which starts lie: before X, and where parts are laid down."""
-        return self.starts & starts_in(self.found, self.end.laid)[0] if self.end.laid else self.starts
+        return self.starts & starts_in(self.attraction, self.end.laid)[0] if self.end.laid else self.starts
 
     @classmethod
-    def of(cls, found: Attraction, end: ArmEnd) -> Paths:
+    def of(cls, attraction: Attraction, end: ArmEnd) -> Paths:
         """Find them."""
-        grid, ranges = found.cover.grid, found.cover.graph.ranges
+        grid, ranges = attraction.cover.grid, attraction.cover.graph.ranges
         lo, hi = (np.concatenate([edges[k : edges.size - 1 + k] for (edges,) in grid.edges]) for k in (0, 1))
         side = grid.side_of(np.arange(grid.n_cells))
         fed, perhaps = lo >= above(end.x), hi > below(end.x)
@@ -260,9 +260,9 @@ class Paths:
         ranges = ranges._replace(box=ranges.box.copy())
         ranges.box[fed[owner], RUN] = 0  # what is fed goes no farther
         parts = strong_components(ranges)
-        unknown = np.concatenate([images.lost for images in found.cover.images])
-        ways = everywhere(found.cover)
-        inward, outward = _leaving(found, ways, unknown)
+        unknown = np.concatenate([images.lost for images in attraction.cover.images])
+        ways = everywhere(attraction.cover)
+        inward, outward = _leaving(attraction, ways, unknown)
         marks = np.where(perhaps, np.left_shift(1, side), 0).astype(np.uint8)
         for each in range(grid.sides):
             marks[outward[each] & ~fed] |= np.uint8(1 << each)
@@ -273,7 +273,7 @@ class Paths:
             for each in range(grid.sides):
                 marks[inward[each] & ~fed] |= near[each]
             spread = reach(ranges, parts, marks)
-            before, near = near, np.array([_ahead(found, spread, each) for each in range(grid.sides)])
+            before, near = near, np.array([_ahead(attraction, spread, each) for each in range(grid.sides)])
         ends_on = spread.copy()
         for cell in np.flatnonzero(
             perhaps & ~fed & ~unknown
@@ -285,27 +285,27 @@ class Paths:
         late = reach(ranges, parts, stay.astype(np.uint8)) > 0
         leaves = reach(ranges, parts, leaving.astype(np.uint8)) > 0
         steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
-        return cls(found, end, ~fed, ends_on, near, leaves, late, steps)
+        return cls(attraction, end, ~fed, ends_on=ends_on, near=near, leaves=leaves, late=late, steps=steps)
 
     def extents(self, some: Mask) -> Extents:
         """Intervals of the starts in some cells, by side."""
-        return CellSet(self.found.cover.grid, some & self.starts).extents()
+        return CellSet(self.attraction.cover.grid, some & self.starts).extents()
 
     def share(self, some: Mask, near: Mask) -> float:
         """Share of the starts before X, or laid down there: of those in some cells, and before the first cells."""
         if self.end.laid:
             return self._laid_share(some)
-        grid, a = self.found.cover.grid, self.found.cover.box.bare[0].a
+        grid, a = self.attraction.cover.grid, self.attraction.cover.box.bare[0].a
         before = sum(float(edges[0] - a[side]) for side, (edges,) in enumerate(grid.edges) if near[side])
         inside = float(grid.measure[some & self.starts].sum())
         return (inside + before) / float((self.end.x - a).sum())
 
     def _laid_share(self, some: Mask) -> float:
         """Share of the ranges where parts are laid down that lies in some cells; 1.0 where all of it does."""
-        meets, inside = starts_in(self.found, self.end.laid)
+        meets, inside = starts_in(self.attraction, self.end.laid)
         if inside and some[meets & self.starts].all():
             return 1.0
-        grid, total, claimed = self.found.cover.grid, 0.0, 0.0
+        grid, total, claimed = self.attraction.cover.grid, 0.0, 0.0
         for side, lo, hi in self.end.laid:
             (edges,) = grid.edges[side]
             overlap = np.minimum(edges[1:], hi) - np.maximum(edges[:-1], lo)
@@ -315,24 +315,24 @@ class Paths:
 
     def near_to(self, bad: Mask) -> Mask:
         """Of which sides the starts before the first cells come to cells, and to no bad ones."""
-        near = self.found.joint
-        joined = not self.found.cover.points and all(each.proved and not each.rolls for each in near)
-        ahead = [_cells_ahead(self.found, side) for side in range(len(near))]
+        near = self.attraction.joint
+        joined = not self.attraction.cover.points and all(each.proved and not each.rolls for each in near)
+        ahead = [_cells_ahead(self.attraction, side) for side in range(len(near))]
         return np.array([joined and not bad[cells].any() for cells in ahead])
 
     def safe(self) -> Safe:
         """Say which sides can be fed."""
         wrong = np.uint8(ANY ^ (1 << self.end.side))
         bad, near = self.ends_on & wrong > 0, self.near & wrong == 0
-        sides = range(self.found.cover.grid.sides)
+        sides = range(self.attraction.cover.grid.sides)
         possible = {side: self.extents(self.ends_on >> side & 1 > 0) for side in sides}
         whole = not (bad & self.starts).any() and bool(near.all())
         share = 1.0 if whole else self.share(~bad, near)
         begins = self.begins
-        measure = self.found.cover.grid.measure
+        measure = self.attraction.cover.grid.measure
         return Safe(
             self.verdict_of(share),
-            {side: found for side, found in possible.items() if any(found.values())},
+            {side: starts for side, starts in possible.items() if any(starts.values())},
             self.extents(~bad),
             share,
             float(measure[self.leaves & begins].sum()) / float(measure[begins].sum()),
@@ -340,7 +340,7 @@ class Paths:
 
     def from_on(self, bad: Mask) -> tuple[dict[int, float], Mask]:
         """Name by side the x from which on there are no bad cells, and the starts from there on."""
-        grid, bad = self.found.cover.grid, bad & self.starts
+        grid, bad = self.attraction.cover.grid, bad & self.starts
         beyond, good = {}, np.zeros_like(bad)
         for side, (edges,) in enumerate(grid.edges):
             last = np.flatnonzero(bad[grid.of_side(side)])
@@ -362,7 +362,7 @@ class Paths:
             return share, ""
         cells = np.flatnonzero(bad & self.begins)
         place = (
-            self.found.cover.place(int(cells[0]))
+            self.attraction.cover.place(int(cells[0]))
             if cells.size
             else "nearer to the joint than the first cells"
         )
@@ -378,7 +378,7 @@ class Paths:
             return Fed("proved", throws, {}, share)
         beyond, good = self.from_on(self.late)
         if not good.any():
-            place = self.found.cover.place(int(np.flatnonzero(self.late & self.starts)[0]))
+            place = self.attraction.cover.place(int(np.flatnonzero(self.late & self.starts)[0]))
             return Fed("undecided", None, {}, 0.0, reason=f"an orbit from {place} may never be fed")
         near = self.near_to(self.late)
         whole = bool(near.all()) and not (self.late & self.starts).any()
@@ -387,7 +387,7 @@ class Paths:
 
     def _whole_side(self, good: Mask) -> Mask:
         """Of which sides all starts in cells are good."""
-        grid = self.found.cover.grid
+        grid = self.attraction.cover.grid
         return np.array(
             [good[cells][self.starts[cells]].all() for cells in map(grid.of_side, range(grid.sides))]
         )
@@ -396,8 +396,10 @@ class Paths:
         """Prove of almost every start that it is fed: those that are late thin out, where they cannot leave the arm."""
         if self.end.laid:
             share, missing = self._laid(self.leaves)
-            met = reached_from(self.found, self.begins & ~self.leaves)
-            thinned = perron_frobenius_bound(self.found.cover, self.late & self.starts & ~self.leaves & met)
+            met = reached_from(self.attraction, self.begins & ~self.leaves)
+            thinned = perron_frobenius_bound(
+                self.attraction.cover, self.late & self.starts & ~self.leaves & met
+            )
             if missing or thinned.reason:
                 return replace(fed, almost_every="undecided", reason=missing or thinned.reason)
             rounds = thinned.throws + thinned.throws // 8 + 1
@@ -407,11 +409,11 @@ class Paths:
         beyond, good = self.from_on(self.leaves)
         # what cannot leave the arm comes to no cell that can, and what is not late never comes to be
         left = self.late & self.starts & ~self.leaves
-        thinned = perron_frobenius_bound(self.found.cover, left)
+        thinned = perron_frobenius_bound(self.attraction.cover, left)
         if thinned.reason or not good.any():
             return replace(fed, almost_every="undecided", reason=fed.reason or thinned.reason)
         # next to the joint a throw rises with the start: it carries no set of positive length into one of length zero
-        near = self.near_to(self.leaves) & all(each.rises for each in self.found.joint)
+        near = self.near_to(self.leaves) & all(each.rises for each in self.attraction.joint)
         whole = bool(near.all()) and not (self.leaves & self.starts).any()
         share = 1.0 if whole else self.share(good, near & self._whole_side(good))
         starts = "almost-every" if whole else {"from": {str(side): x for side, x in beyond.items()}}
@@ -422,31 +424,31 @@ class Paths:
         )
 
 
-def _leaving(found: Attraction, ways: list[NDArray[np.int32]], unknown: Mask) -> tuple[Mask, Mask]:
+def _leaving(attraction: Attraction, ways: list[NDArray[np.int32]], unknown: Mask) -> tuple[Mask, Mask]:
     """By side the cells that may land before its first cell; and those that may land beyond its last one.
 
     These are the cells without a rank whose images come to the border: of the others they are proved not to.
     """
-    grid = found.cover.grid
+    grid = attraction.cover.grid
     inward, outward = np.tile(unknown, (grid.sides, 1)), np.tile(unknown, (grid.sides, 1))
     for ends in ways:
-        free = (found.basin.rank < 0) & (ends[:, 0] >= 0)
+        free = (attraction.basin.rank < 0) & (ends[:, 0] >= 0)
         for side in range(grid.sides):
             inward[side] |= free & (ends[:, 0] == grid.offset[side])
             outward[side] |= free & (ends[:, 1] == grid.offset[side + 1] - 1)
     return inward, outward
 
 
-def _cells_ahead(found: Attraction, side: int) -> slice:
+def _cells_ahead(attraction: Attraction, side: int) -> slice:
     """Cells to which a throw from before the first cell of a side may lead, besides staying before it."""
-    (edges,), first = found.cover.grid.edges[side], int(found.cover.grid.offset[side])
-    to = found.joint[side].reach + found.cover.box.landing
+    (edges,), first = attraction.cover.grid.edges[side], int(attraction.cover.grid.offset[side])
+    to = attraction.joint[side].reach + attraction.cover.box.landing
     return slice(first, first + int(np.searchsorted(edges[:-1], to, side="right")))
 
 
-def _ahead(found: Attraction, spread: Bits, side: int) -> np.uint8:
+def _ahead(attraction: Attraction, spread: Bits, side: int) -> np.uint8:
     """Sides on which a start before the first cell of a side may be fed."""
-    near = found.joint[side]
-    if found.cover.points or near.rolls or near.reason not in ("", SCATTERED):
+    near = attraction.joint[side]
+    if attraction.cover.points or near.rolls or near.reason not in ("", SCATTERED):
         return ANY
-    return np.uint8(np.bitwise_or.reduce(spread[_cells_ahead(found, side)]))
+    return np.uint8(np.bitwise_or.reduce(spread[_cells_ahead(attraction, side)]))

@@ -124,13 +124,22 @@ class FeedingProof(NamedTuple):
         Which sides can be fed.
     fed : Fed
         Whether every start is.
-    found : Attraction
+    attraction : Attraction
         Cells and images.
     """
 
     safe: Safe
     fed: Fed
-    found: Attraction
+    attraction: Attraction
+
+
+def _cuts(end: ArmEnd) -> dict[int, list[float]]:
+    """Places, by side, at which cells have to end: the end of the arm, and the ends of where parts are laid down."""
+    borders = [below(end.x), above(end.x)]
+    return {
+        side: borders + [place for on, *ends in end.laid if on == side for place in ends]
+        for side in range(len(end.scene.sides))
+    }
 
 
 def proved_feeding(
@@ -170,11 +179,7 @@ def proved_feeding(
         )
     tell = progress or (lambda stage, done, of: None)
     every = joined(spelled_deviations(scene, noise), spelled_deviations(scene, scattered(scene)))
-    box, borders = parameter_box(scene, noise=every), [below(end.x), above(end.x)]
-    cuts = {
-        side: borders + [place for on, *ends in end.laid if on == side for place in ends]
-        for side in range(len(scene.sides))
-    }
+    box, cuts = parameter_box(scene, noise=every), _cuts(end)
     wrong = OrientedBeyond(end.x, end.side, from_anywhere=True).wrong()
     shown: tuple[State, ...] = ()
     never = Refutation()
@@ -182,11 +187,11 @@ def proved_feeding(
     for step, cells in enumerate(LADDER):
         began = time.perf_counter()
         tell(f"proof on {cells} cells a side{proved}", step, len(LADDER) + 2)
-        found = attraction(cover(box, cells, cuts))
-        paths = Paths.of(found, end)
+        region = attraction(cover(box, cells, cuts))
+        paths = Paths.of(region, end)
         safe, fed = paths.safe(), paths.fed()
         if safe.verdict != "proved":
-            shown = shown or one_throw(found, wrong, up_to=end.x, laid=end.laid)
+            shown = shown or one_throw(region, wrong, up_to=end.x, laid=end.laid)
         if shown:
             safe = replace(safe, verdict="refuted", counterexample=shown)
         if fed.verdict != "proved":
@@ -195,7 +200,7 @@ def proved_feeding(
         if step == 0 and fed.verdict != "proved":
             tell("an orbit that is never fed", len(LADDER), len(LADDER) + 2)
             never = cycle_that(
-                found, scene, lambda loop: meets(loop, end.laid) and bool((loop.hi < below(end.x)).all())
+                region, scene, lambda loop: meets(loop, end.laid) and bool((loop.hi < below(end.x)).all())
             )
         if never.states:
             cycle, reason = never.recurs.get("cycle", {}), "a periodic orbit is never fed"
@@ -209,7 +214,7 @@ def proved_feeding(
             open_ = f"finer cells than {cells} a side were not tried: they would take more than {seconds:g} s"
             fed = replace(fed, reason="; ".join(filter(None, (fed.reason, open_))))
             break
-    return FeedingProof(safe, fed, found)
+    return FeedingProof(safe, fed, region)
 
 
 # ----------------------------------------------------------------
@@ -221,13 +226,13 @@ PROVED = ("proved", "proved-on-cells")
 
 def section_of(proof: FeedingProof, end: ArmEnd) -> dict[str, Any]:
     """Write what a recheck needs: the side, and for each part that is proved its starts and counts, or its orbit."""
-    safe, fed, found = proof
+    safe, fed, region = proof
     section: dict[str, Any] = {"side": end.side} | ({"laid": hexed(end.laid)} if end.laid else {})
     bare = len(section)
     if safe.share > 0.0:
         section["safety"] = "every" if safe.share == 1.0 else "cells"
     if safe.counterexample:
-        section["wrong"] = thrown_orbit(safe.counterexample, {}, found.cover.box.kappa_varies)
+        section["wrong"] = thrown_orbit(safe.counterexample, {}, region.cover.box.kappa_varies)
     if fed.verdict in PROVED:
         starts = "every" if fed.share == 1.0 else {str(side): x for side, x in fed.beyond.items()}
         section["progress"] = {"starts": _starts(starts), "throws": fed.throws}
@@ -261,7 +266,7 @@ def _progress(fed: Fed) -> float:
 
 def holds(proof: FeedingProof, end: ArmEnd) -> bool:
     """Whether a certificate can hold something of it."""
-    return not proof.found.cover.box.effects and bool(section_of(proof, end))
+    return not proof.attraction.cover.box.effects and bool(section_of(proof, end))
 
 
 def write_proof(
@@ -276,7 +281,7 @@ def write_proof(
     DeniedError
         The checker does not confirm it: it is kept as NAME.denied.zip.
     """
-    section, box = section_of(proof, end), proof.found.cover.box
+    section, box = section_of(proof, end), proof.attraction.cover.box
     if box.effects:
         raise AnswerError(
             "the certificate",
@@ -294,7 +299,7 @@ def write_proof(
     claim = {"claim": "feeds", "section": section, "verdict": verdict_of(proof, laid=bool(end.laid))}
     write(
         path,
-        [proof.found],
+        [proof.attraction],
         [claim],
         noise=box.noise or None,
         tolerance=None,

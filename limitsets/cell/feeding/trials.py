@@ -57,7 +57,7 @@ class Trials:
     @cached_property
     def intervals(self) -> dict[str, tuple[float, float]]:
         """Intervals of the probabilities of each fate, 95 %."""
-        return {name: binomial_interval(found, self.fate.size) for name, found in self.counts.items()}
+        return {name: binomial_interval(count, self.fate.size) for name, count in self.counts.items()}
 
     def series(self) -> NDArray[np.int64]:
         """Right feeds in each series of 20 trials, in the order of the trials; what is left over is left out."""

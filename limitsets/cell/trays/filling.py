@@ -203,8 +203,8 @@ class Filled:
     def passes_to(self, share: float) -> int | None:
         """Give the passes after which this share of the last fraction is filled; None where it takes more, or is 0."""
         last = self.last[self.number]
-        found = np.flatnonzero((self.right >= share * last) & (last > 0.0))
-        return int(found[0]) if found.size else None
+        enough = np.flatnonzero((self.right >= share * last) & (last > 0.0))
+        return int(enough[0]) if enough.size else None
 
     def to_json(self) -> dict[str, Any]:
         """Give the numbers as JSON takes them."""
@@ -247,16 +247,16 @@ def filled(counts: Counts, passes: int, random: np.random.Generator, each: float
         now[:, chain.right],
         interval(nows[..., chain.right]),
         now[:, others].sum(axis=-1),
-        interval(nows[..., others].sum(axis=-1)),
-        ("empty", *(counts.states[k] for k in counts.met)),
-        chain.at_last(),
-        interval(drawn.at_last()),
-        stays,
-        chain.right,
-        float(capture),
-        float(release),
-        float(release) / float(capture + release) if capture + release else math.nan,
-        (low, high),
+        wrong_interval=interval(nows[..., others].sum(axis=-1)),
+        states=("empty", *(counts.states[k] for k in counts.met)),
+        last=chain.at_last(),
+        last_interval=interval(drawn.at_last()),
+        stays=stays,
+        number=chain.right,
+        capture=float(capture),
+        release=float(release),
+        rest=float(release) / float(capture + release) if capture + release else math.nan,
+        rest_interval=(low, high),
     )
 
 
@@ -470,16 +470,19 @@ def tray(
     kicks = max(drops // 2, 1) if kicks is None else kicks
     counted = count(asked, drops, kicks, seed, executor=executor, progress=progress)
     follow = (False, True) if histories else ()
-    followed = tuple(_followed(asked, histories, passes, seed, back, executor, progress) for back in follow)
+    followed = tuple(
+        _followed(asked, histories, passes, seed=seed, returning=back, executor=executor, progress=progress)
+        for back in follow
+    )
     chances = filled(counted, passes, random_of(seed, INTERVALS))
-    found = TrayFill(read, asked, counted, chances, followed, seed)
+    answer = TrayFill(read, asked, counted, chances, followed, seed)
     if pouring is None:
-        return found
+        return answer
     kept = TrialFile(None if file is None else Path(file), pouring.question(), batches, 1)
     name = f"{pouring.parts} parts at once"
     complete(kept, made, (pouring,), name, "batches", executor=executor, workers=workers, progress=progress)
     chain = filled(counted, passes, random_of(seed, INTERVALS), pouring.parts / pouring.depressions)
-    return replace(found, crowds=crowds_of(pouring, tuple(kept)), crowd_chain=chain)
+    return replace(answer, crowds=crowds_of(pouring, tuple(kept)), crowd_chain=chain)
 
 
 def _followed(

@@ -195,12 +195,12 @@ class Counts:
         numbers = [EMPTY, *self.met]
 
         def row(counts: NDArray[np.int64]) -> dict[str, Any]:
-            found, of = (
+            of_fate, of = (
                 {name: int(counts[k]) for name, k in zip(names, numbers, strict=True)},
                 int(counts.sum()),
             )
-            intervals = {name: binomial_interval(n, of) if of else (0.0, 1.0) for name, n in found.items()}
-            return {"counts": found, "of": of, "intervals": intervals}
+            intervals = {name: binomial_interval(n, of) if of else (0.0, 1.0) for name, n in of_fate.items()}
+            return {"counts": of_fate, "of": of, "intervals": intervals}
 
         kicked = {self.states[k]: row(self.kicked[k]) for k in self.met}
         return as_table(arrivals=row(self.captured), kicks=kicked, unfinished=self.unfinished)
@@ -216,11 +216,11 @@ def _kicks(
     passes: Passes, seed: int, state: int, poses: Sequence[Pose], numbers: Sequence[int]
 ) -> list[Rest]:
     """Kick parts that lie in a depression, each as one of those that came to lie so."""
-    found = []
+    rests = []
     for k in numbers:
         motion = passes.kick(random_of(seed, KICKS + state, k))
-        found.append(passes.plate.settle(poses[k % len(poses)], motion))
-    return found
+        rests.append(passes.plate.settle(poses[k % len(poses)], motion))
+    return rests
 
 
 def spread_over(
@@ -234,13 +234,13 @@ def _run(
     task: Callable[[Any], list[Rest]],
     trials: int,
     executor: Executor | None,
-    told: Callable[[int], None],
+    advance: Callable[[int], None],
 ) -> list[Rest]:
     blocks = [range(lo, min(lo + BLOCK, trials)) for lo in range(0, trials, BLOCK)]
     rests: list[Rest] = []
-    for found in spread_over(executor, task, blocks):
-        rests += found
-        told(len(rests))
+    for block_rests in spread_over(executor, task, blocks):
+        rests += block_rests
+        advance(len(rests))
     return rests
 
 
@@ -276,10 +276,10 @@ def count(
         raise AnswerError("the drops and kicks", (drops, kicks), "1 or more", "let some parts fall")
     states = len(passes.states)
 
-    def told(stage: str, of: int) -> Callable[[int], None]:
+    def reporter(stage: str, of: int) -> Callable[[int], None]:
         return lambda done: None if progress is None else progress(stage, min(done, of - 1), of)
 
-    rests = _run(functools.partial(_arrivals, passes, seed), drops, executor, told("drops", drops))
+    rests = _run(functools.partial(_arrivals, passes, seed), drops, executor, reporter("drops", drops))
     captured = _tally(rests, states, "that came by")
     kicked = np.zeros((states, states), dtype=np.int64)
     poses: dict[int, list[Pose]] = {passes.right: []}
@@ -292,7 +292,7 @@ def count(
     while waiting:
         state = waiting.pop(0)
         task = functools.partial(_kicks, passes, seed, state, poses[state])
-        after = _run(task, kicks, executor, told(f"kicks, {passes.states[state]}", kicks))
+        after = _run(task, kicks, executor, reporter(f"kicks, {passes.states[state]}", kicks))
         kicked[state] = _tally(after, states, f"kicked from {passes.states[state]}")
         every += after
         fresh: dict[int, list[Pose]] = {}
@@ -302,7 +302,7 @@ def count(
         poses |= fresh
         waiting += sorted(fresh)
     unfinished = sum(rest.state == UNFINISHED for rest in every)
-    first = {state: found[0] for state, found in sorted(poses.items()) if state > EMPTY}
+    first = {state: poses_of_state[0] for state, poses_of_state in sorted(poses.items()) if state > EMPTY}
     return Counts(passes.states, passes.right, captured, kicked, unfinished, first)
 
 
@@ -345,33 +345,33 @@ class Histories:
 
     def interval(self, after: int) -> tuple[float, float]:
         """Give the interval of the fraction after so many passes; histories are independent."""
-        found = int((self.after_pass[:, after - 1] == self.right).sum()) if after else 0
-        return binomial_interval(found, self.after_pass.shape[0])
+        successes = int((self.after_pass[:, after - 1] == self.right).sum()) if after else 0
+        return binomial_interval(successes, self.after_pass.shape[0])
 
     def captures(self) -> list[tuple[int, int]]:
         """Give (right captures, parts that came by) of an empty depression: after 0, 1 and 2 or more misses in turn."""
-        found = [[0, 0] for _ in range(PAST)]
+        counts = [[0, 0] for _ in range(PAST)]
         for kicked, passed in zip(self.after_kick.tolist(), self.after_pass.tolist(), strict=True):
             misses = 0
             for before, after in zip(kicked, passed, strict=True):
                 if before == EMPTY and after != UNFINISHED:
-                    found[min(misses, PAST - 1)][0] += after == self.right
-                    found[min(misses, PAST - 1)][1] += 1
+                    counts[min(misses, PAST - 1)][0] += after == self.right
+                    counts[min(misses, PAST - 1)][1] += 1
                 misses = misses + 1 if before == EMPTY and after == EMPTY else 0
-        return [(right, of) for right, of in found]
+        return [(right, of) for right, of in counts]
 
     def releases(self) -> list[tuple[int, int]]:
         """Give (releases, kicks) of the right state: after it stood 0, 1 and 2 or more kicks."""
-        found = [[0, 0] for _ in range(PAST)]
+        counts = [[0, 0] for _ in range(PAST)]
         for kicked, passed in zip(self.after_kick.tolist(), self.after_pass.tolist(), strict=True):
             stood = -1
             for last, now, after in zip([EMPTY, *passed[:-1]], kicked, passed, strict=True):
                 if last == self.right and now != UNFINISHED:
-                    found[min(stood, PAST - 1)][0] += now != self.right
-                    found[min(stood, PAST - 1)][1] += 1
+                    counts[min(stood, PAST - 1)][0] += now != self.right
+                    counts[min(stood, PAST - 1)][1] += 1
                 if after == self.right:
                     stood = stood + 1 if last == self.right and now == self.right else 0
-        return [(out, of) for out, of in found]
+        return [(out, of) for out, of in counts]
 
     def to_json(self) -> dict[str, Any]:
         """Give the numbers as JSON takes them."""
@@ -397,7 +397,7 @@ def _history(
     passes: Passes, count: int, seed: int, returning: bool, numbers: Sequence[int]
 ) -> list[list[tuple[int, int]]]:
     """Follow depressions from empty ones: states after kick and pass."""
-    found = []
+    chains = []
     for number in numbers:
         random = random_of(seed, RETURNING if returning else FRESH, number)
         state, pose, on_plate, rows = EMPTY, Pose(0.0, 0.0, 0.0), None, []
@@ -417,8 +417,8 @@ def _history(
             if state == UNFINISHED:
                 rows += [(UNFINISHED, UNFINISHED)] * (count - len(rows))
                 break
-        found.append(rows)
-    return found
+        chains.append(rows)
+    return chains
 
 
 def histories(
@@ -449,10 +449,10 @@ def histories(
     """
     task = functools.partial(_history, passes, count, seed, returning)
     rows: list[list[tuple[int, int]]] = []
-    for found in spread_over(executor, task, [[k] for k in range(number)]):
+    for block in spread_over(executor, task, [[k] for k in range(number)]):
         if progress is not None:
             progress("histories", len(rows), number)
-        rows += found
+        rows += block
     table = np.array(rows, dtype=np.int64).reshape(number, count, 2)
     return Histories(table[..., 0].copy(), table[..., 1].copy(), returning, passes.right)
 

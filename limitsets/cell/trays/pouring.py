@@ -296,24 +296,24 @@ class TrayCrowd:
 
 def crowds_of(pouring: Pouring, rows: Sequence[Row]) -> tuple[TrayCrowd, ...]:
     """Count batches: of parts that push each other, and of parts that pass through each other."""
-    found = []
+    crowds = []
     for name in ("pushing", "passing"):
         kept = [row[name] for row in rows]
         states = np.array([each["states"] for each in kept], dtype=np.int64)
         right, covered, wrong = np.moveaxis(states, -1, 0)
-        found.append(
+        crowds.append(
             TrayCrowd(
                 pouring.parts,
                 pouring.depressions,
                 name == "pushing",
-                right,
-                covered,
-                wrong,
-                np.array([each["met"] for each in kept]),
-                sum(each["unfinished"] for each in kept),
-                sum(each["moved"] for each in kept),
-                sum(each["seconds"] for each in kept),
-                pouring.seed,
+                right=right,
+                covered=covered,
+                wrong=wrong,
+                met=np.array([each["met"] for each in kept]),
+                unfinished=sum(each["unfinished"] for each in kept),
+                moved=sum(each["moved"] for each in kept),
+                seconds=sum(each["seconds"] for each in kept),
+                seed=pouring.seed,
             )
         )
-    return tuple(found)
+    return tuple(crowds)

@@ -396,15 +396,15 @@ class Crowd:
 
     def rests(self) -> list[Rest]:
         """Where all parts are now."""
-        found = []
+        resting = []
         for each in self.members:
             if each.mode == OUT:
                 x, y = each.body.position
                 where = "lost" if each.lost else "out"
-                found.append(Rest(each.number, where, x, -1, (x, y, each.body.angle), tuple(each.met)))
+                resting.append(Rest(each.number, where, x, -1, (x, y, each.body.angle), tuple(each.met)))
             else:
-                found.append(rest_of(each, self.ground, self.cavity, each.body.is_sleeping))
-        return found
+                resting.append(rest_of(each, self.ground, self.cavity, each.body.is_sleeping))
+        return resting
 
     def recording(self) -> Recording:
         """Give what was kept since the crowd was made."""
@@ -436,10 +436,10 @@ class Crowd:
                     (self._fly if each.mode == FLYING else self._turn)(each)
             self._mark("impact", *contacts.news)
             contacts.news.clear()
-        found = self.rests()
-        self.film.end(self.count * step, found)
+        rests = self.rests()
+        self.film.end(self.count * step, rests)
         self.count = 0
-        return found
+        return rests
 
     def _mark(self, word: str, *numbers: int) -> None:
         self.film.mark(self.count * self.step, numbers, word)
@@ -458,13 +458,13 @@ class Crowd:
 
     def _fly(self, member: Member) -> None:
         """Look whether a part in flight has come down; on the arm its corner is held from then on."""
-        found = member.struck(self.step)
-        if found is None:
+        strike = member.struck(self.step)
+        if strike is None:
             member.due = self.count + (
                 1 if self.contacts.any_of(member.number) else member.steps_to_arm(self.step)
             )
-        elif self.ground.is_arm(member.corner_at(*found, self.step)):
-            member.catch(self.space, *found, self.step)
+        elif self.ground.is_arm(member.corner_at(*strike, self.step)):
+            member.catch(self.space, *strike, self.step)
             member.met["arm"] = None
             self._mark("impact", member.number)
             self._turn(member)

@@ -231,7 +231,7 @@ class Member:
         body, kappa = self.body, self.scene.kappa
         y, angle, rate = body.position.y - self.scene.surface_height, body.angle, body.angular_velocity
         rise = body.velocity.y + 0.5 * kappa * step
-        found = None
+        strike = None
         for vertex, (radius, phase) in enumerate(self.polar):
             if y + radius * math.sin(angle + phase) >= 0.0:
                 continue
@@ -244,9 +244,9 @@ class Member:
                     break
                 back -= over / slope
             back = min(max(back, 0.0), step)
-            if found is None or back > found[0]:
-                found = back, vertex
-        return found
+            if strike is None or back > strike[0]:
+                strike = back, vertex
+        return strike
 
     def before(self, back: float, step: float) -> tuple[tuple[float, float, float], tuple[float, float]]:
         """Its pose and velocity so long ago, in flight."""

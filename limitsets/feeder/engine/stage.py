@@ -158,7 +158,9 @@ def set_up(scene: Scene, x: float, side: int) -> Stage:
     space.gravity = (0.0, -scene.kappa)
     space.add(body, part)
     size = float(scene.sides.length.max())
-    return Stage(space, body, part, corners, tuple(flat), height, scene.kappa, size)
+    return Stage(
+        space, body, part, corners=corners, flat=tuple(flat), height=height, kappa=scene.kappa, size=size
+    )
 
 
 # ----------------------------------------------------------------

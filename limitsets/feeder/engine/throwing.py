@@ -209,7 +209,17 @@ def throw(
         turned, on = turn_on_hinge(stage, struck, step, left)
     status = "rest" if on >= 0 else "unfinished"
     end, time = stage.body.position.x, flown + turned
-    return EngineThrow(end, on, status, struck, flown, time, seen.residual, seen.reverses, seen.rocks)
+    return EngineThrow(
+        end,
+        on,
+        status,
+        struck=struck,
+        phi=flown,
+        time=time,
+        residual=seen.residual,
+        reverses=seen.reverses,
+        rocks=seen.rocks,
+    )
 
 
 def _check_asked(contact: str, friction: float | None, threshold: float, rolls: bool, stroke: float) -> None:
@@ -377,6 +387,6 @@ def _by_map(
     after, on, code = np.empty_like(x), np.empty_like(side), np.empty_like(side)
     for each in np.unique(side).tolist():
         here = side == each
-        found = images(scene.map, x[here], each)
-        after[here], on[here], code[here] = found.x, found.side, found.code
+        image = images(scene.map, x[here], each)
+        after[here], on[here], code[here] = image.x, image.side, image.code
     return after, on, code

@@ -535,7 +535,7 @@ def rest_of(
     count = len(vertices)
     ends = [side_ends(count, side) for side in range(count)]
     point = centre.in_frame(vertices, sqrt) if isinstance(centre, OnSide) else centre
-    found = []
+    sides = []
     for side, (left, right) in enumerate(ends):
         a, d, length = above_side(vertices[left], vertices[right], point, sqrt)
         if isinstance(centre, OnSide) and side == centre.side:
@@ -546,8 +546,8 @@ def rest_of(
         in_x, in_y = vertices[left][0] - before[0], vertices[left][1] - before[1]
         out_x, out_y = vertices[right][0] - vertices[left][0], vertices[right][1] - vertices[left][1]
         corner = atan2(in_x * out_y - in_y * out_x, in_x * out_x + in_y * out_y)
-        found.append((a, d, length, length - a, corner))
-    return found
+        sides.append((a, d, length, length - a, corner))
+    return sides
 
 
 def resting_sides(

@@ -95,7 +95,7 @@ class Goal(ABC):
     laid: Laid = ()
 
     @abstractmethod
-    def decide(self, found: Found) -> Verdict:
+    def decide(self, analysis: Found) -> Verdict:
         """Decide it from what an analysis found."""
 
     @abstractmethod
@@ -163,10 +163,10 @@ def by_side(laid: Laid) -> dict[str, list[list[float]]]:
     >>> by_side(((0, 8.0, 12.0), (0, 14.0, 16.0)))
     {'0': [[8.0, 12.0], [14.0, 16.0]]}
     """
-    found: dict[str, list[list[float]]] = {}
+    ranges: dict[str, list[list[float]]] = {}
     for side, lo, hi in laid:
-        found.setdefault(str(side), []).append([lo, hi])
-    return found
+        ranges.setdefault(str(side), []).append([lo, hi])
+    return ranges
 
 
 def laid_words(laid: Laid, unit: str) -> str:
@@ -239,9 +239,9 @@ class OrientedBeyond(Goal):
     from_anywhere: bool = False
     laid: Laid = ()
 
-    def decide(self, found: Found) -> Verdict:
+    def decide(self, analysis: Found) -> Verdict:
         """Compare with the farthest place on any other side."""
-        others = (x for side, x in _reached(found.extents).items() if side != self.side)
+        others = (x for side, x in _reached(analysis.extents).items() if side != self.side)
         threshold = max(others, default=-math.inf)
         return Verdict(threshold <= self.x, threshold)
 
@@ -287,9 +287,9 @@ class Reaches(Goal):
     from_anywhere: bool = False
     laid: Laid = ()
 
-    def decide(self, found: Found) -> Verdict:
+    def decide(self, analysis: Found) -> Verdict:
         """Compare with the farthest place on the side."""
-        threshold = _reached(found.extents).get(self.side, -math.inf)
+        threshold = _reached(analysis.extents).get(self.side, -math.inf)
         # extents say how far some orbit gets; that every one does is another question
         return Verdict(None if self.every_orbit and threshold >= self.x else threshold >= self.x, threshold)
 
@@ -313,9 +313,9 @@ class AttractsAll(Goal):
     from_anywhere: bool = False
     laid: Laid = ()
 
-    def decide(self, found: Found) -> Verdict:
+    def decide(self, analysis: Found) -> Verdict:
         """Look for one attractor with all starts."""
-        return Verdict(len(found.fractions) == 1 and found.fractions[0] >= _WHOLE, None)
+        return Verdict(len(analysis.fractions) == 1 and analysis.fractions[0] >= _WHOLE, None)
 
     def question(self, unit: str) -> str:
         """Say what is asked."""
@@ -340,9 +340,9 @@ class FlipOrder(Goal):
     from_anywhere: bool = False
     laid: Laid = ()
 
-    def decide(self, found: Found) -> Verdict:
+    def decide(self, analysis: Found) -> Verdict:
         """Compare with the one order found, wherever it begins."""
-        order = tuple(found.flip_order or ())
+        order = tuple(analysis.flip_order or ())
         return Verdict(self.order in (order[start:] + order[:start] for start in range(len(order))), None)
 
     def question(self, unit: str) -> str:
@@ -359,9 +359,9 @@ class StaysOnArm(Goal):
     from_anywhere: bool = False
     laid: Laid = ()
 
-    def decide(self, found: Found) -> Verdict:
+    def decide(self, analysis: Found) -> Verdict:
         """Look for starts that leave."""
-        return Verdict(found.leaving <= 0, None)
+        return Verdict(analysis.leaving <= 0, None)
 
     def question(self, unit: str) -> str:
         """Say what is asked."""
@@ -392,9 +392,9 @@ class Predicate(Goal):
     from_anywhere: bool = False
     laid: Laid = ()
 
-    def decide(self, found: Found) -> Verdict:
+    def decide(self, analysis: Found) -> Verdict:
         """Ask the caller of every interval."""
-        parts = [(side, np.array(spans).reshape(-1, 2)) for side, spans in found.extents.items()]
+        parts = [(side, np.array(spans).reshape(-1, 2)) for side, spans in analysis.extents.items()]
         return Verdict(all(np.all(self.holds(span[:, 0], span[:, 1], side)) for side, span in parts), None)
 
     def question(self, unit: str) -> str:

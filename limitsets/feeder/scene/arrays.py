@@ -94,11 +94,11 @@ def throw_stack(scene: Scene, values: Mapping[str, npt.ArrayLike]) -> ThrowStack
         numbers = reader.numbers(scene.goal, scene.cavity, scene.tray)
     possible = reader.possible
 
-    def kept(found: Array, present: Any) -> Array:
-        mask = possible.reshape(-1, *[1] * (found.ndim - 1))
-        return np.ascontiguousarray(np.where(mask, found, present))
+    def kept(array: Array, present: Any) -> Array:
+        mask = possible.reshape(-1, *[1] * (array.ndim - 1))
+        return np.ascontiguousarray(np.where(mask, array, present))
 
-    fields = {name: kept(found, getattr(own, name)) for name, found in numbers.items()}
+    fields = {name: kept(array, getattr(own, name)) for name, array in numbers.items()}
     params = repeated(own, count)._replace(**fields)
     lo, hi = resting_places(params.a, params.arm_length[:, None])
     return ThrowStack(params, lo, hi, params.a.copy(), possible)
@@ -182,9 +182,9 @@ class _Arrays(Numbers):
 
     def on_side(self, vertices: Sequence[Vector]) -> OnSide:
         """Return the centre of mass where it is measured on a side."""
-        found = super().on_side(vertices)
-        self._require_inside(vertices, found.in_frame(vertices, np.sqrt))
-        return found
+        centre = super().on_side(vertices)
+        self._require_inside(vertices, centre.in_frame(vertices, np.sqrt))
+        return centre
 
     def plate(self, vertices: Sequence[Vector], density: Scalar, points: list[Any]) -> Mass:
         """Add up a plate and the point masses on it."""
@@ -222,13 +222,13 @@ class _Arrays(Numbers):
         if cavity is not None:  # so is one that the arm overlaps, or that the part does not fit in
             self.require((cavity.position <= arm_length) & (cavity.position > a.max(axis=-1)))
             self.require(cavity.width >= fitted)
-        found = {
+        by_name = {
             "kappa": kappa,
             "surface_height": self.number("arm.surface_height"),
             "arm_length": arm_length,
             "radius_of_gyration": self.shape.radius_of_gyration,
         }
-        fields = {name: np.array(np.broadcast_to(each, self.count)) for name, each in found.items()}
+        fields = {name: np.array(np.broadcast_to(each, self.count)) for name, each in by_name.items()}
         fields |= {"a": a, "d": d, "length": length, "corner": corner}
         for each in (*fields.values(), right):
             self.require(np.isfinite(each).all(axis=tuple(range(1, each.ndim))))

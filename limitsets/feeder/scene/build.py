@@ -34,8 +34,8 @@ def resolve_goal(table: GoalTable, rests: list[bool], arm_length: float, resolve
     """Resolve ``[goal]`` for a part that rests on these of its sides."""
     named = [kind for kind in GOALS if getattr(table, kind) is not None]
     if len(named) != 1:
-        found = " and ".join(named) or "none"
-        raise resolver.refusal("goal", "the goal", found, f"one of {', '.join(GOALS)}", "name exactly one")
+        kinds = " and ".join(named) or "none"
+        raise resolver.refusal("goal", "the goal", kinds, f"one of {', '.join(GOALS)}", "name exactly one")
 
     def side(value: int, key: str) -> int:
         if value >= len(rests):
@@ -76,7 +76,7 @@ def resolve_goal(table: GoalTable, rests: list[bool], arm_length: float, resolve
 
 def resolve_world(table: WorldTable, resolver: Resolver) -> World:
     """Resolve ``[world]``."""
-    scatter, found, own = None, {}, {each.name for each in fields(World)}
+    scatter, facts, own = None, {}, {each.name for each in fields(World)}
     for name, fact in FACTS.items():
         given, key = getattr(table, name), f"world.{name}"
         if given is not None and fact.dimension:
@@ -84,14 +84,14 @@ def resolve_world(table: WorldTable, resolver: Resolver) -> World:
             if not given < fact.most:
                 raise resolver.refusal(key, fact.thing, text, fact.words, "correct it")
         if given is not None:
-            found[name] = given
+            facts[name] = given
     if table.scatter is not None and (table.scatter.speed or table.scatter.landing):
         scatter = Scatter(
             _noise(table.scatter.speed, "throw.speed", "world.scatter.speed", resolver),
             _noise(table.scatter.landing, "landing.x", "world.scatter.landing", resolver),
         )
-    more = {name: found.pop(name) for name in found.keys() - own}
-    return World(**found, scatter=scatter, more=more)
+    more = {name: facts.pop(name) for name in facts.keys() - own}
+    return World(**facts, scatter=scatter, more=more)
 
 
 def _noise(text: str | None, name: str, key: str, resolver: Resolver) -> Deviation | None:

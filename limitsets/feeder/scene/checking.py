@@ -79,12 +79,12 @@ def doubts(scene: Scene) -> tuple[Doubt, ...]:
     >>> doubts(load("paper-designed").with_values({"arm.surface_height": "-0.2 m"}))[0].thing
     "1.17 times the part's longest side"
     """
-    found: dict[str, Doubt] = {}
+    by_key: dict[str, Doubt] = {}
     for key, value, measured, least, most, thing, usual in _rows(scene):
-        if not least <= measured <= most and not (key.startswith("throw.") and "arm.length" in found):
+        if not least <= measured <= most and not (key.startswith("throw.") and "arm.length" in by_key):
             thing = thing.format(f"{measured:.3g}" if measured < 1000 else f"{measured:.0f}")
-            found.setdefault(key, Doubt(key, thing, value, usual, "has it the right unit?", scene.file))
-    return tuple(found.values())
+            by_key.setdefault(key, Doubt(key, thing, value, usual, "has it the right unit?", scene.file))
+    return tuple(by_key.values())
 
 
 def _rows(scene: Scene) -> Iterator[Row]:
@@ -204,17 +204,17 @@ def starting_text(name: str, file: str, unit: str = "in") -> str:
         else:
             lines += [*_quantities(key, field), ""]
     body = (
-        _LENGTHS.sub(lambda found: _in_unit(found, unit), "\n".join(lines))
+        _LENGTHS.sub(lambda length: _in_unit(length, unit), "\n".join(lines))
         if unit != "in"
         else "\n".join(lines)
     )
     return HEAD.format(file=file) + "\n" + body.rstrip("\n") + "\n"
 
 
-def _in_unit(found: re.Match[str], unit: str) -> str:
+def _in_unit(length: re.Match[str], unit: str) -> str:
     """Convert a quantity in inches, to 10 digits."""
-    value = convert(parse(f"{found[1]} in", "length"), unit)
-    return f'"{value:.10g} {unit}{found[2] or ""}"'
+    value = convert(parse(f"{length[1]} in", "length"), unit)
+    return f'"{value:.10g} {unit}{length[2] or ""}"'
 
 
 def new_scene(file: str | Path, unit: str = "in") -> Path:
@@ -304,7 +304,7 @@ def _model(annotation: Any) -> type[Table] | None:
 
     if isinstance(annotation, type) and issubclass(annotation, Table):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _model(part)) is not None), None)
+    return next((model for part in get_args(annotation) if (model := _model(part)) is not None), None)
 
 
 def _example(field: FieldInfo) -> Any:
@@ -324,8 +324,8 @@ def _example(field: FieldInfo) -> Any:
 def _examples(annotation: Any) -> Iterator[Any]:
     """Give the examples that the types in an annotation carry."""
     for part in get_args(annotation):
-        if (found := getattr(part, "examples", None)) is not None:
-            yield found
+        if (examples := getattr(part, "examples", None)) is not None:
+            yield examples
         yield from _examples(part)
 
 
@@ -391,35 +391,35 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
     """
     try:
         structure, file = structure_of(source)
-        tree, found = respelled(plain(structure, file), file)
+        tree, errors = respelled(plain(structure, file), file)
         while inner := respelled(tree, file)[1]:  # in a table whose own name was misspelt
-            tree, found = respelled(tree, file)[0], found + inner
+            tree, errors = respelled(tree, file)[0], errors + inner
     except SceneError as error:  # no file, no TOML: there is nothing more to look at
         return (error,), ()
     refused = refusals(tree, file)[1]
-    found += refused
+    errors += refused
     blamed = {_path_of(error) for error in refused}
     looked_at = _mended(tree, blamed)
     if looked_at is None:
-        return tuple(found), ()
+        return tuple(errors), ()
     instead: set[Words] = set()
     while (wrong := _first(looked_at, file)) is not None:
         path = _path_of(wrong)
         # a tolerance of what is blamed already is not given only because something stands in for that
         about = {path, _words_of(str(path[1]))} if path[0] == "tolerance" and len(path) == 2 else {path}
         if not any(each[: len(one)] == one for each in about for one in (*blamed, *instead)):
-            found.append(wrong)
+            errors.append(wrong)
             blamed.add(path)
             instead |= _hanging_on(wrong)
         after = _passed(looked_at, wrong, file)
         if after is None:
-            return tuple(found), ()
+            return tuple(errors), ()
         looked_at = after
     # the masses by which a part tips over are looked at, what stands in for another value is not
-    tips = {_path_of(error) for error in found if isinstance(error, TipsError)}
+    tips = {_path_of(error) for error in errors if isinstance(error, TipsError)}
     if any(path[0] in ("part", "arm", "throw", "gravity") for path in blamed - tips):
-        return tuple(found), ()
-    return tuple(found), doubts(Scene.of(looked_at, file))
+        return tuple(errors), ()
+    return tuple(errors), doubts(Scene.of(looked_at, file))
 
 
 def _path_of(error: SceneError) -> Words:

@@ -43,7 +43,7 @@ def read_laid(scene: Scene, given: LaidLike | None, key: str = "laid") -> Laid:
         return ()
     if not isinstance(given, Mapping) or not given:
         raise AnswerError("where parts are laid down", shown(given), FORM, "name a side and a range", key=key)
-    found: list[tuple[int, float, float]] = []
+    spans: list[tuple[int, float, float]] = []
     for side, ranges in given.items():
         sides = [i for i, rests in enumerate(scene.sides.rests.tolist()) if rests]
         if isinstance(side, bool) or side not in sides:
@@ -54,9 +54,9 @@ def read_laid(scene: Scene, given: LaidLike | None, key: str = "laid") -> Laid:
         )
         if not pairs or not ranges:
             raise AnswerError("where parts are laid down", shown(ranges), FORM, "write pairs", key=key)
-        found += [(int(side), *_ends(scene, side, lo, hi, key)) for lo, hi in ranges]
+        spans += [(int(side), *_ends(scene, side, lo, hi, key)) for lo, hi in ranges]
     joined: list[tuple[int, float, float]] = []
-    for side, lo, hi in sorted(found):
+    for side, lo, hi in sorted(spans):
         if joined and joined[-1][0] == side and lo <= joined[-1][2]:
             joined[-1] = side, joined[-1][1], max(hi, joined[-1][2])
         else:

@@ -122,8 +122,8 @@ class Numbers(ABC):
             tuple(self.number(f"part.mass.points[{k}].{word}") for word in ("x", "y", "mass"))
             for k in range(len(mass.get("points", ())))
         ]
-        found = self.plate(vertices, density, points)
-        return Shape(vertices, found.centre, lengths, found.radius_of_gyration)
+        plate = self.plate(vertices, density, points)
+        return Shape(vertices, plate.centre, lengths, plate.radius_of_gyration)
 
     def sides(self, atan2: Callable[[Scalar, Scalar], Scalar]) -> list[tuple[Scalar, ...]]:
         """Return (a, d, length, right, corner) of every side (`limitsets.geometry.rest_of`)."""
@@ -232,10 +232,10 @@ class Floats(Numbers):
         if side > last:
             key = "part.mass.center.side"
             raise self.refusal(key, "the side", side, f"0 to {last}", "name a side of this part")
-        found = super().on_side(vertices)
+        centre = super().on_side(vertices)
         with self.at("part.mass.center"):
-            require_inside(np.array(vertices), found.in_frame(vertices), "the centre of mass")
-        return found
+            require_inside(np.array(vertices), centre.in_frame(vertices), "the centre of mass")
+        return centre
 
     def plate(self, vertices: Sequence[Vector], density: float, points: list[Any]) -> Mass:
         """Add up a plate and the point masses on it."""
@@ -260,18 +260,18 @@ class Floats(Numbers):
         """Gravity in the plane of the motion [unit/s^2]; None where it is not given."""
         if "gravity" not in self.tree:
             return None
-        found: float = super().gravity
-        return found
+        in_plane: float = super().gravity
+        return in_plane
 
     @cached_property
     def kappa(self) -> float:
         """Gravity over the squared angular speed of the throw [length]."""
         throw = self.tree["throw"]
-        found: float = super().kappa
-        if "speed" in throw and not LEAST <= found <= 1 / LEAST:
+        ratio: float = super().kappa
+        if "speed" in throw and not LEAST <= ratio <= 1 / LEAST:
             allowed = f"gravity/speed^2 from {LEAST:g} to {1 / LEAST:g} {self.resolver.unit}"
             raise self.refusal("throw.speed", "this angular speed", throw["speed"], allowed, "correct it")
-        return found
+        return ratio
 
 
 def _pairs(vertices: Array) -> list[Vector]:

@@ -74,12 +74,12 @@ def find(name: object, *, key: str | None = None, file: str | None = None) -> Pl
     ('part', 'vertices', 3, 1)
     """
     text = name if isinstance(name, str) else ""
-    found = _place_of(text)
-    if found is None:
+    place = _place_of(text)
+    if place is None:
         near = difflib.get_close_matches(_pattern_of(text)[:64], NAMES, n=1, cutoff=0.3)
         remedy = f"did you mean {near[0]!r}?" if near else "name one of these, a scene's"
         raise SceneError("the quantity", shown(name), ", ".join(NAMES), remedy, key=key, file=file)
-    return found
+    return place
 
 
 def _pattern_of(text: str) -> str:

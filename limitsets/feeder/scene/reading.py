@@ -202,7 +202,7 @@ def _parsed(text: str, file: str | None) -> dict[str, Any]:
         raise refuse("not valid", _why_no_toml(str(error))) from None
 
 
-def _why_no_toml(found: str) -> str:
+def _why_no_toml(message: str) -> str:
     """Keep the line and column at the end of tomllib's message, however long what stands before them is.
 
     Examples
@@ -210,8 +210,8 @@ def _why_no_toml(found: str) -> str:
     >>> _why_no_toml("Invalid value (at line 11, column 10)")
     'Invalid value (at line 11, column 10); a quantity stands in quotation marks: length = "400 mm"'
     """
-    what, at, place = found.rpartition(" (at ")
-    words = f"{shown(what)}{at}{place}" if at else str(shown(found))
+    what, at, place = message.rpartition(" (at ")
+    words = f"{shown(what)}{at}{place}" if at else str(shown(message))
     return f'{words}; a quantity stands in quotation marks: length = "400 mm"'
 
 

@@ -279,15 +279,15 @@ class Scene(Tabled):
             "gravity.acceleration": self.gravity,
             "part.mass.radius_of_gyration": self.radius_of_gyration,
         }
-        found = derived.get(name)
-        if found is None:
+        number = derived.get(name)
+        if number is None:
             remedy = "add [gravity]" if name == "throw.speed" else "it is given in other words here"
             if name == NOISE_ONLY:
                 remedy = "it names the noise of landings only"
             raise SceneError(
                 "the quantity", name, "a quantity that the scene gives", remedy, key=name, file=self.file
             )
-        return found
+        return number
 
     def with_values(self, values: Mapping[str, float | str]) -> Scene:
         """Give the scene with other values; everything that follows from them is computed anew.
@@ -322,16 +322,16 @@ class Scene(Tabled):
 
         made = Scene.of(replaced(self.text, self.unit, self.file, values), self.file)
         speed = values.get("throw.speed")
-        found = turns(made.arm_length, made.kappa)
+        most_turns = turns(made.arm_length, made.kappa)
         if not values.keys() & {"throw.speed", "throw.kappa"} and "kappa" in made.text["throw"]:
             self._warn_of_gravity(made)
-        if isinstance(speed, str | None) or found <= MOST_TURNS:
+        if isinstance(speed, str | None) or most_turns <= MOST_TURNS:
             return made
         # a number of deg/s, most often: no throw from the outer half of the arm lands within a turn
         raise SceneError(
             "this angular speed",
             f"{float(speed):g} rad/s",
-            f"a speed whose throws land: a part thrown from the arm's end would turn {found:.0f} times",
+            f"a speed whose throws land: a part thrown from the arm's end would turn {most_turns:.0f} times",
             f'a bare number is read in rad/s: write "{float(speed):g} deg/s", or the text "{float(speed):g} rad/s"',
             key="throw.speed",
             file=self.file,

@@ -270,8 +270,8 @@ def resolve_feedback(
         key = f"feedback.throws[{k}]"
         named = [word for word in ("kappa", "speed") if getattr(each, word) is not None]
         if len(named) != 1:
-            found = " and ".join(named) or "none"
-            raise resolver.refusal(key, "this throw", found, "kappa or speed", "give it one of the two")
+            given = " and ".join(named) or "none"
+            raise resolver.refusal(key, "this throw", given, "kappa or speed", "give it one of the two")
         if each.name in [other.name for other in throws]:
             raise resolver.refusal(
                 f"{key}.name", "the name of this throw", each.name, "a name of its own", "choose another"
@@ -290,8 +290,8 @@ def resolve_feedback(
 def _sensor(table: SensorTable, count: int, arm_length: float, resolver: Resolver) -> Sensor:
     key, named = "feedback.sensor", [word for word in ("beyond", "side") if getattr(table, word) is not None]
     if len(named) != 1:
-        found = " and ".join(named) or "none"
-        raise resolver.refusal(key, "the sensor", found, "beyond or side", "it answers one question: name it")
+        given = " and ".join(named) or "none"
+        raise resolver.refusal(key, "the sensor", given, "beyond or side", "it answers one question: name it")
     if table.side is not None:
         if table.error is not None:
             remedy = "the error of a place: leave it out"

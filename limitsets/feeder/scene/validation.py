@@ -76,9 +76,9 @@ def validate(tree: Tree, file: str | None) -> SceneTable:
     SceneError
         For the first thing wrong, in the order of `refusals`.
     """
-    table, found = refusals(tree, file)
-    if table is None or found:
-        raise found[0]
+    table, errors = refusals(tree, file)
+    if table is None or errors:
+        raise errors[0]
     return table
 
 
@@ -90,15 +90,15 @@ def refusals(tree: Tree, file: str | None) -> tuple[SceneTable | None, list[Scen
     model, table, wrong = _read(tree)
     rank = {"extra_forbidden": 0, "missing": 2}
     wrong.sort(key=lambda problem: rank.get(problem["type"], 1))
-    found = [_refusal(problem, model, tree, file) for problem in wrong]
-    return table, [*found, *_contradictions(tree, file)]
+    errors = [_refusal(problem, model, tree, file) for problem in wrong]
+    return table, [*errors, *_contradictions(tree, file)]
 
 
 def respelled(tree: Tree, file: str | None) -> tuple[Tree, list[SceneError]]:
     """Tell of all unknown keys, each under the name that it is like, where that is free, or else left out."""
     model, _, wrong = _read(tree)
     unknown = [problem for problem in wrong if problem["type"] == "extra_forbidden"]
-    told = [_refusal(problem, model, tree, file) for problem in unknown]
+    errors = [_refusal(problem, model, tree, file) for problem in unknown]
     tree = copy.deepcopy(tree)
     for problem in unknown:
         meant = _meant(problem["loc"], model, tree)
@@ -106,7 +106,7 @@ def respelled(tree: Tree, file: str | None) -> tuple[Tree, list[SceneError]]:
         value = node.pop(problem["loc"][-1])
         if meant:
             node[meant] = value
-    return tree, told
+    return tree, errors
 
 
 def _table_of(path: tuple[str | int, ...], tree: Tree) -> Any:
@@ -150,45 +150,56 @@ _ONE_OF = {
 
 def _contradictions(tree: Tree, file: str | None) -> Iterator[SceneError]:
     """Refuse words that exclude each other, half a description, or none; for this no value has to be right."""
-
-    def refusal(key: str, thing: str, value: object, allowed: str, remedy: str) -> SceneError:
-        return SceneError(thing, shown(value), allowed, remedy, key=key, file=file)
-
     for key, (thing, one, other, allowed) in _ONE_OF.items():
         if not isinstance(tree.get(key), dict):
             continue
         given = [word for word in (one, other) if word in tree[key]]
         if len(given) != 1:
-            found = " and ".join(given) or f"neither {one} nor {other}"
+            words = " and ".join(given) or f"neither {one} nor {other}"
             remedy = "give one of them, not both" if given else "give one of them"
-            yield refusal(key, thing, found, allowed, remedy)
+            yield SceneError(thing, shown(words), allowed, remedy, key=key, file=file)
         elif given == ["speed"] and "gravity" not in tree:
+            allowed = "acceleration or tilt in [gravity]"
             remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
-            yield refusal("throw.speed", "gravity", "missing", "acceleration or tilt in [gravity]", remedy)
+            yield SceneError("gravity", "missing", allowed, remedy, key="throw.speed", file=file)
     mass = tree["part"].get("mass") if isinstance(tree.get("part"), dict) else None
-    if not isinstance(mass, dict):
-        return
-    measured = [name for name in ("center", "radius_of_gyration") if name in mass]
-    made = [name for name in ("plate_density", "plate_thickness", "points") if name in mass]
+    if isinstance(mass, dict):
+        yield from _contradictions_of_mass(mass, file)
+
+
+def _contradictions_of_mass(mass: Tree, file: str | None) -> Iterator[SceneError]:
+    """Refuse a mass that is both measured and computed from a plate, or neither."""
+    measured: list[str] = [name for name in ("center", "radius_of_gyration") if name in mass]
+    made: list[str] = [name for name in ("plate_density", "plate_thickness", "points") if name in mass]
     allowed = "center and radius_of_gyration, or plate_density and points"
     if measured and made:
-        found = " and ".join(measured + made)
+        words = " and ".join(measured + made)
         remedy = "give one of the two, not both: a point mass beside a measured part is added to it by hand, by the "
         remedy += "parallel-axis rule (docs/scene.md)"
-        yield refusal("part.mass", "the mass", found, allowed, remedy)
+        yield SceneError("the mass", shown(words), allowed, remedy, key="part.mass", file=file)
     elif len(measured) == 1 or (not measured and "plate_density" not in made):
-        found = f"only {' and '.join(measured + made)}" if measured or made else "empty"
-        yield refusal("part.mass", "the mass", found, allowed, "add what is missing")
+        words = f"only {' and '.join(measured + made)}" if measured or made else "empty"
+        yield SceneError("the mass", shown(words), allowed, "add what is missing", key="part.mass", file=file)
     elif made:
-        density, thickness = mass["plate_density"], mass.get("plate_thickness")
-        key, keys = "part.mass.plate_density", "part.mass.plate_thickness"
-        unit = str(density).strip(" ").rpartition(" ")[2]
-        if unit in UNITS["mass per volume"] and thickness is None:
-            allowed = "a mass per area, or a mass per volume with plate_thickness"
-            yield refusal(key, "this density", density, allowed, f'add {keys}, like "2 mm"')
-        if unit in UNITS["mass per area"] and thickness is not None:
-            remedy = f"{density} holds the thickness already: leave it out, or give the density in kg/m^3 or g/cm^3"
-            yield refusal(keys, "the thickness", thickness, "one beside a mass per volume", remedy)
+        yield from _contradictions_of_plate(mass["plate_density"], mass.get("plate_thickness"), file)
+
+
+def _contradictions_of_plate(density: object, thickness: object, file: str | None) -> Iterator[SceneError]:
+    """Refuse a mass per volume without a thickness, and a mass per area with one."""
+    key, keys = "part.mass.plate_density", "part.mass.plate_thickness"
+    unit = str(density).strip(" ").rpartition(" ")[2]
+    if unit in UNITS["mass per volume"] and thickness is None:
+        allowed, remedy = (
+            "a mass per area, or a mass per volume with plate_thickness",
+            f'add {keys}, like "2 mm"',
+        )
+        yield SceneError("this density", shown(density), allowed, remedy, key=key, file=file)
+    if unit in UNITS["mass per area"] and thickness is not None:
+        allowed = "one beside a mass per volume"
+        remedy = (
+            f"{density} holds the thickness already: leave it out, or give the density in kg/m^3 or g/cm^3"
+        )
+        yield SceneError("the thickness", shown(thickness), allowed, remedy, key=keys, file=file)
 
 
 def _refusal(problem: Any, table: type[SceneTable], tree: Tree, file: str | None) -> SceneError:

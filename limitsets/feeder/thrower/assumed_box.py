@@ -236,8 +236,8 @@ def _rolls(b: SideBox, rest: Rest, energy: Interval, jog: bool) -> Interval:
 
 
 @proof_kernel
-def _write(out: Any, column: int, found: Interval) -> None:
-    out[column, 0], out[column, 1] = found.lo, found.hi
+def _write(out: Any, column: int, bounds: Interval) -> None:
+    out[column, 0], out[column, 1] = bounds.lo, bounds.hi
 
 
 @proof_kernel
@@ -273,8 +273,8 @@ def _throw(b: SideBox, rest: Rest, x: Interval, phi: Interval, slope: Interval, 
 
 
 @proof_kernel
-def _wider(out: Any, column: int, found: Interval) -> None:
-    out[column, 0], out[column, 1] = min(out[column, 0], found.lo), max(out[column, 1], found.hi)
+def _wider(out: Any, column: int, bounds: Interval) -> None:
+    out[column, 0], out[column, 1] = min(out[column, 0], bounds.lo), max(out[column, 1], bounds.hi)
 
 
 @proof_kernel
@@ -362,8 +362,8 @@ def _beyond(lo: Throw, hi: Throw, side: int, angle: float) -> tuple[float, float
     at = turn_point(angle)
     sine = own.d * after.right + own.a * after.d
     cosine = own.d * after.d - own.a * after.right
-    found = sine * (1.0 - at.versin) - cosine * at.sin
-    return found.lo, found.hi
+    bounds = sine * (1.0 - at.versin) - cosine * at.sin
+    return bounds.lo, bounds.hi
 
 
 def corner_bounds(lo: Throw, hi: Throw, side: int, guess: float) -> tuple[float, float]:

@@ -175,8 +175,8 @@ def _barrier(
     kappa = part.own.kappa
     behind, ahead = kappa * (above - low), kappa * (high - above)
     left, right = tips_box(part, k) == 1, tips_box(part, k + 1) == -1
-    found = behind if left else (ahead if right else barrier)
-    return Interval(found.lo, found.hi)
+    height = behind if left else (ahead if right else barrier)
+    return Interval(height.lo, height.hi)
 
 
 @proof_kernel

@@ -33,8 +33,8 @@ gather_side = kernel(gather)
 def flip_margin(part: Side, x: float, at: Turned) -> float:
     """Positive where the part flips after an impact at phi."""
     omega, barrier = strike(part.flight, part, x, at)
-    found: float = margin(part.flip, part.inertia, omega, barrier)
-    return found
+    excess: float = margin(part.flip, part.inertia, omega, barrier)
+    return excess
 
 
 @kernel

@@ -186,7 +186,17 @@ def trace(params: Throw | FullThrow, x: float, side: int, count: int = 1) -> Tra
     reason = (
         _beyond_model(params, float(path.x[made - 1]), int(path.side[made - 1])) if outside.any() else None
     )
-    return Trace(path.x, path.side, path.code, phi, shift, turned, other, path.stopped, reason)
+    return Trace(
+        path.x,
+        path.side,
+        path.code,
+        phi=phi,
+        displacement=shift,
+        turned=turned,
+        other_vertex_first=other,
+        stopped=path.stopped,
+        reason=reason,
+    )
 
 
 def _beyond_model(params: Throw | FullThrow, x: float, side: int) -> str:

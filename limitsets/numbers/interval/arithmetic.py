@@ -130,8 +130,8 @@ def power(a: Ends, count: int) -> Ends:
     lo, hi = (1.0, 1.0), (1.0, 1.0)
     for _ in range(n):
         lo, hi = mul(lo, (base[0], base[0])), mul(hi, (base[1], base[1]))
-    found = or_empty(holds(a), lo[0], hi[1])
-    return found if count >= 0 else div((1.0, 1.0), found)
+    ends = or_empty(holds(a), lo[0], hi[1])
+    return ends if count >= 0 else div((1.0, 1.0), ends)
 
 
 @proof_kernel

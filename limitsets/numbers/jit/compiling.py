@@ -75,17 +75,17 @@ def _compiled_helpers(function: Callable[..., Any], proof: bool) -> dict[str, An
 
 def _compiled_values(values: dict[str, Any], names: set[str], proof: bool) -> dict[str, Any]:
     """Those of the values in whose place another one has to stand."""
-    found = {}
+    compiled_values = {}
     for name, value in values.items():
         if _is_plain(value):
-            found[name] = _helper(value, proof)
+            compiled_values[name] = _helper(value, proof)
         elif isinstance(value, python_types.ModuleType) and value.__name__.split(".")[0] not in COMPILED:
             own = vars(value)
             inside = _compiled_values({key: own[key] for key in names & own.keys()}, names, proof)
             if inside:
-                found[name] = python_types.ModuleType(value.__name__)
-                vars(found[name]).update(own, **inside)
-    return found
+                compiled_values[name] = python_types.ModuleType(value.__name__)
+                vars(compiled_values[name]).update(own, **inside)
+    return compiled_values
 
 
 def _in_scope(function: Callable[..., Any], scope: dict[str, Any]) -> Any:
@@ -108,8 +108,8 @@ def with_helpers(function: Callable[..., Any], proof: bool) -> Callable[..., Any
     """Return a kernel whose plain helpers are compiled; itself where it has none, as all of the package."""
     if (function.__module__ or "").split(".")[0] == "limitsets":
         return function
-    found = _compiled_helpers(function, proof)
-    return _in_scope(function, {**function.__globals__, **found}) if found else function
+    helpers = _compiled_helpers(function, proof)
+    return _in_scope(function, {**function.__globals__, **helpers}) if helpers else function
 
 
 # What numba says around the cause of a failure.
@@ -130,7 +130,7 @@ _NO_COORDINATES = re.compile(
     r"|Cannot unify (.*) and .* for 'after"
 )
 
-# What stands where a kernel takes the entries of a number, as of a tuple.
+# Lines of numba's message where a kernel takes entries of a number, as if it were a tuple.
 _NO_ENTRIES = re.compile(r">>> getitem\(float64, |failed to unpack float64")
 
 _OPERATION = re.compile(r">>> (add|sub|mul|truediv|pow|neg)\((.*)\)$")
@@ -162,18 +162,15 @@ def _explained(error: Exception, cls: type) -> MapError:
     lines = [line.strip() for line in str(error).splitlines()]
     cause = next((line for line in lines if not _AROUND.match(line)), type(error).__name__)
     cause = re.sub(r", defined at .*", "", cause.removeprefix("TypingError: "))
-    named = next((found for line in lines if (found := _KERNEL.search(line))), None)
-    kernel = f"the kernel {named[1]} of {cls.__name__}" if named else f"a kernel of {cls.__name__}"
-    places = (re.match(r'File "(.*)", line (\d+)', line) for line in lines)
-    spots = ((Path(at[1]).resolve(), int(at[2])) for at in places if at)
-    own = (PACKAGE, Path(numba.__file__).parent)
-    spot = next((at for at in spots if not any(folder in at[0].parents for folder in own)), None)
+    call = next(filter(None, map(_KERNEL.search, lines)), None)
+    kernel = f"the kernel {call[1]} of {cls.__name__}" if call else f"a kernel of {cls.__name__}"
+    spot = _own_line(lines)
     place = f"{spot[0].name}, line {spot[1]}" if spot else ""
     where = f"correct {place}" if place else "correct the kernel"
     if spot and any("Interval(float64)" in line for line in lines):  # a box, of a kernel for plain numbers
         file, number = str(spot[0]), spot[1]
         above = (re.match(r"\s*def (\w+)", linecache.getline(file, k)) for k in range(number, 0, -1))
-        name = next((found[1] for found in above if found), "the kernel")
+        name = next((head[1] for head in above if head), "the kernel")
         return MapError(
             f"what {name} of {cls.__name__} does with x or a parameter ({place})",
             linecache.getline(file, number).strip(),
@@ -194,20 +191,33 @@ def _explained(error: Exception, cls: type) -> MapError:
             "a tuple",
             "in one dimension write x, not x[0]; of a map of 2 or 3 pass dimension= to limitsets.register",
         )
-    if found := next((found for line in lines if (found := _NO_COORDINATES.match(line))), None):
+    if state := next(filter(None, map(_NO_COORDINATES.match, lines)), None):
         return MapError(
             f"the new x that the kernel image of {cls.__name__} gives",
-            _in_words("mul", next(filter(None, found.groups()))),
+            _in_words("mul", next(filter(None, state.groups()))),
             "as many numbers as the map has dimensions: one as it is, two or three as a tuple",
             "correct what image returns, or pass dimension= to limitsets.register",
         )
-    if found := next((found for line in lines if (found := _OPERATION.match(line))), None):
+    if operation := next(filter(None, map(_OPERATION.match, lines)), None):
         return MapError(
             f"an operation of {kernel}",
-            _in_words(*found.groups()),
+            _in_words(*operation.groups()),
             "one of numbers",
             (f"take the entries of a tuple one by one, as params.c[0] * x; {where}"),
         )
+    return _explained_by_cause(cause, cls, kernel, where)
+
+
+def _own_line(lines: list[str]) -> tuple[Path, int] | None:
+    """Find the line of source that an error names and that is neither of this package nor of numba."""
+    places = (re.match(r'File "(.*)", line (\d+)', line) for line in lines)
+    spots = ((Path(at[1]).resolve(), int(at[2])) for at in places if at)
+    own = (PACKAGE, Path(numba.__file__).parent)
+    return next((at for at in spots if not any(folder in at[0].parents for folder in own)), None)
+
+
+def _explained_by_cause(cause: str, cls: type, kernel: str, where: str) -> MapError:
+    """Explain an error by its cause, in the compiler's words where they are of no known kind."""
     if field := re.match(r"Unknown attribute '(\w+)' of type", cause):
         fields = ", ".join(getattr(cls, "_fields", ()))
         return MapError(

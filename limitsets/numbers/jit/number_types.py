@@ -27,11 +27,11 @@ _MARK, _BYTE = "limitsets_mark", ir.IntType(8)
 
 def _mark_of(builder: Any) -> Any:
     """Return the byte of the mark, one for all that is linked together."""
-    found = builder.module.globals.get(_MARK)
-    if found is None:
-        found = ir.GlobalVariable(builder.module, _BYTE, _MARK)
-        found.linkage, found.initializer = "linkonce_odr", ir.Constant(_BYTE, 0)
-    return found
+    mark = builder.module.globals.get(_MARK)
+    if mark is None:
+        mark = ir.GlobalVariable(builder.module, _BYTE, _MARK)
+        mark.linkage, mark.initializer = "linkonce_odr", ir.Constant(_BYTE, 0)
+    return mark
 
 
 @extending.intrinsic  # type: ignore[untyped-decorator]  # numba has no types
@@ -117,8 +117,8 @@ def _number(cls: type[T]) -> type[T]:
         return typed
 
     def made(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        found = _structure(context, builder, signature.return_type, *args)
-        return numba.core.imputils.impl_ret_borrowed(context, builder, signature.return_type, found)
+        structure = _structure(context, builder, signature.return_type, *args)
+        return numba.core.imputils.impl_ret_borrowed(context, builder, signature.return_type, structure)
 
     extending.type_callable(cls)(typer)
     extending.typeof_impl.register(cls)(
@@ -134,10 +134,10 @@ _TWICE: set[type] = set()
 
 def _structure(context: Any, builder: Any, kind: _NumberType, one: Any, two: Any) -> Any:
     """Put two values together, while code is generated."""
-    found = cgutils.create_struct_proxy(kind)(context, builder)
+    structure = cgutils.create_struct_proxy(kind)(context, builder)
     for name, value in zip(_FIELDS[kind.cls], (one, two), strict=True):
-        setattr(found, name, value)
-    return found._getvalue()
+        setattr(structure, name, value)
+    return structure._getvalue()
 
 
 @extending.register_model(_NumberType)
@@ -172,8 +172,8 @@ def _read_field(context: Any, builder: Any, kind: Any, value: Any, name: str) ->
 
 @extending.box(_NumberType)  # type: ignore[untyped-decorator]  # numba has no types
 def _to_python(kind: Any, value: Any, c: Any) -> Any:
-    found = cgutils.create_struct_proxy(kind)(c.context, c.builder, value=value)
-    fields = [c.box(kind.entry, getattr(found, name)) for name in _FIELDS[kind.cls]]
+    structure = cgutils.create_struct_proxy(kind)(c.context, c.builder, value=value)
+    fields = [c.box(kind.entry, getattr(structure, name)) for name in _FIELDS[kind.cls]]
     cls = c.pyapi.unserialize(c.pyapi.serialize_object(kind.cls))
     made = c.pyapi.call_function_objargs(cls, fields)
     for each in (*fields, cls):
@@ -267,8 +267,8 @@ def corners_as_numbers(number: type, array: type) -> Callable[[Any, Any], Any]:
     @extending.intrinsic  # type: ignore[untyped-decorator]  # numba has no types
     def together(typing: Any, lo: Any, hi: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            found = value(context, builder, lo, *args)
-            return numba.core.imputils.impl_ret_borrowed(context, builder, signature.return_type, found)
+            corners = value(context, builder, lo, *args)
+            return numba.core.imputils.impl_ret_borrowed(context, builder, signature.return_type, corners)
 
         return (joined(lo)(lo, hi), code) if lo == hi else None
 

@@ -524,7 +524,7 @@ class CellSet:
         if axis not in range(self.grid.dimension):
             allowed = f"0 to {self.grid.dimension - 1}"
             raise GridError("the axis", axis, allowed, "name an axis of the grid")
-        found: dict[int, list[tuple[float, float]]] = {}
+        intervals: dict[int, list[tuple[float, float]]] = {}
         for side in range(self.grid.sides):
             block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
             others = tuple(each for each in range(self.grid.dimension) if each != axis)
@@ -532,8 +532,8 @@ class CellSet:
             border = np.flatnonzero(np.diff(np.concatenate([[0], met, [0]])))
             edges = self.grid.edges[side][axis]
             if border.size:
-                found[side] = [(float(edges[a]), float(edges[b])) for a, b in border.reshape(-1, 2)]
-        return found
+                intervals[side] = [(float(edges[a]), float(edges[b])) for a, b in border.reshape(-1, 2)]
+        return intervals
 
     def pieces(self) -> dict[int, list[tuple[tuple[float, float], ...]]]:
         """Per side the boxes that hold its connected pieces, a pair (lo, hi) for each axis.
@@ -552,7 +552,7 @@ class CellSet:
         """
         from scipy import ndimage
 
-        found: dict[int, list[tuple[tuple[float, float], ...]]] = {}
+        boxes_by_side: dict[int, list[tuple[tuple[float, float], ...]]] = {}
         for side, axes in enumerate(self.grid.edges):
             block = self.mask[self.grid.of_side(side)].reshape(tuple(self.grid.shape[side]))
             labels, _ = ndimage.label(block, np.ones((3,) * self.grid.dimension))
@@ -564,8 +564,8 @@ class CellSet:
                 for piece in ndimage.find_objects(labels)
             ]
             if boxes:
-                found[side] = boxes
-        return found
+                boxes_by_side[side] = boxes
+        return boxes_by_side
 
     def refined(self, fine: Grid) -> CellSet:
         """Return the cells of a refinement (`Grid.refine`) that lie in this set."""

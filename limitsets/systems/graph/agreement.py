@@ -110,7 +110,7 @@ def _around_changes(code_of: Callable[[Floats], Any], starts: Floats, domain: Do
 
 def _points(params: Any, domain: Domain, side: int) -> tuple[Floats, int]:
     """Where the kernels are compared: the starts, then those around changes of branch; how many starts there are."""
-    starts, found = _starts(domain, side), []
+    starts, near_changes = _starts(domain, side), []
 
     def code_of(x: Floats) -> Any:
         return images(params, x, side).code
@@ -124,9 +124,9 @@ def _points(params: Any, domain: Domain, side: int) -> tuple[Floats, int]:
         if domain.dimension == 1:  # two changes of sign between a pair of starts
             more = hidden(lambda x: margins(params, x, side), starts[:, 0])
             starts = np.unique(np.append(starts, more))[:, None]
-        found.append(_around_changes(sign_of, starts, domain, side))
-    found.append(_around_changes(code_of, starts, domain, side))
-    return np.concatenate([starts, *found]), len(starts)
+        near_changes.append(_around_changes(sign_of, starts, domain, side))
+    near_changes.append(_around_changes(code_of, starts, domain, side))
+    return np.concatenate([starts, *near_changes]), len(starts)
 
 
 def require_agreement(params: Any, domain: Domain, boxes: bool, upper: Any = None) -> None:
@@ -155,17 +155,25 @@ def require_agreement(params: Any, domain: Domain, boxes: bool, upper: Any = Non
         return
     for corner, side in product(corners, np.flatnonzero(domain.inhabited).tolist()):
         points, count = _points(corner, domain, side)
-        found = images(corner, points, side)
-        require_codes(corner, found.code)
-        after = found.x.reshape(points.shape)
-        usable = (found.code >= 0) & np.isfinite(after).all(axis=1)
+        image = images(corner, points, side)
+        require_codes(corner, image.code)
+        after = image.x.reshape(points.shape)
+        usable = (image.code >= 0) & np.isfinite(after).all(axis=1)
         size = _extent(domain, side) + np.abs(after)
         if kind.has_margin and len(kind.branches) > 1:
-            _ask_margin(corner, points, side, np.where(usable, found.code, -1), count)
+            _ask_margin(corner, points, side, np.where(usable, image.code, -1), count)
         if kind.has_image_on:
-            _ask_forced(corner, points, side, (after, found.side, found.code), usable, size)
+            _ask_forced(corner, points, side, (after, image.side, image.code), usable, size)
         if boxes and kind.has_image_box and rounding_is_sound():
-            _ask_boxes(ends, domain, points, side, (after, found.side, found.code), usable, size)
+            _ask_boxes(
+                ends,
+                domain,
+                points,
+                side=side,
+                seen=(after, image.side, image.code),
+                usable=usable,
+                size=size,
+            )
 
 
 def _ask_margin(params: Any, points: Floats, side: int, code: Any, count: int) -> None:
@@ -183,7 +191,7 @@ def _ask_margin(params: Any, points: Floats, side: int, code: Any, count: int) -
         remedy = "its sign is wrong everywhere: give its negative"
     got, want = (f"{each} ({names[each]})" for each in (int(sign[k]), int(code[k])))
     what = "the branch by the sign of the kernel margin"
-    _refuse(what, params, points[k], side, got, want, remedy)
+    _refuse(what, params, points[k], side=side, value=got, allowed=want, remedy=remedy)
 
 
 def _ask_forced(params: Any, starts: Any, side: int, seen: Any, usable: Any, size: Any) -> None:
@@ -214,18 +222,18 @@ def _ask_boxes(ends: Any, domain: Domain, starts: Any, side: int, seen: Any, usa
     after, to, code = seen
     params, upper = ends
     points = columns(starts, starts.shape[1])
-    found = BoxImages(params, upper, side, points, points)
+    boxes = BoxImages(params, upper, side, points, points)
     inside = np.zeros(code.size, dtype=bool)
     for slot in range(2):
-        lo, hi = (np.stack(corner, axis=1) for corner in found.slots[slot])
+        lo, hi = (np.stack(corner, axis=1) for corner in boxes.slots[slot])
         held = ((lo - SAME * size <= after) & (after <= hi + SAME * size)).all(axis=1)
-        inside |= held & (found.to[2 * slot] == to) & ((slot == 0) | (found.count == BOTH))
+        inside |= held & (boxes.to[2 * slot] == to) & ((slot == 0) | (boxes.count == BOTH))
     undefined = np.isnan(after).any(axis=1)
-    proved = found.count != NOTHING
-    _ask_exits(params, domain, starts, side, code, found, proved & ~usable & ~undefined)
+    proved = boxes.count != NOTHING
+    _ask_exits(params, domain, starts, side=side, code=code, boxes=boxes, gone=proved & ~usable & ~undefined)
     for k in np.flatnonzero(proved & ((usable & ~inside) | undefined))[:1]:
-        box = tuple((float(lo[k]), float(hi[k])) for lo, hi in zip(*found.slots[0], strict=True))
-        got = (*box, int(found.to[0, k]))
+        box = tuple((float(lo[k]), float(hi[k])) for lo, hi in zip(*boxes.slots[0], strict=True))
+        got = (*box, int(boxes.to[0, k]))
         _refuse(
             "the proved box of the kernel image_box",
             params,
@@ -237,12 +245,12 @@ def _ask_boxes(ends: Any, domain: Domain, starts: Any, side: int, seen: Any, usa
 
 
 def _ask_exits(
-    params: Any, domain: Domain, starts: Any, side: int, code: Any, found: BoxImages, gone: NDArray[np.bool_]
+    params: Any, domain: Domain, starts: Any, side: int, code: Any, boxes: BoxImages, gone: NDArray[np.bool_]
 ) -> None:
     """Refuse boxes in the domain, of points that have left the map: only `image` knows of that exit."""
-    lo, hi = (np.stack(corner, axis=1) for corner in found.slots[0])
+    lo, hi = (np.stack(corner, axis=1) for corner in boxes.slots[0])
     for k in np.flatnonzero(gone):
-        to = int(found.to[0, k]) % domain.sides
+        to = int(boxes.to[0, k]) % domain.sides
         if ((domain.lo[to] <= lo[k]) & (hi[k] <= domain.hi[to])).all():
             x = ", ".join(f"{v:.12g}" for v in starts[k])
             raise MapError(

@@ -43,21 +43,21 @@ LIMITS = (
 
 def _free_bytes() -> int | None:
     """Memory that this process may still take; None where the system does not say."""
-    found = []
+    free_bytes = []
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-        found += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+        free_bytes += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
     except OSError:
         if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
-            found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+            free_bytes.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     for limit, used in LIMITS:
         try:
-            found.append(
+            free_bytes.append(
                 int(Path(limit).read_text(encoding="ascii")) - int(Path(used).read_text(encoding="ascii"))
             )
         except (OSError, ValueError):  # no such limit, or "max"
             continue
-    return min(found, default=None)
+    return min(free_bytes, default=None)
 
 
 def require_memory(grid: Grid, method: str) -> None:

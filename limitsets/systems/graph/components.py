@@ -138,19 +138,19 @@ def fill_components(
 def _reach(r: Ranges, size: Any, order: Any, marks: Any) -> None:
     i = 0
     for c in range(size.size):
-        j, found = i + size[c], marks[order[i]]
+        j, reached_marks = i + size[c], marks[order[i]]
         for k in range(i, j):
             cell = order[k]
-            found |= marks[cell]
+            reached_marks |= marks[cell]
             begin_box, end_box = boxes_of(r, cell)
             for box in range(begin_box, end_box):
                 run = np.int64(r.box[box, RUN])
                 for row in range(box_rows(r, box)):
                     begin = row_start(r, box, row)
                     for target in range(begin, begin + run):
-                        found |= marks[target]
+                        reached_marks |= marks[target]
         for k in range(i, j):
-            marks[order[k]] = found
+            marks[order[k]] = reached_marks
         i = j
 
 
@@ -438,8 +438,8 @@ def attracting_of(r: Ranges, components: Components, sets: Sequence[NDArray[np.i
     """Whether each recurrent component is attracting: no edge and no way out leads from it; of any number of them."""
     if segment_tree.is_wide(r):
         return np.array([not segment_tree.leaves(r, components.label, cells) for cells in sets], dtype=bool)
-    found = np.zeros(len(sets), dtype=np.bool_)
+    attracting = np.zeros(len(sets), dtype=np.bool_)
     if sets:
         ends = np.cumsum([cells.size for cells in sets])
-        _attracting(r, components.label, np.concatenate(sets), ends, found)
-    return found
+        _attracting(r, components.label, np.concatenate(sets), ends, attracting)
+    return attracting

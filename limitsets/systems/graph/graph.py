@@ -155,10 +155,10 @@ class TransitionGraph(Tabled):
         parts = self.components()
         ends = np.concatenate([[0], np.cumsum(parts.size)])
         chosen = np.flatnonzero(parts.recurrent)
-        found = [
+        components = [
             parts.order[a:b] for a, b in zip(ends[chosen].tolist(), ends[chosen + 1].tolist(), strict=True)
         ]
-        return [np.sort(cells) if cells.size > 1 else cells for cells in found]
+        return [np.sort(cells) if cells.size > 1 else cells for cells in components]
 
     def recurrent_components(self) -> list[NDArray[np.int32]]:
         """Cells of each recurrent component, ascending in topological number: attracting ones come early."""
@@ -229,8 +229,8 @@ def morse_graph(graph: TransitionGraph) -> nx.DiGraph[int]:
     import networkx as nx
 
     sets = graph.recurrent_components()
-    found = graph.condensation()
-    proper = found.order & ~np.eye(len(sets), dtype=bool)
+    condensation = graph.condensation()
+    proper = condensation.order & ~np.eye(len(sets), dtype=bool)
     between = (proper.astype(np.float32) @ proper.astype(np.float32)) > 0
     morse: nx.DiGraph[int] = nx.DiGraph()
     names = list(graph.exits)
@@ -240,9 +240,9 @@ def morse_graph(graph: TransitionGraph) -> nx.DiGraph[int]:
             k,
             cells=len(cells),
             members=members,
-            attracting=bool(found.attracting[k]),
+            attracting=bool(condensation.attracting[k]),
             extents=members.extents(),
-            exits=[name for name, out in zip(names, found.exits[k], strict=True) if out],
+            exits=[name for name, out in zip(names, condensation.exits[k], strict=True) if out],
         )
     morse.add_edges_from((int(i), int(j)) for i, j in np.argwhere(proper & ~between))
     return morse

@@ -197,11 +197,11 @@ def count_edges(r: Ranges) -> int:
 
 
 def _cells_of(r: Ranges, boxes: slice) -> set[int]:
-    found: set[int] = set()
+    cells: set[int] = set()
     for start, run, rows, planes, side in r.box[boxes].tolist():
         stride, plane = int(r.row_stride[side]), int(r.plane_stride[side])
         for p in range(planes):
             for row in range(rows):
                 begin = start + row * stride + p * plane
-                found.update(range(begin, begin + run))
-    return found
+                cells.update(range(begin, begin + run))
+    return cells

@@ -170,17 +170,17 @@ def strong(r: Ranges) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.
 def any_bits(tree: Any, leaf: int, begin: Any, end: Any) -> Any:
     """Bits of all cells from `begin` up to before `end`."""
     left, right = leaf + begin, leaf + end
-    found = tree[0]
+    bits = tree[0]
     while left < right:
         if left & 1:
-            found |= tree[left]
+            bits |= tree[left]
             left += 1
         if right & 1:
             right -= 1
-            found |= tree[right]
+            bits |= tree[right]
         left >>= 1
         right >>= 1
-    return found
+    return bits
 
 
 @kernel(entry=True, counting=False)
@@ -189,19 +189,19 @@ def _reach(r: Ranges, leaf: int, label: Any, order: Any, tree: Any) -> None:
         tree[node] = tree[2 * node] | tree[2 * node + 1]
     i = 0
     while i < order.size:
-        c, j, found = label[order[i]], i, tree[leaf + order[i]]
+        c, j, bits = label[order[i]], i, tree[leaf + order[i]]
         while j < order.size and label[order[j]] == c:
             cell = order[j]
-            found |= tree[leaf + cell]
+            bits |= tree[leaf + cell]
             begin_box, end_box = boxes_of(r, cell)
             for box in range(begin_box, end_box):
                 begin = np.int64(r.box[box, START])
-                found |= any_bits(tree, leaf, begin, begin + np.int64(r.box[box, RUN]))
+                bits |= any_bits(tree, leaf, begin, begin + np.int64(r.box[box, RUN]))
             j += 1
         for k in range(i, j):
             at: Any = leaf + np.int64(order[k])
-            while at > 0 and (tree[at] | found) != tree[at]:
-                tree[at] |= found
+            while at > 0 and (tree[at] | bits) != tree[at]:
+                tree[at] |= bits
                 at >>= 1
         i = j
 

@@ -42,10 +42,10 @@ class Target(NamedTuple):
             np.concatenate(axes),
             begin.reshape(shape),
             grid.shape,
-            np.array(rate).reshape(shape),
-            below,
-            above,
-            sink,
+            per_length=np.array(rate).reshape(shape),
+            sink_below=below,
+            sink_above=above,
+            sink_of_code=sink,
         )
 
 
@@ -162,9 +162,9 @@ def placed(
 
 
 def _per_cell(cell: NDArray[np.int64], exits: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    found = np.zeros(int(cell.max(initial=-1)) + 1, np.uint8)
-    np.bitwise_or.at(found, cell, exits)
-    return found
+    exits_of_cell = np.zeros(int(cell.max(initial=-1)) + 1, np.uint8)
+    np.bitwise_or.at(exits_of_cell, cell, exits)
+    return exits_of_cell
 
 
 def leaving(target: Target, cell: NDArray[np.int64], code: NDArray[np.int64], dimension: int) -> TargetBoxes:

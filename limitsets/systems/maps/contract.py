@@ -212,12 +212,12 @@ def register(
         cls.__name__,
         dimension,
         tuple(branches),
-        {**(EXITS_OF_A_MAP if exits is None else exits), "undefined": codes.UNDEFINED},
-        image_on is not None,
-        boxes,
-        margin is not None,
-        displacement is not None,
-        image_box is not None,
+        exits={**(EXITS_OF_A_MAP if exits is None else exits), "undefined": codes.UNDEFINED},
+        has_image_on=image_on is not None,
+        has_image_box=boxes,
+        has_margin=margin is not None,
+        has_displacement=displacement is not None,
+        own_box=image_box is not None,
     )
     # Compiled code knows classes of values by name and fields alone: it would take the second such class for the first.
     alike = sum((kind.name, each._fields) == (cls.__name__, cls._fields) for each, kind in _KINDS.items())

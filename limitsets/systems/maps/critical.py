@@ -132,14 +132,14 @@ def hidden(value_of: Callable[[Array], Array], x: Array) -> Array:
     a, b, sign = _dips(value_of(x), x)
     if sign.size == 0:
         return np.empty(0)
-    found = []
+    points = []
     for _ in range(NARROWINGS):
         c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
         at_c, at_d = value_of(c), value_of(d)
-        found += [at[sign_code(value) == (sign < 0)] for at, value in ((c, at_c), (d, at_d))]
+        points += [at[sign_code(value) == (sign < 0)] for at, value in ((c, at_c), (d, at_d))]
         lower = sign * at_c < sign * at_d
         a, b = np.where(lower, a, c), np.where(lower, d, b)
-    return np.concatenate(found)
+    return np.concatenate(points)
 
 
 # ----------------------------------------------------------------
@@ -227,12 +227,12 @@ def _margins_of(params: Any, side: int) -> Callable[[Array], Array]:
     require_sides(params, side, side)
     dimension = kind_of(params).dimension
 
-    def found(x: Array) -> Array:
+    def margins_at(x: Array) -> Array:
         out = np.empty(len(x))
         _margins(params, side, columns(x, dimension), out)
         return out
 
-    return found
+    return margins_at
 
 
 def _sampled(domain: Sides, side: int, count: int) -> Array:
@@ -249,8 +249,8 @@ def _sampled(domain: Sides, side: int, count: int) -> Array:
 def _code_of(params: Any, side: int) -> Callable[[Array], Codes]:
     """Branch in force at x, a negative number where there is none."""
     if kind_of(params).has_margin:
-        found = _margins_of(params, side)
-        return lambda x: sign_code(found(x))
+        margins_at = _margins_of(params, side)
+        return lambda x: sign_code(margins_at(x))
     return lambda x: images(params, x, side).code
 
 
@@ -316,13 +316,13 @@ def critical_points(
     """
     require_domain(params, domain, samples)
     names = kind_of(params).branches
-    found: dict[int, tuple[CriticalPoint, ...]] = {}
+    points: dict[int, tuple[CriticalPoint, ...]] = {}
     for side in range(domain.sides):
         x, code = branches_of_side(params, domain, side, samples)
         changes = np.flatnonzero((code[1:] != code[:-1]) & (code[1:] >= 0) & (code[:-1] >= 0))
         rows = zip(x[changes + 1].tolist(), code[changes].tolist(), code[changes + 1].tolist(), strict=True)
-        found[side] = tuple(
+        points[side] = tuple(
             CriticalPoint(at if abs(at) >= TINY else 0.0, f"{names[before]}->{names[after]}", before, after)
             for at, before, after in rows
         )
-    return found
+    return points

@@ -80,8 +80,8 @@ def _decision(form: Decision, params: Any, x: Any) -> Any:
 
 
 def _on_branch(form: OnBranch, params: Any, x: Any) -> Any:
-    found = forced(params, x, form.side, form.branch)
-    return found[0], found[1]
+    forced_image = forced(params, x, form.side, form.branch)
+    return forced_image[0], forced_image[1]
 
 
 def _by_image(params: Any, x: Any, side: int, branch: int) -> Any:
@@ -158,12 +158,12 @@ def _columns(x: Any, k: int, form: Any, params: Any, box: Any) -> Any:
 @proof_kernel
 def _component(form: Any, params: Any, x: Any, columns: Any, i: int) -> Interval:
     """Enclose coordinate i of a formula on a box on which values and derivatives are known."""
-    found = columns[0][i].value
+    hull = columns[0][i].value
     least, most = (
         _at(form, params, _corner(x, columns, i, False)),
         _at(form, params, _corner(x, columns, i, True)),
     )
-    lo, hi = max(found.lo, least[i].value.lo), min(found.hi, most[i].value.hi)
+    lo, hi = max(hull.lo, least[i].value.lo), min(hull.hi, most[i].value.hi)
     open_sign = False
     for j in range(len(columns)):
         slope = columns[j][i].slope
@@ -189,12 +189,12 @@ def _range(x: Any, k: int, form: Any, params: Any, box: Any, columns: Any) -> In
 @proof_kernel
 def _slot(form: Any, params: Any, x: Any, branch: int) -> Any:
     """One image as the contract has it, and whether it is finite."""
-    found = _range(x, form, params, x, _columns(x, form, params, x))
+    hull = _range(x, form, params, x, _columns(x, form, params, x))
     _, to = _formula(form, params, state_of(x))
     finite = True
-    for k in range(len(found)):
-        finite &= (found[k].lo <= found[k].hi) & (found[k].hi - found[k].lo < math.inf)
-    return (state_of(_lows(found)), state_of(_highs(found)), to, branch), finite
+    for k in range(len(hull)):
+        finite &= (hull[k].lo <= hull[k].hi) & (hull[k].hi - hull[k].lo < math.inf)
+    return (state_of(_lows(hull)), state_of(_highs(hull)), to, branch), finite
 
 
 @proof_kernel
@@ -275,10 +275,10 @@ def _enclose_branch(
         sign = _sign(params, x, side)
         form = _form(params, side, branch)
         columns = _columns(x, form, params, x)
-        found = _range(x, form, params, x, columns)
+        hull = _range(x, form, params, x, columns)
         _, to = _formula(form, params, state_of(x))
-        for i in range(len(found)):
-            image[0, k, i], image[1, k, i] = found[i].lo, found[i].hi
+        for i in range(len(hull)):
+            image[0, k, i], image[1, k, i] = hull[i].lo, hull[i].hi
             for j in range(len(columns)):
                 slope[0, k, i, j], slope[1, k, i, j] = columns[j][i].slope.lo, columns[j][i].slope.hi
         mine = (sign.lo > 0.0) if branch == 1 else (sign.hi <= 0.0)

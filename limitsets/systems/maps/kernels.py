@@ -166,12 +166,12 @@ def entries_of(x: Any) -> Any:
     """Undo `state_of`."""
 
 
-def _as_given(found: Any, params: Any, x: Any, side: int, branch: int) -> Any:
-    return found
+def _as_given(image_on_branch: Any, params: Any, x: Any, side: int, branch: int) -> Any:
+    return image_on_branch
 
 
 @generic(default=_as_given)
-def _with_slope(found: Any, params: Any, x: Any, side: int, branch: int) -> Any:
+def _with_slope(image_on_branch: Any, params: Any, x: Any, side: int, branch: int) -> Any:
     """Return ``(x', side', slope)``, whether the slope is there or not."""
 
 
@@ -203,10 +203,10 @@ def _row(y: Any, i: int, columns: Any) -> Any:
     return state_of(_entry(columns, i))
 
 
-def _with_derivative(found: Any, params: Any, x: Any, side: int, branch: int) -> Any:
+def _with_derivative(image_on_branch: Any, params: Any, x: Any, side: int, branch: int) -> Any:
     start = entries_of(x)
     columns = _column(start, params, start, side, branch)
-    return found[0], found[1], state_of(_row(columns[0], columns))
+    return image_on_branch[0], image_on_branch[1], state_of(_row(columns[0], columns))
 
 
 state_of.on(1, _first)

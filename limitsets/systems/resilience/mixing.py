@@ -42,9 +42,9 @@ from limitsets.systems.resilience.orbits import (
     Colours,
     best,
     colours,
+    full_caption,
     labelled_lattice,
     leaves_by_the_border,
-    told,
 )
 from limitsets.systems.sets import Attractor
 
@@ -163,8 +163,8 @@ def entropy_of(mass: Floats) -> Floats:
     """Entropy of each column."""
     with np.errstate(divide="ignore", invalid="ignore"):
         p = mass / mass.sum(axis=0)
-        found: Floats = np.where(p > 0.0, -p * np.log(p), 0.0).sum(axis=0)
-    return found
+        entropy: Floats = np.where(p > 0.0, -p * np.log(p), 0.0).sum(axis=0)
+    return entropy
 
 
 def least_entropy(mass: Floats, open_to: NDArray[np.bool_], rest: Floats) -> Floats:
@@ -241,7 +241,7 @@ class BasinEntropy(Tabled):
             "cells along a box",
             Column("undecided share", show=".4f"),
         )
-        caption = told("Basin entropy, natural logarithm", self.undecided, self.cut)
+        caption = full_caption("Basin entropy, natural logarithm", self.undecided, self.cut)
         return (Table(columns, [row], caption, how_found(self.how)),)
 
     def to_json(self) -> dict[str, Any]:
@@ -302,7 +302,7 @@ def basin_entropy(
     >>> found.how, found.lo <= found.value <= found.hi, round(found.value * 125, 2)  # ln 2 in one of 125 boxes
     ('proved', True, 0.69)
     """
-    return _measured(_of_all, graph, found, box, starts, steps, seed)
+    return _measured(_of_all, graph, found, box=box, starts=starts, steps=steps, seed=seed)
 
 
 @arguments_checked
@@ -346,7 +346,7 @@ def boundary_basin_entropy(
     >>> found.boxes, round(found.value, 2)  # 0 lies in the middle of a box: ln 2
     (1, 0.69)
     """
-    return _measured(_of_boundary, graph, found, box, starts, steps, seed)
+    return _measured(_of_boundary, graph, found, box=box, starts=starts, steps=steps, seed=seed)
 
 
 def _of_all(each: Boxes) -> tuple[Floats, float, float, float]:
@@ -375,7 +375,7 @@ def _of_boundary(each: Boxes) -> tuple[Floats, float, float, float]:
 def _measured(
     measure: Callable[[Boxes], tuple[Floats, float, float, float]],
     graph: TransitionGraph,
-    found: tuple[Attractor, ...],
+    attractors: tuple[Attractor, ...],
     box: int,
     starts: int | None,
     steps: int,
@@ -384,7 +384,7 @@ def _measured(
     most = int(graph.grid.shape.min())
     if not 2 <= box <= most:
         raise AnswerError("the cells along a box", box, f"an integer from 2 to {most}", "pass box=20")
-    parted, followed = colours(graph, found), None
+    parted, followed = colours(graph, attractors), None
     if starts is None:
         each = of_cells(parted, box)
         weight, value, lo, hi = measure(each)
@@ -406,7 +406,9 @@ def _measured(
     kept, boxes = best(float(np.clip(value, lo, hi)), each.undecided), int((weight > 0.0).sum())
     how = parted.how if starts is None else "sampled"
     lo, hi = max(lo - ROUNDING, 0.0), hi + ROUNDING
-    return BasinEntropy(kept, lo, hi, how, boxes, box, each.undecided, followed, cut)
+    return BasinEntropy(
+        kept, lo, hi, how=how, boxes=boxes, box=box, undecided=each.undecided, starts=followed, cut=cut
+    )
 
 
 def _mean(values: Floats, weights: Floats) -> float:

@@ -102,16 +102,16 @@ class Colours:
         return CellSet(self.grid, mask)
 
 
-def colours(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Colours:
+def colours(graph: TransitionGraph, attractors: tuple[Attractor, ...]) -> Colours:
     """Find the basins of a graph; AnswerError for attractors of another one."""
-    shares = basins(graph, found)
+    shares = basins(graph, attractors)
     undecided = np.flatnonzero(shares.labels == codes.UNDECIDED)
     blocks = np.full(graph.n_cells, codes.UNDECIDED, dtype=np.int32)
-    for number, attractor in enumerate(found):
+    for number, attractor in enumerate(attractors):
         blocks[attractor.cells.mask] = number
     staying = graph.recurrent_set().mask & (blocks == codes.UNDECIDED)
     leaving = [(graph.ranges.exits >> number & 1).astype(bool) for number in range(len(graph.exits))]
-    ends = [*(attractor.cells.mask for attractor in found), *leaving, staying]
+    ends = [*(attractor.cells.mask for attractor in attractors), *leaving, staying]
     possible = np.zeros((len(ends), undecided.size), dtype=bool)
     for begin in range(0, len(ends) if undecided.size else 0, BITS):
         marks = np.zeros(graph.n_cells, dtype=np.uint64)
@@ -120,7 +120,7 @@ def colours(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Colours:
         seen = reach(graph.ranges, graph.components(), marks)[undecided]
         for bit in range(min(BITS, len(ends) - begin)):
             possible[begin + bit] = seen >> np.uint64(bit) & np.uint64(1)
-    labels = np.array([*range(len(found)), *graph.exits.values()], dtype=np.int64)
+    labels = np.array([*range(len(attractors)), *graph.exits.values()], dtype=np.int64)
     return Colours(graph, shares, blocks, labels, undecided, possible)
 
 
@@ -129,7 +129,7 @@ def best(value: float, undecided: float) -> float:
     return value if undecided <= MOST_UNDECIDED else np.nan
 
 
-def told(caption: str, undecided: float, cut: bool = False) -> str:
+def full_caption(caption: str, undecided: float, cut: bool = False) -> str:
     """Write what is beside a number into the caption of its table: what is left out, and where orbits were cut off."""
     words = [caption]
     if undecided > MOST_UNDECIDED:

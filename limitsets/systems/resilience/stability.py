@@ -30,9 +30,9 @@ from limitsets.systems.resilience.orbits import (
     best,
     colours,
     follow,
+    full_caption,
     leaves_by_the_border,
     random_starts,
-    told,
 )
 from limitsets.systems.sets import Attractor
 from limitsets.systems.sets.basin import longest_stays
@@ -119,7 +119,7 @@ class ConvergenceTimes(Tabled):
             Table(
                 ("to", "starts", *means, *proved),
                 rows,
-                told("Convergence times", self.undecided),
+                full_caption("Convergence times", self.undecided),
                 how_found(self.how),
             ),
         )
@@ -283,7 +283,11 @@ class BasinStability(Tabled):
             ("undecided", self.undecided, None),
         ]
         columns = ("basin", Column("share", show=".6f"), Column("bracket", show=".6f", ends=True))
-        return (Table(columns, rows, told("Basin stability", self.undecided, self.cut), how_found(self.how)),)
+        return (
+            Table(
+                columns, rows, full_caption("Basin stability", self.undecided, self.cut), how_found(self.how)
+            ),
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Give the shares as JSON takes them."""
@@ -344,7 +348,16 @@ def basin_stability(
         shares, undecided, how = *_sampled(parted, starts, steps, seed), "sampled"
     exits = dict(zip(graph.exits, shares[len(found) :], strict=True))
     cut = starts is None and leaves_by_the_border(graph)
-    return BasinStability(how, tuple(shares[: len(found)]), exits, undecided, starts, cut, inner, outer)
+    return BasinStability(
+        how,
+        tuple(shares[: len(found)]),
+        exits,
+        undecided=undecided,
+        starts=starts,
+        cut=cut,
+        inner=inner,
+        outer=outer,
+    )
 
 
 def _counted(
@@ -536,7 +549,9 @@ def minimal_fatal_shock(
         width = CELLS * float(np.sqrt(((hi - lo) ** 2).sum(axis=1)).max())
         least, far = max(least - width, 0.0), far + width
     name = parted.names[int(np.flatnonzero(parted.codes == into)[0])]
-    return FatalShock(least, far, parted.how, state, side, parted.names[own], where, name, cut)
+    return FatalShock(
+        least, far, parted.how, x=state, side=side, basin=parted.names[own], shock=where, into=name, cut=cut
+    )
 
 
 def _place(parted: Colours, x: ArrayLike, side: int) -> tuple[Floats, int]:
@@ -580,7 +595,17 @@ def _sampled_pushes(
             push, least, into = x[nearest] - state, float(distance[nearest]), int(label[nearest])
     names = dict(zip(parted.codes.tolist(), parted.names, strict=True))
     goes = None if into is None else names[into]
-    return FatalShock(0.0, least, "sampled", state, side, names[int(own)], push, goes, into is None)
+    return FatalShock(
+        0.0,
+        least,
+        "sampled",
+        x=state,
+        side=side,
+        basin=names[int(own)],
+        shock=push,
+        into=goes,
+        cut=into is None,
+    )
 
 
 def _border(parted: Colours, state: Floats, side: int) -> list[tuple[float, float, Floats, int]]:
@@ -589,12 +614,12 @@ def _border(parted: Colours, state: Floats, side: int) -> list[tuple[float, floa
     Below its lower border a state has left for certain only at the anchor, if there is one (a_i of the throw).
     """
     domain, ways = parted.grid.domain, list(parted.graph.exits.values())
-    target, found = Target.of(parted.grid, parted.graph.exits), []
+    target, shocks = Target.of(parted.grid, parted.graph.exits), []
     for axis, x in enumerate(state.tolist()):
         lo, hi = float(domain.lo[side, axis]), float(domain.hi[side, axis])
         foot = lo if domain.anchor is None else float(domain.anchor[side])
         for near, far, sink in ((lo, foot, target.sink_below), (hi, hi, target.sink_above)):
             push = np.zeros(state.size)
             push[axis] = far - x
-            found.append((abs(near - x), abs(far - x), push, ways[sink]))
-    return found
+            shocks.append((abs(near - x), abs(far - x), push, ways[sink]))
+    return shocks

@@ -36,10 +36,10 @@ from limitsets.systems.resilience.orbits import (
     best,
     colours,
     follow,
+    full_caption,
     labelled_starts,
     leaves_by_the_border,
     random_cells,
-    told,
 )
 from limitsets.systems.sets import Attractor
 
@@ -117,7 +117,7 @@ class UncertaintyExponent(Tabled):
             caption = (
                 f"Uncertainty exponent: none, {self.fitted.sum()} distances to fit; more starts=... give more"
             )
-        caption = told(caption, self.undecided, self.cut)
+        caption = full_caption(caption, self.undecided, self.cut)
         columns = (Column("apart", "cells", ".6g"), Column("uncertain share", show=".6f"), "fitted")
         return (Table(columns, rows, caption, how_found(self.how)),)
 
@@ -206,12 +206,12 @@ def uncertainty_exponent(
         best(slope, undecided),
         best(error, undecided),
         apart,
-        shares,
-        fitted,
-        graph.grid.dimension,
-        undecided,
-        starts,
-        cut,
+        shares=shares,
+        fitted=fitted,
+        dimension=graph.grid.dimension,
+        undecided=undecided,
+        starts=starts,
+        cut=cut,
     )
 
 
@@ -228,7 +228,7 @@ def _sampled(
     if starts < count * FEWEST_UNCERTAIN:
         fewest = f"an integer from {count * FEWEST_UNCERTAIN}, for {count} distances"
         raise AnswerError("the number of starts", starts, fewest, "pass starts=100000")
-    apart, found, labels = np.geomspace(farthest, NEAREST, count), [], []
+    apart, rows, labels = np.geomspace(farthest, NEAREST, count), [], []
     for distance in apart:
         cell, (x, side) = random_cells(grid, starts // count, rng)
         axis, row = rng.integers(grid.dimension, size=side.size), np.arange(side.size)
@@ -250,11 +250,11 @@ def _sampled(
             np.bincount(axis[some], minlength=grid.dimension) for some in (known, known & differs)
         )
         number = int(uncertain.sum())
-        found.append((number / max(int(of.sum()), 1), float((uncertain / np.maximum(of, 1)).max()), number))
+        rows.append((number / max(int(of.sum()), 1), float((uncertain / np.maximum(of, 1)).max()), number))
         if number < FEWEST_UNCERTAIN:
             break  # nearer ones are fewer still
-    shares, largest, numbers = np.array(found[::-1], dtype=np.float64).T
-    return apart[: len(found)][::-1], shares, largest, numbers, np.concatenate(labels)
+    shares, largest, numbers = np.array(rows[::-1], dtype=np.float64).T
+    return apart[: len(rows)][::-1], shares, largest, numbers, np.concatenate(labels)
 
 
 def _uncertain(grid: Grid, label: NDArray[np.int64], apart: int) -> tuple[float, float]:

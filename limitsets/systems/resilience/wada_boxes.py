@@ -31,11 +31,11 @@ from limitsets.systems.resilience.orbits import (
     Colours,
     colours,
     follow,
+    full_caption,
     labelled_starts,
     leaves_by_the_border,
     random_cells,
     starts_in,
-    told,
 )
 from limitsets.systems.sets import Attractor
 
@@ -89,7 +89,7 @@ class Wada(Tabled):
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = list(zip(self.refinements, self.shares, strict=False))
         columns = ("starts per cell and axis", Column("share of boxes that meet all basins", show=".6f"))
-        caption = told(f"Wada: {self.boxes} of {self.of} boxes", self.undecided, self.cut)
+        caption = full_caption(f"Wada: {self.boxes} of {self.of} boxes", self.undecided, self.cut)
         return (Table(columns, rows, caption, f"{self.how}, not proved"),)
 
     def to_json(self) -> dict[str, Any]:
@@ -178,20 +178,29 @@ def wada(
             _see(graph.grid, middle, seen, here)
         else:
             left = np.flatnonzero(~here[:, met].all(axis=1))
-            _look(parted, middle[left], left, parts, steps, rng, here, returning=starts is not None)
+            _look(
+                parted,
+                middle[left],
+                left,
+                parts=parts,
+                steps=steps,
+                rng=rng,
+                here=here,
+                returning=starts is not None,
+            )
         known = of and met.size > 2 and undecided <= MOST_UNDECIDED
         shares.append(float(here[:, met].all(axis=1).mean()) if known else np.nan)
     names = tuple(parted.names[k] for k in met)
     cut = starts is None and leaves_by_the_border(graph)
-    return Wada(tuple(shares), names, REFINEMENTS, middle.size, of, undecided, cut)
+    return Wada(tuple(shares), names, REFINEMENTS, boxes=middle.size, of=of, undecided=undecided, cut=cut)
 
 
 def _numbers(parted: Colours, label: NDArray[np.int64]) -> NDArray[np.int64]:
     """Index of each label among the basins, -1 for undecided."""
     order = np.argsort(parted.codes)
     at = np.searchsorted(parted.codes[order], label).clip(max=order.size - 1)
-    found: NDArray[np.int64] = np.where(parted.codes[order][at] == label, order[at], -1)
-    return found
+    numbers: NDArray[np.int64] = np.where(parted.codes[order][at] == label, order[at], -1)
+    return numbers
 
 
 def _around(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

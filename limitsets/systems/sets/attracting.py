@@ -189,7 +189,16 @@ def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor
     order, jogs = _visits(sides)
     flips = float((np.diff(sides) != 0).mean()) if sides.size > 1 else 0.0
     return Attractor(
-        cells, extents, order, jogs, flips, exponent, max(sides.size - 1, 0), inside, path.stopped, graph.how
+        cells,
+        extents,
+        order,
+        jogs_per_visit=jogs,
+        flips_per_throw=flips,
+        lyapunov=exponent,
+        throws=max(sides.size - 1, 0),
+        in_cells=inside,
+        stopped=path.stopped,
+        how=graph.how,
     )
 
 

@@ -69,8 +69,8 @@ def _stays(graph: TransitionGraph) -> Integers:
         count = np.count_nonzero(component >= 0)
         if not count or count * parts**graph.grid.dimension > MOST_CELLS:
             break
-        found = _refined(graph, component, parts)
-        stays += np.where(found < ENDLESS, found, 0)
+        refined = _refined(graph, component, parts)
+        stays += np.where(refined < ENDLESS, refined, 0)
         left &= stays == 0
     return stays
 
@@ -204,36 +204,36 @@ def _refined(graph: TransitionGraph, component: Integers, parts: int) -> Integer
 
 def _axes(grid: Grid, here: Integers, side: int, parts: int) -> list[_Axis]:
     """Cut the axes of a side; in one dimension, where an axis is as long as the side, but for the cells looked at."""
-    found = []
+    axes = []
     for edges in grid.edges[side]:
         cells = here - grid.offset[side] if grid.dimension == 1 else np.arange(edges.size - 1)
         ends = edges[cells, None] + np.arange(parts + 1) / parts * (edges[cells + 1] - edges[cells])[:, None]
         ends[:, -1] = edges[cells + 1]
-        found.append(_Axis(ends[:, :-1].ravel(), ends[:, 1:].ravel(), cells))
-    return found
+        axes.append(_Axis(ends[:, :-1].ravel(), ends[:, 1:].ravel(), cells))
+    return axes
 
 
 def _hulls(graph: TransitionGraph, lo: Any, hi: Any, side: int) -> tuple[list[Any], Any]:
     """Boxes around the images of the corners of fine cells, their sides, where they say; whether all corners agree."""
-    found = [
+    corner_images = [
         images(graph.map, np.stack(corner, axis=1), side) for corner in product(*zip(lo, hi, strict=True))
     ]
-    x, first = [there.x.reshape(-1, len(lo)) for there in found], found[0]
+    x, first = [there.x.reshape(-1, len(lo)) for there in corner_images], corner_images[0]
     least, most = np.minimum.reduce(x), np.maximum.reduce(x)
     clear = (first.code >= 0) & (np.isfinite(least) & np.isfinite(most)).all(axis=1)
-    for there in found[1:]:
+    for there in corner_images[1:]:
         clear &= (there.code == first.code) & (there.side == first.side)
     return [(least, most, first.side, clear)], clear
 
 
 def _enclosed(graph: TransitionGraph, lo: Any, hi: Any, side: int) -> tuple[list[Any], Any]:
     """Proved boxes of the images of fine cells, one or two each, their sides, where they are; whether one is proved."""
-    found = BoxImages(graph.map, graph.map if graph.upper is None else graph.upper, side, lo, hi)
+    enclosures = BoxImages(graph.map, graph.map if graph.upper is None else graph.upper, side, lo, hi)
     boxes = [
-        (*(np.stack(corner, axis=1) for corner in found.slots[slot]), found.to[2 * slot], given)
-        for slot, given in enumerate((found.count != NOTHING, found.count == BOTH))
+        (*(np.stack(corner, axis=1) for corner in enclosures.slots[slot]), enclosures.to[2 * slot], given)
+        for slot, given in enumerate((enclosures.count != NOTHING, enclosures.count == BOTH))
     ]
-    return boxes, found.count != NOTHING
+    return boxes, enclosures.count != NOTHING
 
 
 def _met(axes: list[_Axis], lo: Floats, hi: Floats, some: Integers, pad: int) -> tuple[Any, Any]:
@@ -343,10 +343,10 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
         graph.grid,
         labels,
         tuple(by_code[k] for k in range(len(found))),
-        by_code[codes.UNDECIDED],
-        {name: by_code[code] for name, code in graph.exits.items()},
-        _advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
-        graph.how,
+        undecided_between=by_code[codes.UNDECIDED],
+        exits={name: by_code[code] for name, code in graph.exits.items()},
+        advice=_advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
+        how=graph.how,
     )
 
 

@@ -149,8 +149,8 @@ def _stepped(params: Any, x: Array, side: Ints) -> tuple[Array, Ints, Ints]:
     after, to, code = np.empty_like(flat), np.empty_like(sides), np.empty_like(sides)
     for s in np.unique(sides).tolist():
         mine = sides == s
-        found = images(params, flat[mine, 0] if flat.shape[1] == 1 else flat[mine], s)
-        after[mine], to[mine], code[mine] = found.x.reshape(-1, flat.shape[1]), found.side, found.code
+        image = images(params, flat[mine, 0] if flat.shape[1] == 1 else flat[mine], s)
+        after[mine], to[mine], code[mine] = image.x.reshape(-1, flat.shape[1]), image.side, image.code
     return after.reshape(x.shape), to.reshape(side.shape), code.reshape(side.shape)
 
 
@@ -210,10 +210,10 @@ def _beside(params: Any, slopes: Slopes, side: Ints, scale: float) -> Measured:
             if not (best > FARTHEST * scale).any():
                 break
             tried = x + BESIDE * scale * way
-            found = _stepped(params, tried, side)
-            better = (best > FARTHEST * scale) & (miss(*found) < best)
-            at[better], after[better], code[better] = tried[better], found[0][better], found[2][better]
-            best = np.where(better, miss(*found), best)
+            step = _stepped(params, tried, side)
+            better = (best > FARTHEST * scale) & (miss(*step) < best)
+            at[better], after[better], code[better] = tried[better], step[0][better], step[2][better]
+            best = np.where(better, miss(*step), best)
         slope = _slopes(slopes, at, side, code)
         return after - np.einsum("mpij,mpj->mpi", slope, at - x), slope
 
@@ -273,8 +273,8 @@ def _closed(params: Any, x: Array, side: Ints, scale: float, slopes: Slopes, *, 
         tried = x
         if way is not None:  # what `image` itself calls the points
             tried = np.roll(_stepped(params, x + 4.0 * EPS * scale * way, side)[0], 1, axis=1)
-        found, to, code = _stepped(params, tried, side)
-        miss = np.abs(found - _ahead(tried))
+        landing, to, code = _stepped(params, tried, side)
+        miss = np.abs(landing - _ahead(tried))
         good = ((code >= 0) & (to == _ahead(side)) & (miss <= rounding).all(axis=-1)).all(axis=1) & ~done
         points[good], branches[good], missed[good] = tried[good], code[good], miss[good]
         done |= good
@@ -328,12 +328,12 @@ def _least(one: Closed) -> float:
     return float(np.ravel(one.cycle.x)[0])
 
 
-def distinct(found: Iterable[Closed]) -> list[Cycle]:
+def distinct(orbits: Iterable[Closed]) -> list[Cycle]:
     """Each orbit once, with its smallest period, by period and least point."""
     kept: list[Closed] = []
     seamed: dict[int, list[Closed]] = {}
     widest = 0.0
-    for one in sorted(found, key=lambda each: (each.cycle.period, each.cycle.side[0], _least(each))):
+    for one in sorted(orbits, key=lambda each: (each.cycle.period, each.cycle.side[0], _least(each))):
         period = one.cycle.period
         if any(_same(one, one, d) for d in range(1, period) if period % d == 0):
             continue

@@ -164,12 +164,12 @@ def in_bottleneck(params: Any, union: Union, tolerance: float, scale: float) -> 
     """Tell whether a step moves some end, by no more than the tolerance, and no fixed point is that near."""
     for side, intervals in union.items():
         x = np.array([end.x for interval in intervals for end in interval])
-        found = images(params, x, side)
-        stays = (found.side == side) & (found.code >= 0)
+        image = images(params, x, side)
+        stays = (image.side == side) & (image.code >= 0)
         if not stays.any():
             continue
-        x, branch = x[stays], found.code[stays]
-        step = displacements(params, x, side) if kind_of(params).has_displacement else found.x[stays] - x
+        x, branch = x[stays], image.code[stays]
+        step = displacements(params, x, side) if kind_of(params).has_displacement else image.x[stays] - x
         slope = along(params, x, side, branch[:, None])[2]
         near = tolerance * np.maximum(scale, np.abs(x))
         if ((np.abs(step) <= near) & (np.abs(step) > np.abs(1.0 - slope) * near)).any():

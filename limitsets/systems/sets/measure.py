@@ -69,11 +69,11 @@ def _from_points(graph: TransitionGraph, cells: NDArray[np.int64], side: int) ->
     """Shares of the points of each cell."""
     grid = graph.grid
     samples = SAMPLES[grid.dimension]
-    found = images(graph.map, sample_points(grid, cells, side, samples), side)
-    target = np.full(found.code.size, -1)
+    image = images(graph.map, sample_points(grid, cells, side, samples), side)
+    target = np.full(image.code.size, -1)
     for after in range(grid.sides):
-        lands = (found.side == after) & (found.code >= 0)
-        target[lands] = grid.index(found.x[lands], after)
+        lands = (image.side == after) & (image.code >= 0)
+        target[lands] = grid.index(image.x[lands], after)
     source = np.repeat(cells, samples**grid.dimension)
     kept = target >= 0
     return UlamMatrix(source[kept], target[kept], np.full(int(kept.sum()), samples ** -float(grid.dimension)))
@@ -101,7 +101,7 @@ def _from_pieces(
     boxes = grid.boxes(cells, side)
     bottom, top = boxes[0][:, 0], boxes[1][:, 0]
     ends = [piece.lo for piece in pieces[1:]]
-    found = []
+    matrices = []
     for piece, end in zip(pieces, [*ends, np.inf], strict=True):
         # The last float of a piece and the first of the next are neighbours: the gap between them is nothing.
         piece_top = end if np.nextafter(piece.hi, np.inf) == end else piece.hi
@@ -119,8 +119,8 @@ def _from_pieces(
         weight = share[owner] * part
         kept = weight > 0.0
         number = grid.offset[after] + cell
-        found.append(UlamMatrix(cells[some][owner][kept], number[kept], weight[kept]))
-    return found
+        matrices.append(UlamMatrix(cells[some][owner][kept], number[kept], weight[kept]))
+    return matrices
 
 
 def ulam_matrix(graph: TransitionGraph, cells: NDArray[np.int64]) -> UlamMatrix:
@@ -268,14 +268,14 @@ def invariant_measures(
     if not cells.size:
         return ()
     chain, lost = _chain(graph, cells)
-    found = []
+    measures = []
     for members in sorted(_closed_classes(chain), key=lambda part: int(part[0])):
         part, residual, steps = _stationary(chain[members][:, members], tolerance, most_steps)
         weight = np.zeros(graph.n_cells)
         weight[cells[members]] = part
         share = float((part * lost[members]).sum())
-        found.append(Measure(CellSet.of(graph.grid, cells[members]), weight, residual, steps, share))
-    return tuple(found)
+        measures.append(Measure(CellSet.of(graph.grid, cells[members]), weight, residual, steps, share))
+    return tuple(measures)
 
 
 # ----------------------------------------------------------------
@@ -380,8 +380,8 @@ def _diagram(params: Any, extents: Extents, domain: Sides) -> tuple[list[tuple[i
         ends = np.array([[part[2], part[3]] for part in parts]).ravel()
         sides = np.repeat([nodes[part[0]].side for part in parts], 2)
         after, to, _ = along(params, ends, sides, np.repeat([[part[1]] for part in parts], 2, axis=0))
-        found, new = after.reshape(-1, 2), []
-        for (k, *_), (one, other), side in zip(parts, found.tolist(), to[::2].tolist(), strict=True):
+        intervals, new = after.reshape(-1, 2), []
+        for (k, *_), (one, other), side in zip(parts, intervals.tolist(), to[::2].tolist(), strict=True):
             target, fresh = number(side, min(one, other), max(one, other))
             edges.append((k, target))
             if fresh:

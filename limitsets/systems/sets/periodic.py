@@ -110,7 +110,9 @@ def alphabet_of(params: Any, extents: Extents, domain: Sides) -> Alphabet:
     table = table[table[:, 2] <= table[:, 3]]
     sides, branches = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64)
     torn = any(piece.above == "jump" for row in pieces.values() for piece in row)
-    return Alphabet(params, sides, branches, table[:, 2].copy(), table[:, 3].copy(), scale, torn)
+    return Alphabet(
+        params, sides, branches, lo=table[:, 2].copy(), hi=table[:, 3].copy(), scale=scale, torn=torn
+    )
 
 
 def letters_alone(alphabet: Alphabet) -> Words:
@@ -308,9 +310,9 @@ def cycles_of(
     require_period(up_to)
     alphabet = alphabet_of(params, extents, domain)
     words = letters_alone(alphabet)
-    found: list[Closed] = []
+    closed_orbits: list[Closed] = []
     while words.lo.size and words.lo.size <= most_words:
-        found += _closed(alphabet, words)
+        closed_orbits += _closed(alphabet, words)
         if words.length == up_to:
             break
         words = grown(alphabet, words)
@@ -318,7 +320,7 @@ def cycles_of(
     how = "by itinerary"
     if not complete:
         how += f" up to period {words.length - 1}: too many words; raise most_words"
-    return Cycles(distinct(found), complete=complete, how=how)
+    return Cycles(distinct(closed_orbits), complete=complete, how=how)
 
 
 # ----------------------------------------------------------------
@@ -435,7 +437,7 @@ def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> 
     x = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
     sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), (len(x),)))
     scale = float(np.abs(x).max())
-    found: list[Closed] = []
+    closed_orbits: list[Closed] = []
 
     def slopes(at: Array, on: Ints, _: Ints) -> Array:
         return _returned(params, 1, at, on)[1]
@@ -445,9 +447,11 @@ def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> 
         keys = np.column_stack([np.round(roots / (NEAR * scale)), on])
         _, one_of_each = np.unique(keys, axis=0, return_index=True)
         orbits = _followed(params, roots[one_of_each], on[one_of_each], period)
-        found += closed(params, *orbits, scale, slopes, seams=len(kind.branches) == 1)
+        closed_orbits += closed(params, *orbits, scale, slopes, seams=len(kind.branches) == 1)
     return Cycles(
-        distinct(found), complete=False, how="by Newton's method from many starts: completeness not claimed"
+        distinct(closed_orbits),
+        complete=False,
+        how="by Newton's method from many starts: completeness not claimed",
     )
 
 
@@ -524,7 +528,7 @@ def cycles(graph: TransitionGraph, up_to: int, within: Any = None) -> Cycles:
         raise AnswerError(
             "the set to look in", shown(within), "cells, or an answer with cells", "pass an attractor"
         )
-    found = cycles_from(graph.map, *_middles(cells), up_to)
+    answer = cycles_from(graph.map, *_middles(cells), up_to)
     if within is None:
-        return found
-    return Cycles((cycle for cycle in found if _inside(cycle, cells)), complete=False, how=found.how)
+        return answer
+    return Cycles((cycle for cycle in answer if _inside(cycle, cells)), complete=False, how=answer.how)

@@ -152,7 +152,7 @@ def settle(params: Any, r: Region, p: Pieces, u: Unions) -> int:
 
 
 @kernel
-def _told(r: Region, c: Cells, k: Components, side: int, x: float) -> bool:
+def _ends_known(r: Region, c: Cells, k: Components, side: int, x: float) -> bool:
     """Whether a state is out of the domain, or in a cell all of whose starts end in one known way."""
     if x < r.lo[side] or x > r.hi[side]:
         return True
@@ -179,7 +179,7 @@ def stays_around(
             return False
         for i in range(min(u.size[IMAGE], MOST_INTERVALS)):
             to = u.side[IMAGE, i]
-            if _told(r, c, k, to, u.lo[IMAGE, i]) or _told(r, c, k, to, u.hi[IMAGE, i]):
+            if _ends_known(r, c, k, to, u.lo[IMAGE, i]) or _ends_known(r, c, k, to, u.hi[IMAGE, i]):
                 return False
         if not cover_more(u, scale) or u.size[PUSHED] == 0:
             return True

@@ -191,7 +191,7 @@ def find_components(sides: int, c: Cells, k: Components) -> tuple[int, bool]:
         k.waiting[:n],
         k.loops[:n],
     )
-    found, i = 0, 0
+    n_attractors, i = 0, 0
     while i < n:
         label, j, ends = k.label[k.order[i]], i, 0
         while j < n and k.label[k.order[j]] == label:
@@ -203,15 +203,15 @@ def find_components(sides: int, c: Cells, k: Components) -> tuple[int, bool]:
         # a cell alone that is stretched over itself holds a repelling fixed point, which all other orbits leave
         recurs = j - i > 1 or (k.loops[k.order[i]] and not c.expands[k.order[i]])
         if ends == 0:
-            if found == MOST_ATTRACTORS:
-                return found, False
-            ends, k.closed[found] = FIRST << found, label
-            found += 1
+            if n_attractors == MOST_ATTRACTORS:
+                return n_attractors, False
+            ends, k.closed[n_attractors] = FIRST << n_attractors, label
+            n_attractors += 1
             recurs = False
         for m in range(i, j):
             k.ends[k.order[m]], k.held[k.order[m]] = ends, recurs
         i = j
-    return found, True
+    return n_attractors, True
 
 
 @kernel

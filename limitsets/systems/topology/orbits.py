@@ -51,16 +51,16 @@ def _starts(sides: int, c: Cells, k: Components, s: Starts) -> int:
 @kernel(entry=True, counting=False)
 def _throw_all(params: Any, sides: int, count: int, s: Starts) -> None:
     """Make a step of several orbits, side by side: the images of a side are one loop over an array."""
-    found = 0
+    thrown = 0
     for side in range(sides):
-        begin = found
+        begin = thrown
         for i in range(count):
             if s.side[i] == side:
-                s.which[found], s.before[found] = i, s.x[i]
-                found += 1
-        if found > begin:
-            before, after = (s.before[begin:found],), (s.after[begin:found],)
-            fill_images(params, side, before, after, s.to[begin:found], s.codes[begin:found])
+                s.which[thrown], s.before[thrown] = i, s.x[i]
+                thrown += 1
+        if thrown > begin:
+            before, after = (s.before[begin:thrown],), (s.after[begin:thrown],)
+            fill_images(params, side, before, after, s.to[begin:thrown], s.codes[begin:thrown])
     for j in range(count):
         i = s.which[j]
         s.x[i], s.side[i], s.code[i] = s.after[j], s.to[j], s.codes[j]
@@ -283,11 +283,11 @@ def _of_ends(params: Any, inside: bool, scale: float, p: Pieces, u: Unions) -> t
                     ):
                         continue  # a turning point: one orbit
                 count += 1
-                found = _joins(params, x, to, DOUBTFUL if missed else known, scale, u)
-                missed = missed or found == NO_CYCLE
-                if found == DOUBTFUL or (missed and max(known, found) > NO_CYCLE):
+                length = _joins(params, x, to, DOUBTFUL if missed else known, scale, u)
+                missed = missed or length == NO_CYCLE
+                if length == DOUBTFUL or (missed and max(known, length) > NO_CYCLE):
                     return DOUBTFUL, count
-                known = max(known, found)
+                known = max(known, length)
     return known, count
 
 

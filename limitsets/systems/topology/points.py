@@ -168,7 +168,7 @@ def _rests(
 
 
 @kernel
-def _told(u: Unions, out: Any) -> None:
+def _note_reach(u: Unions, out: Any) -> None:
     for k in range(u.size[SET]):
         side = u.side[SET, k]
         if not out[side] >= u.hi[SET, k]:
@@ -194,16 +194,16 @@ def _reaches(
         out[k] = np.nan
         for side in range(r.lo.size):
             scale = max(scale, r.hi[side] - r.lo[side])
-        found = _pieces(one, decided, r, w, w.pieces) and (
+        followed = _pieces(one, decided, r, w, w.pieces) and (
             not joined or _pieces(two, decided, r, v, v.pieces)
         )
         for a in range(t.attractors[i]):
             _begin(scale, r, a, i, t, w.unions)
             cycle = t.period[i, a] > 0
-            found = found and _rests(one, two, joined, cycle, scale, r, w.pieces, v.pieces, w.unions)
-            if found:
-                _told(w.unions, out[k])
-        if not found:
+            followed = followed and _rests(one, two, joined, cycle, scale, r, w.pieces, v.pieces, w.unions)
+            if followed:
+                _note_reach(w.unions, out[k])
+        if not followed:
             out[k] = np.inf
 
 
@@ -297,8 +297,8 @@ def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topolog
         t.bands[i, a, side] += 1
         t.reach[i, a, side] = u.hi[SET, k]
     jogs_min, jogs_max, order = t.jogs_min[i, a], t.jogs_max[i, a], t.flip_order[i, a]
-    found = push_through(params, sides, scale, w.pieces, u, jogs_min, jogs_max, order)
-    return DECIDED if found == NOTHING else MOVING
+    obstacle = push_through(params, sides, scale, w.pieces, u, jogs_min, jogs_max, order)
+    return DECIDED if obstacle == NOTHING else MOVING
 
 
 @kernel
@@ -330,8 +330,8 @@ def _point(params: Any, decided: bool, r: Region, w: Work, t: Topologies, i: int
     if not whole:
         return TOO_FINE
     for a in range(count):
-        found = _attractor(params, a, r, scale, w, t, i)
-        doubt = found if doubt == DECIDED else doubt
+        obstacle = _attractor(params, a, r, scale, w, t, i)
+        doubt = obstacle if doubt == DECIDED else doubt
     if doubt == DECIDED and _met_twice(count, scale, t, i):
         doubt = NOT_ONE
     if doubt == DECIDED and remaining(params, sides, w.cells, w.components, w.starts) > 0:
@@ -421,17 +421,17 @@ def topologies(
     if len(region.lo) != n:
         raise AnswerError("the rows of the domains", len(region.lo), str(n), "give a row for each point")
     decided = kind.has_margin or len(kind.branches) == 1
-    found = empty(n, region.lo.shape[1])
+    answer = empty(n, region.lo.shape[1])
     points = np.arange(n)
     for cells, samples in levels:
-        _points(stack, points, decided, region, work_for(region, cells, samples), found)
-        points = np.flatnonzero(found.undecided != DECIDED)
+        _points(stack, points, decided, region, work_for(region, cells, samples), answer)
+        points = np.flatnonzero(answer.undecided != DECIDED)
         if points.size == 0:
             break
-    _tidy(found)
+    _tidy(answer)
     if throws:
-        _means(stack, throws, found, np.zeros((2, STRETCHES)))
-    return found
+        _means(stack, throws, answer, np.zeros((2, STRETCHES)))
+    return answer
 
 
 def region_of(lo: Any, hi: Any, anchor: Any = None) -> Region:

@@ -65,8 +65,8 @@ def _friction(pivot: Any, slip: Any) -> float:
 def _margin(pivot: Any, part: FullSide, inertia: float, omega: float, barrier: float) -> float:
     """Positive where the part gets over its vertex; one that is held by no hinge does not ask for a criterion."""
     if pivot is None:
-        found: float = margin(part.own.flip, inertia, omega, barrier)
-        return found
+        excess: float = margin(part.own.flip, inertia, omega, barrier)
+        return excess
     return 0.5 * inertia * signed_square(omega) - barrier
 
 

@@ -66,8 +66,8 @@ def _find_undefined(lo_map: Any, hi_map: Any, side: int, lo: Any, hi: Any, count
     for k in range(count.size):
         take_mark()
         one, two = on_side_box(lo_map, hi_map, side)
-        found = image_box(one, two, pick(lo, k), pick(hi, k), side)
-        count[k] = NOTHING if take_mark() else found[0]
+        image = image_box(one, two, pick(lo, k), pick(hi, k), side)
+        count[k] = NOTHING if take_mark() else image[0]
 
 
 @proof_kernel(entry=True, counting=False)
@@ -152,7 +152,7 @@ class Hulls:
 
     def __init__(self, n: int, dimension: int) -> None:
         self.n, self.dimension = n, dimension
-        self.found: dict[tuple[int, int], tuple[Columns, Columns]] = {}
+        self.bounds: dict[tuple[int, int], tuple[Columns, Columns]] = {}
 
     def join(self, images: BoxImages, wanted: NDArray[np.bool_], slot: int, cells: NDArray[np.int64]) -> None:
         """Widen them by one slot of the wanted images, those of the pieces of `cells`, which follow each other."""
@@ -162,9 +162,9 @@ class Hulls:
         begin = int(left.argmax()) if left.any() else left.size
         while begin < left.size:
             key = int(side[begin]), int(branch[begin])
-            if key not in self.found:
-                self.found[key] = self._empty(math.inf), self._empty(-math.inf)
-            begin = _widen(begin, left, lo, hi, side, branch, cells, self.found[key])
+            if key not in self.bounds:
+                self.bounds[key] = self._empty(math.inf), self._empty(-math.inf)
+            begin = _widen(begin, left, lo, hi, side, branch, cells, self.bounds[key])
 
     def _empty(self, end: float) -> Columns:
         return tuple(np.full(self.n, end) for _ in range(self.dimension))
@@ -172,8 +172,8 @@ class Hulls:
     def arrays(self) -> dict[tuple[int, int], tuple[Floats, Floats]]:
         """Hulls with corners of shape (n,), in more than one dimension (n, dimension)."""
         if self.dimension == 1:
-            return {key: (lo[0], hi[0]) for key, (lo, hi) in self.found.items()}
-        return {key: (np.stack(lo, axis=1), np.stack(hi, axis=1)) for key, (lo, hi) in self.found.items()}
+            return {key: (lo[0], hi[0]) for key, (lo, hi) in self.bounds.items()}
+        return {key: (np.stack(lo, axis=1), np.stack(hi, axis=1)) for key, (lo, hi) in self.bounds.items()}
 
 
 # ----------------------------------------------------------------
@@ -209,15 +209,15 @@ def _least_known(lo_map: Any, hi_map: Any) -> tuple[tuple[str, ...], float, floa
         for number in _numbers(lo_map, hi_map)
         if number[1] < number[2]
     }
-    found = max(widths, key=lambda key: widths[key], default=None)
-    return found if found is not None and widths[found] > 1e-9 else None
+    widest = max(widths, key=lambda key: widths[key], default=None)
+    return widest if widest is not None and widths[widest] > 1e-9 else None
 
 
 def _parameter_pieces(lo_map: Any, hi_map: Any, pieces: int) -> list[tuple[Any, Any]]:
-    found = _least_known(lo_map, hi_map)
-    if found is None:
+    widest = _least_known(lo_map, hi_map)
+    if widest is None:
         return [(lo_map, hi_map)]
-    names, low, high = found
+    names, low, high = widest
     cuts = np.linspace(low, high, pieces + 1).tolist()
     return [(_with(lo_map, names, a), _with(hi_map, names, b)) for a, b in pairwise(cuts)]
 
@@ -334,23 +334,23 @@ def enclosed(map: Any, grid: Grid, side: int, target: Target, *, upper: Any = No
     upper : NamedTuple, optional
         The upper corner; default `map`.
     """
-    found = enclosures(map, map if upper is None else upper, grid.edges[side], side)
-    return boxes_of(found, target, len(kind_of(map).exits))
+    proved_images = enclosures(map, map if upper is None else upper, grid.edges[side], side)
+    return boxes_of(proved_images, target, len(kind_of(map).exits))
 
 
-def boxes_of(found: Enclosures, target: Target, exits: int) -> TargetBoxes:
+def boxes_of(proved_images: Enclosures, target: Target, exits: int) -> TargetBoxes:
     """Target cells of proved images; a cell of which nothing is proved goes to every cell and leaves by every exit."""
-    n, (sides, dimension) = found.lost.size, target.cells.shape
+    n, (sides, dimension) = proved_images.lost.size, target.cells.shape
     parts = []
-    for (side, _), hull in found.hulls.items():
+    for (side, _), hull in proved_images.hulls.items():
         if not 0 <= side < sides:
             raise AnswerError(
                 "the side that image_box gives", side, f"0 to {sides - 1}", "correct the kernel"
             )
         lo, hi = (corner.reshape(n, dimension) for corner in hull)
-        cell = np.flatnonzero((lo <= hi).all(axis=1) & ~found.lost)
+        cell = np.flatnonzero((lo <= hi).all(axis=1) & ~proved_images.lost)
         parts.append(placed(target, cell, np.full(cell.size, side), lo[cell], hi[cell], 0, inside=False))
-    lost = np.flatnonzero(found.lost)
+    lost = np.flatnonzero(proved_images.lost)
     everywhere = np.full(int(lost.max(initial=-1)) + 1, 0, np.uint8)
     everywhere[lost] = 2**exits - 1
     for side in np.flatnonzero(target.cells.prod(axis=1)).tolist():

@@ -205,5 +205,7 @@ def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: 
     elif mixed.size:
         positions = np.unravel_index(mixed, tuple(shape))
         numbers = (np.stack(positions, axis=1) @ strides)[:, None] + samples.offsets
-        parts += every_branch(params, side, target, samples, mixed, numbers, (after, to, code))
+        parts += every_branch(
+            params, side, target, samples=samples, cells=mixed, numbers=numbers, seen=(after, to, code)
+        )
     return merged(parts, n, second)

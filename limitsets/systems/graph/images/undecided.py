@@ -160,7 +160,7 @@ def _place_pieces(
     parts: int,
     cells: Any,
     pieces: Any,
-    found: Any,
+    boxes: Any,
     exits: Any,
 ) -> int:
     """Target cells of pieces, widened where the map may turn in them; how many meet the grid.
@@ -169,7 +169,7 @@ def _place_pieces(
     """
     here = on_side(params, side)
     ends, x, to, code = pieces
-    owner, side_out, first, last = found
+    owner, side_out, first, last = boxes
     kept = 0  # pieces that there are, moved to the front
     for k in range(code.size):
         if code[k] != codes.UNSETTLED:
@@ -245,8 +245,8 @@ def split(
     owner, side_out = np.empty(code.size, np.int64), np.empty(code.size, np.int32)
     first, last = np.empty((code.size, 1), np.int32), np.empty((code.size, 1), np.int32)
     exits = np.zeros(int(cells[-1]) + 1, np.uint8)
-    found = owner, side_out, first, last
-    n = _place_pieces(params, side, target, samples.pad, PARTS * pieces, cells, flat, found, exits)
+    boxes = owner, side_out, first, last
+    n = _place_pieces(params, side, target, samples.pad, PARTS * pieces, cells, flat, boxes, exits)
     return TargetBoxes(owner[:n], side_out[:n], first[:n], last[:n], exits, 0.0)
 
 
@@ -285,7 +285,7 @@ def every_branch(
     points = real.reshape(-1, real.shape[-1])[flat]
     alone = placed(target, owner[flat], to.ravel()[flat], points, points, 0, inside=False)
     beyond = TargetBoxes(alone.cell[:0], alone.side[:0], alone.lo[:0], alone.hi[:0], alone.exits, 0.0)
-    found = [leaving(target, owner[gone], named[gone], real.shape[-1]), beyond]
+    boxes = [leaving(target, owner[gone], named[gone], real.shape[-1]), beyond]
     if kind.has_image_on:
         for branch in range(len(kind.branches)):
             forced, forced_to = images_on(params, _states(starts), side, branch)
@@ -296,18 +296,18 @@ def every_branch(
             taken = ((code == branch) | ((code < 0) & landed & close)).any(axis=1)
             taken &= np.any(finite, axis=1)  # the branch itself may have a hole
             lo, hi = (np.where(finite[..., None], forced, end)[taken] for end in (np.inf, -np.inf))
-            found.append(
+            boxes.append(
                 placed(
                     target,
                     cells[taken],
                     forced_to[taken, 0],
-                    lo.min(axis=1),
-                    hi.max(axis=1),
-                    samples.pad,
-                    True,
+                    lo=lo.min(axis=1),
+                    hi=hi.max(axis=1),
+                    pad=samples.pad,
+                    inside=True,
                 )
             )
-        return found
+        return boxes
     landed &= code >= 0
     for key in {(int(c), int(t)) for c, t in zip(code[landed], to[landed], strict=True)}:
         mine = landed & (code == key[0]) & (to == key[1])
@@ -315,8 +315,8 @@ def every_branch(
         lo = np.where(mine[..., None], real, np.inf).min(axis=1)[some]
         hi = np.where(mine[..., None], real, -np.inf).max(axis=1)[some]
         sides = np.full(int(some.sum()), key[1])
-        found.append(placed(target, cells[some], sides, lo, hi, samples.pad, True))
-    return found
+        boxes.append(placed(target, cells[some], sides, lo=lo, hi=hi, pad=samples.pad, inside=True))
+    return boxes
 
 
 def _states(points: NDArray[np.float64]) -> NDArray[np.float64]:
