@@ -75,10 +75,15 @@ class FedShares:
         """Share that is on the arm still after the last throw made."""
         return self.shares["never"]
 
+    @cached_property
+    def _ended(self) -> NDArray[np.int64]:
+        """How many have ended, by whatever fate, after each number of throws from 0 on."""
+        return np.cumsum(np.bincount(self.trials.throws[self.trials.fate < len(FATES) - 1], minlength=1))
+
     @property
     def ended(self) -> NDArray[np.float64]:
         """Share that has ended, by whatever fate, after each number of throws from 0 on."""
-        return np.concatenate([[0.0], np.cumsum(self.by_throw.sum(axis=1))])
+        return self._ended / self.trials.fate.size
 
     @property
     def mean_throws(self) -> float:
@@ -89,8 +94,7 @@ class FedShares:
     def quantile(self, share: float) -> int | None:
         """Throws after which `share` of all starts have ended; None where so many never do."""
         needed = math.ceil(share * self.trials.fate.size - 1e-9)
-        throws = np.sort(self.trials.throws[self.trials.fate < len(FATES) - 1])
-        return int(throws[needed - 1]) if 0 < needed <= throws.size else None
+        return int(np.searchsorted(self._ended, needed)) if 0 < needed <= self._ended[-1] else None
 
     def per_minute(self, throw_rate: float | None) -> float | None:
         """Parts fed rightly per minute where the next part starts as soon as one has ended; None if one never may."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,6 +23,8 @@ SERIES = 20
 MOST_THROWS = 20_000
 NEVER = FATES.index("never")
 
+# Parts thrown at once: Ctrl-C waits for one throw of all of them.
+BLOCK = 1 << 20
 # Parts thrown to find how many throws a part takes.
 PILOT = 200
 # Share of a_i within which a part that creeps to the joint is followed no farther.
@@ -50,7 +52,7 @@ class Trials:
     beyond: NDArray[np.bool_]
     seed: int
 
-    @property
+    @cached_property
     def counts(self) -> dict[str, int]:
         """How many met each fate."""
         return dict(zip(FATES, np.bincount(self.fate, minlength=len(FATES)).tolist(), strict=True))
@@ -141,18 +143,35 @@ def run_trials(
     -------
     Trials
     """
-    scene = end.scene
     random = np.random.Generator(np.random.Philox(seed))
-    many = ManyParts(scattering_map(scene, scatter, seed), *end.drawn(random, count))
+    params, creeping = scattering_map(end.scene, scatter, seed), creeping_below(end, scatter)
     fate = np.full(count, NEVER, dtype=np.int64)
     throws = np.full(count, MOST_THROWS, dtype=np.int64)
     beyond = np.zeros(count, dtype=bool)
-    waiting = np.arange(count)
-    a, right = scene.sides.a, scene.sides.right
-    creeping = creeping_below(end, scatter)
+    drawn = 0
+    for first in range(0, count, BLOCK):
+        here = slice(first, min(first + BLOCK, count))
+        many = ManyParts(params, *end.drawn(random, here.stop - first), drawn)
+        for waiting in _to_their_fates(end, many, creeping, fate[here], throws[here], beyond[here]):
+            if progress is not None:
+                progress("trials", here.stop - waiting, count)
+        drawn = many.drawn
+    return Trials(fate, throws, beyond, seed)
+
+
+def _to_their_fates(
+    end: ArmEnd,
+    many: ManyParts,
+    creeping: NDArray[np.float64],
+    fate: NDArray[np.int64],
+    throws: NDArray[np.int64],
+    beyond: NDArray[np.bool_],
+) -> Iterator[int]:
+    """Throw parts until each has met its fate, and fill in what is asked of each; before every throw, how many wait."""
+    waiting = np.arange(fate.size)
+    a, right = end.scene.sides.a, end.scene.sides.right
     for number in range(1, MOST_THROWS + 1):
-        if progress is not None:
-            progress("trials", count - waiting.size, count)
+        yield waiting.size
         edge = end.at_edge(many.x, many.side)
         code = many.throw()
         # a jog lands on the left corner of its side, a flip on the right corner of the next one
@@ -167,4 +186,3 @@ def run_trials(
         waiting = waiting[~done]
         if not waiting.size:
             break
-    return Trials(fate, throws, beyond, seed)
