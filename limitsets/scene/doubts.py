@@ -103,6 +103,38 @@ def _rows(scene: Scene) -> Iterator[Row]:
         elif deviation.relative or name != "gravity.tilt" or "tilt" in text["gravity"]:
             share = deviation.value if deviation.relative else deviation.value / abs(scene.value(name))
             yield key, given, share, 0.0, 0.5, "{} times the value itself", "below 0.1 times"
+    scatter = scene.world.scatter
+    speed = None if scatter is None else scatter.speed
+    # a throw given by kappa without gravity has no speed
+    if speed is not None and (speed.relative or scene.gravity is not None):
+        share = speed.value if speed.relative else speed.value / scene.value("throw.speed")
+        said, given = "{} times the speed itself", text["world"]["scatter"]["speed"]
+        yield "world.scatter.speed", given, share, 0.0, 0.2, said, "below 0.03 times"
+    if scatter is not None and scatter.landing is not None:
+        given = text["world"]["scatter"]["landing"]
+        yield (
+            "world.scatter.landing",
+            given,
+            scatter.landing.value / size,
+            0.0,
+            0.25,
+            over,
+            "below 0.05 times",
+        )
+    if scene.world.friction is not None:
+        given = str(text["world"]["friction"])
+        yield "world.friction", given, scene.world.friction, 0.0, 3.0, "a coefficient of {}", "0.1 to 1"
+    if scene.world.bounce_threshold is not None:
+        given = text["world"]["bounce_threshold"]
+        yield (
+            "world.bounce_threshold",
+            given,
+            scene.world.bounce_threshold / size,
+            0.0,
+            0.25,
+            over,
+            "below 0.05 times",
+        )
     if "throw_rate" in text.get("world", {}):
         rate = scene.world.more["throw_rate"]
         given, said = text["world"]["throw_rate"], "{} throws a second"
