@@ -11,7 +11,7 @@ import typer
 
 from limitsets.cli.about import About
 from limitsets.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges
-from limitsets.cli.certificates import own_file, with_ending
+from limitsets.cli.certificates import own_file, say_replaced, with_ending
 from limitsets.cli.output import Csv, Json, Scene, Words, answer, option, progress, saved, table
 from limitsets.proposals import proposed
 
@@ -75,6 +75,7 @@ def certify(
                     proof.save(draft, recheck=not no_recheck, workers=None)
                 except DeniedError as error:
                     proof, kept = proof.denied(error.claims), str(file.with_name(Path(error.file or "").name))
+            say_replaced(file, draft)
             seconds = None if no_recheck or not written else time.perf_counter() - begin
     records = [each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]
     place = file if written else None

@@ -180,15 +180,23 @@ def _require_own(folder: Path, scene: SceneOf) -> None:
         found = {}
         with suppress(OSError, ValueError, TypeError, KeyError):
             found = dict(loads(file.read_text(encoding="utf-8"))["scene"])
-        if found and found.get("name") != scene.name:
-            raise LimitsetsError(
-                "the folder of the report", str(folder), f"one of {scene.name}, or a new one",
-                f"it holds that of {found.get('name')}; name another with --out, or delete it",
-            )  # fmt: skip
+        if found:
+            refuse_other("the report", folder, str(found.get("name")), scene)
         if found and found != scene.as_dict():
-            said = f"limitsets: {folder} holds the report of {scene.name} with other values: it is replaced"
-            print(said, file=sys.stderr)
+            say_other("the report", folder, scene.name)
             return
+
+
+def refuse_other(what: str, place: Path, name: str, scene: SceneOf) -> None:
+    """Refuse a place that holds what is of a scene of another name."""
+    if name != scene.name:
+        remedy = f"it is of {name}; name another with --out, or delete it"
+        raise LimitsetsError(f"the place of {what}", str(place), f"one of {scene.name}, or a new one", remedy)
+
+
+def say_other(what: str, place: Path, name: str) -> None:
+    """Say that what is of other values of this scene is replaced: whoever edits a scene wants the new answer."""
+    print(f"limitsets: {place}: {what} of {name} with other values is replaced", file=sys.stderr, flush=True)
 
 
 @contextmanager
