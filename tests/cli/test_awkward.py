@@ -154,7 +154,7 @@ def test_a_certificate_of_other_values_is_not_replaced_in_silence(capfd, tables,
 def test_a_certificate_of_other_values_stays_where_nothing_is_proved(capfd):
     assert run(capfd, "certify", "paper-designed", "--claim", "trapping", "--no-recheck")[0] == 0
     kept = Path("paper-designed.proof.zip").read_bytes()
-    code, _, err = run(capfd, "certify", "paper-designed", "--noise", "throw.speed=9 %", "--no-recheck")
+    code, _, err = run(capfd, "certify", "paper-designed", "--claim", "goal", "--noise", "throw.speed=9 %")
     assert (code, "replaced" in err) == (1, False)
     assert Path("paper-designed.proof.zip").read_bytes() == kept
 
