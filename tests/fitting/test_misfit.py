@@ -120,7 +120,7 @@ def test_a_number_written_down_wrong_is_named_alone():
 
 
 def test_the_ratio_of_likelihoods_takes_one_alternative_at_a_time():
-    """By the densities of scipy; all alternatives at once took 20 times the memory, and held Ctrl-C back for seconds."""
+    """By the densities of scipy; all at once took 20 times the memory, and held Ctrl-C back."""
     z = np.random.default_rng(3).standard_normal((1000, 200)) * 2.0
     alternatives = [(share, wide) for share in SHARES for wide in WIDER]
     plain = norm.logpdf(z)
