@@ -290,11 +290,18 @@ def show_scene(scene: SceneOf, files: list[Path], about: About | None) -> None:
 class _Interrupts:
     """Ctrl-C, remembered: raised inside a callback of somebody else's C code an exception may be lost on the way.
 
-    The next step raises it again, so that no file is replaced after it.
+    The next step raises it again, so that no file is replaced after it; an error that comes of it is it, and Python's
+    words on what was lost are not shown.
     """
 
     def __init__(self) -> None:
         self.pressed = False
+        self.told_before = sys.unraisablehook
+
+    def lost(self, found: sys.UnraisableHookArgs) -> None:
+        """Hear of an exception that could not be raised."""
+        if not self.pressed:
+            self.told_before(found)
 
     def __call__(self, *_: object) -> None:
         self.pressed = True
@@ -333,6 +340,7 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
     )
     if ours:
         signal.signal(signal.SIGINT, interrupts)
+        sys.unraisablehook = interrupts.lost
     try:
         with bar() as shown:
 
@@ -345,7 +353,11 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
         if notes := getattr(error, "__notes__", ()):
             raise InterruptedRun("; ".join(notes)) from None
         raise
+    except Exception:
+        interrupts.check()
+        raise
     finally:
         if ours:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+            sys.unraisablehook = interrupts.told_before
     interrupts.check()
