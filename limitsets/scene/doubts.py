@@ -121,24 +121,16 @@ def _rows(scene: Scene) -> Iterator[Row]:
             over,
             "below 0.05 times",
         )
-    if scene.world.friction is not None:
-        given = str(text["world"]["friction"])
-        yield "world.friction", given, scene.world.friction, 0.0, 3.0, "a coefficient of {}", "0.1 to 1"
-    if scene.world.bounce_threshold is not None:
-        given = text["world"]["bounce_threshold"]
-        yield (
-            "world.bounce_threshold",
-            given,
-            scene.world.bounce_threshold / size,
-            0.0,
-            0.25,
-            over,
-            "below 0.05 times",
-        )
-    if "throw_rate" in text.get("world", {}):
-        rate = scene.world.more["throw_rate"]
-        given, said = text["world"]["throw_rate"], "{} throws a second"
-        yield "world.throw_rate", given, rate, 0.01, 20.0, said, "0.1 to 10"
+    # what a fact of the world is measured in, and what is believed of it
+    facts = {
+        "friction": (1.0, 0.0, 3.0, "a coefficient of {}", "0.1 to 1"),
+        "bounce_threshold": (size, 0.0, 0.25, over, "below 0.05 times"),
+        "throw_rate": (1.0, 0.01, 20.0, "{} throws a second", "0.1 to 10"),
+    }
+    for name, (one, least, most, said, usual) in facts.items():
+        if name in text.get("world", {}):
+            given, measured = str(text["world"][name]), getattr(scene.world, name) / one
+            yield f"world.{name}", given, measured, least, most, said, usual
 
 
 def _in_words(scene: Scene, word: str, turned: float) -> float:

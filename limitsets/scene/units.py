@@ -93,8 +93,17 @@ _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?"
 _QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=[%\u00b0]))([^\s].*)")
 _SMALLEST, _LARGEST = 1e-300, 1e12
 
-_FREE_FALL = Fraction("9.80665")
 _PI = Fraction("3.1415926535897932384626433832795028841971693993751")
+
+# Of a dimension that is wanted and a unit of another that is plainly read as one of it: when, the factor, the unit.
+_EACH_TURN = "if each turn throws once"
+_READ_AS = {
+    ("frequency", "rpm"): (_EACH_TURN, Fraction(1, 60), "Hz"),
+    ("frequency", "deg/s"): (_EACH_TURN, Fraction(1, 360), "Hz"),
+    ("frequency", "rad/s"): (_EACH_TURN, Fraction(1, 2) / _PI, "Hz"),
+    ("angular speed", "Hz"): ("if it counts turns", Fraction(60), "rpm"),
+    ("acceleration", "g"): ("if it is that of free fall", Fraction("9.80665"), "m/s^2"),
+}
 
 # Sizes in m, kg, rad and s, by what the units measure; a test compares quotients of them with those of pint.
 _SIZES_BY_KIND: dict[str, dict[str, str | Fraction]] = {
@@ -216,8 +225,11 @@ def _why_not_unit(number: str, unit: str, dimension: str) -> str:
     size, name = _in_known_unit(unit)
     for other, units in UNITS.items():
         if name in units and other != dimension:
-            meant = _meant_by(Fraction(number) * size, name, dimension)
-            return f"{unit} is a unit of {other}: {meant or 'the dimension is wrong'}"
+            if (dimension, name) not in _READ_AS:
+                return f"{unit} is a unit of {other}: the dimension is wrong"
+            words, factor, own = _READ_AS[dimension, name]
+            value = float(Fraction(number) * size * factor)
+            return f'{unit} is a unit of {other}: {words}, write "{value:.15g} {own}"'
     if dimension == "frequency" and unit in _PERIODS and not _is_zero(number):
         rate = 1 / (Fraction(number) * _PERIODS[unit])
         return f'{unit} is a unit of time: if it is that from throw to throw, write "{float(rate):.15g} Hz"'
@@ -226,24 +238,6 @@ def _why_not_unit(number: str, unit: str, dimension: str) -> str:
     if size == 1:
         return f"the unit {unit!r} is not known; did you mean {name!r}?"
     return f'the unit {unit!r} is not known; write "{float(Fraction(number) * size):.15g} {name}"'
-
-
-def _meant_by(value: Fraction, unit: str, dimension: str) -> str:
-    """Say what to write where a unit of another dimension is plainly read as one of this; empty where none is.
-
-    Examples
-    --------
-    >>> _meant_by(Fraction(90), "rpm", "frequency")
-    'if each turn throws once, write "1.5 Hz"'
-    """
-    if dimension == "frequency" and unit in UNITS["angular speed"]:
-        rate = value * exact_factor(unit, "rpm") / 60
-        return f'if each turn throws once, write "{float(rate):.15g} Hz"'
-    if dimension == "angular speed" and unit == "Hz":
-        return f'if it counts turns, write "{float(60 * value):.15g} rpm"'
-    if dimension == "acceleration" and unit == "g":
-        return f'if it is that of free fall, write "{float(value * _FREE_FALL):.15g} m/s^2"'
-    return ""
 
 
 def _in_known_unit(unit: str) -> tuple[Fraction, str]:

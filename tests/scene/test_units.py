@@ -130,6 +130,7 @@ def test_refuses(text: object, words: str) -> None:
         ("120 /min", "angular speed", 'if it counts turns, write "120 rpm"'),
         ("90 rpm", "frequency", 'rpm is a unit of angular speed: if each turn throws once, write "1.5 Hz"'),
         ("540 deg/s", "frequency", 'if each turn throws once, write "1.5 Hz"'),
+        ("6.283185307179586 rad/s", "frequency", 'if each turn throws once, write "1 Hz"'),
         ("90 rev/min", "frequency", 'if each turn throws once, write "1.5 Hz"'),
         ("90 throws/min", "frequency", 'write "1.5 Hz"'),
         ("0.5 s", "frequency", 's is a unit of time: if it is that from throw to throw, write "2 Hz"'),
