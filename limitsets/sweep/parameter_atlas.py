@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limitsets.arguments import arguments_checked
-from limitsets.cells import as_domain
-from limitsets.errors import LimitsetsError
+from limitsets.cells import Domain, as_domain
+from limitsets.errors import LimitsetsError, MapError
 from limitsets.files import as_plain, locked
-from limitsets.maps import coerce, kind_of
+from limitsets.maps import coerce, domain_of, kind_of
 from limitsets.maps.contract import require_dimension
 from limitsets.progress import shown_in_notebooks
 from limitsets.scene import Scene, load
@@ -271,7 +271,7 @@ def atlas(
     options : mapping, optional
         Keyword arguments of the task.
     domain : Domain or array_like, optional
-        Of a map, for tasks that need one; see `limitsets.grid`.
+        Of a map, for tasks that need one; see `limitsets.grid`.  Textbook maps have one of their own.
     chunk : sequence of int, optional
         Points of a chunk along y and x (or x); chosen by the number of points otherwise.
     seed : int
@@ -382,10 +382,19 @@ def _subject(subject: Any, domain: Any) -> Subject:
             )
         return SceneSubject(subject)
     kind_of(subject)
-    box = None if domain is None else as_domain(domain)
+    chosen = coerce(subject)
+    box = _own_domain(chosen) if domain is None else as_domain(domain)
     if box is not None:
         require_dimension(subject, "domain", box.dimension)
-    return MapSubject(coerce(subject), box)
+    return MapSubject(chosen, box)
+
+
+def _own_domain(params: Any) -> Domain | None:
+    """Give the domain of a textbook map; other maps have none of their own."""
+    try:
+        return as_domain(domain_of(params))
+    except MapError:
+        return None
 
 
 def _work(plan: Plan) -> Work:
