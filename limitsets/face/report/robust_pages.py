@@ -354,14 +354,18 @@ def _drawn(found: Robustness) -> Iterator[tuple[str, Figure]]:
 
 
 def _noise(found: Robustness) -> Iterator[tuple[str, Figure]]:
-    """Draw the noise: where nothing stays there is no density, and where nothing is fed no throws until then."""
+    """Draw the noise: where nothing stays there is no density, where nothing is fed no throws until then.
+
+    Of a single level, where there was no time for others, there is nothing to see.
+    """
     if found.noise is None or found.levels is None:
         return
     if found.noise.classes:
         yield "density", plot.noise_density(found.noise)
     if found.noise.feeding.mean is not None:
         yield "throws", plot.noise_arrivals(found.noise)
-    yield "levels", plot.noise_levels(found.levels, {"level of the noise, as given = 1": 1.0})
+    if found.levels.factors.size > 1:
+        yield "levels", plot.noise_levels(found.levels, {"level of the noise, as given = 1": 1.0})
 
 
 def write_robustness(
