@@ -13,6 +13,7 @@ import pytest
 import limitsets as ls
 from limitsets.proofs.prover import certificate as confirm
 from tests.cli.command import PROGRESS, run
+from tests.feeding.scenes import with_cavity
 from tests.lead_triangle import left_by_some
 
 
@@ -240,11 +241,21 @@ def test_without_flint_there_is_one_clear_error(capfd, monkeypatch):
 
 @pytest.mark.sweep
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_ctrl_c_reaches_the_helpers_without_a_traceback(capfd):
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("recheck", "large.zip"),
+        ("feed", "cavity.toml", "--no-proof", "--trials", "20000000"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_ctrl_c_ends_a_command_and_its_helpers_without_a_traceback(capfd, words):
     """From a terminal the whole group of processes hears it."""
     run(capfd, "certify", "paper-designed", "--noise", "throw.speed=0.38 %", "-o", "large.zip")
+    Path("cavity.toml").write_text(ls.dump(with_cavity()))
     process = subprocess.Popen(
-        [sys.executable, "-m", "limitsets", "recheck", "large.zip"],
+        [sys.executable, "-m", "limitsets", *words],
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     if process.stderr.readline():  # it is at work, and has been for two seconds

@@ -1,5 +1,6 @@
 """The command line: exit codes, what goes to which stream, JSON words, and files that stay whole."""
 
+import ctypes
 import io
 import json
 import signal
@@ -312,6 +313,31 @@ def test_no_progress_is_printed_after_the_command(monkeypatch):
         tell("throwing", 0, 1)
         assert begun.wait(10)
     assert sys.stderr.getvalue() == "limitsets: throwing (1 of 1)\n"
+
+
+def test_ctrl_c_that_a_callback_loses_ends_what_comes_of_it(capfd):
+    """While numba compiles it may be lost, and what is half compiled fails: "a bug: no compiled object yet"."""
+
+    @ctypes.CFUNCTYPE(None)
+    def callback():
+        signal.raise_signal(signal.SIGINT)
+
+    def work():
+        with output.progress():
+            callback()
+            raise RuntimeError("no compiled object yet")
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    hook = sys.unraisablehook
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            work()
+        with pytest.raises(RuntimeError), output.progress():
+            raise RuntimeError("an error of its own")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert sys.unraisablehook is hook
+    assert capfd.readouterr().err == ""
 
 
 def test_a_reader_that_goes_away():

@@ -322,6 +322,25 @@ PLATE_OF_25_G = tomllib.loads(LEAD)
         ),
         ({"gravity": {"acceleration": "193.045 m/s^2"}}, "gravity.acceleration", ("193 m/s^2",)),
         ({"world": {"throw_rate": "120 Hz"}}, "world.throw_rate", ("120 throws a second",)),
+        ({"world": {"scatter": {"speed": "60 %"}}}, "world.scatter.speed", ("'60 %'", "0.6 times the speed")),
+        # sqrt(193.045 / 25.3778518) rad/s are 158.02 deg/s
+        (
+            {"world": {"scatter": {"speed": "79.01 deg/s"}}},
+            "world.scatter.speed",
+            ("'79.01 deg/s'", "0.5 times the speed"),
+        ),
+        # the longest side is 6.75 in
+        (
+            {"world": {"scatter": {"landing": "13.5 in"}}},
+            "world.scatter.landing",
+            ("'13.5 in'", "2 times the part's longest side"),
+        ),
+        ({"world": {"friction": 45}}, "world.friction", ("a coefficient of 45",)),
+        (
+            {"world": {"bounce_threshold": "27 in"}},
+            "world.bounce_threshold",
+            ("'27 in'", "4 times the part's longest side"),
+        ),
     ],
 )
 def test_improbable_values_are_told_and_not_refused(capfd, tables, key, words):
@@ -337,6 +356,13 @@ def test_improbable_values_are_told_and_not_refused(capfd, tables, key, words):
     code, out, _ = run(capfd, "check", "odd.toml", "--json")
     (record,) = json.loads(out)
     assert (code, set(record), record["improbable"]) == (0, documented("check"), True)
+
+
+def test_of_a_scatter_of_no_speed_nothing_is_said():
+    """A throw given by kappa without gravity has none."""
+    tree = with_tables(world={"scatter": {"speed": "79.01 deg/s"}})
+    del tree["gravity"]
+    assert examined(tree) == ((), ())
 
 
 def test_sizes_in_metres_are_improbable():

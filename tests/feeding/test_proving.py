@@ -1,16 +1,21 @@
 """Safety and progress: the figures of the theory, and that no orbit contradicts what is proved."""
 
+import time
+
 import numpy as np
 import pytest
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
+from limitsets.cell.feeding import proving
 from limitsets.cell.feeding.falling import arm_end_of
 from limitsets.cell.feeding.paths import Paths
 from limitsets.cell.feeding.proving import proved_feeding, verdict_of, write_proof
 from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.certifying import spelled_deviations
 from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.systems.graph.images.enclosed import enclosures
 from tests.feeding.scenes import with_cavity
 
 
@@ -105,6 +110,70 @@ def test_when_time_is_up_what_is_proved_is_the_answer():
     assert "finer cells than 2048 a side were not tried" in found.fed.reason
     assert found.found.cover.grid.n_cells < 8192
     assert not any("8192" in stage for stage, _, _ in told)
+
+
+def pentagon():
+    """A part that 6 % of noise carries anywhere: a quarter of its cells can be thrown from beyond where it stands."""
+    corners = [(12.145, 11.491), (8.57, 13.529), (-14.251, 9.684), (-5.53, -14.579), (17.207, -5.453)]
+    mass = [{"x": "3.628 mm", "y": "2.934 mm", "mass": "180.155 g"}]
+    return ls.load(
+        {
+            "part": {
+                "vertices": [[f"{x} mm", f"{y} mm"] for x, y in corners],
+                "mass": {"plate_density": "3 kg/m^2", "points": mass},
+            },
+            "arm": {"surface_height": "0.641 mm", "length": "262.438 mm"},
+            "throw": {"kappa": "12.5314 mm"},
+            "cavity": {
+                "position": "177.233 mm", "width": "40.382 mm", "depth": "43.016 mm", "angle": "47.2 deg"
+            },
+        }
+    )  # fmt: skip
+
+
+def test_a_cell_that_is_not_lost_has_the_image_that_it_has_alone():
+    """Nothing more is asked of a cell once nothing is proved of it; the others are all done to the end."""
+    scene = pentagon()
+    box = parameter_box(scene, noise=spelled_deviations(scene, {"throw.speed": "6 %"}))
+    edges = np.linspace(scene.sides.a[0] + 1.0, 0.9 * scene.arm_length, 25)
+    found = enclosures(box.lo, box.hi, edges, 0)
+    assert found.lost.any()
+    assert not found.lost.all()
+    for k in range(24):
+        alone = enclosures(box.lo, box.hi, edges[k : k + 2], 0)
+        assert alone.lost[0] == found.lost[k]
+        if not found.lost[k]:
+            own = {key: (lo[k], hi[k]) for key, (lo, hi) in found.hulls.items() if lo[k] <= hi[k]}
+            assert own == {key: (lo[0], hi[0]) for key, (lo, hi) in alone.hulls.items()}
+
+
+@pytest.mark.sweep  # 10 s of its own, and the kernels
+def test_the_first_cells_keep_the_time_too():
+    """256 pieces of this noise took 35 s of the processor before, whatever time was given."""
+    end, noise = arm_end_of(pentagon(), 0), {"throw.speed": "6 %"}
+    proved_feeding(end, noise, seconds=0.0)
+    began = time.process_time()
+    found = proved_feeding(end, noise, seconds=5.0)
+    assert time.process_time() - began < 20.0
+    assert (found.safe.verdict, found.fed.verdict) == ("undecided", "undecided")
+    assert "pieces, not 256, which would take longer" in found.fed.reason
+
+
+def test_fewer_pieces_of_the_noise_prove_less_and_say_so(monkeypatch):
+    end = arm_end_of(with_cavity())
+    monkeypatch.setattr(proving, "SOON", np.inf)
+    whole = proved_feeding(end, {"throw.speed": "3 %"}, seconds=0.0)
+    assert "pieces" not in whole.fed.reason
+    monkeypatch.setattr(proving, "SOON", 0.0)
+    few = proved_feeding(end, {"throw.speed": "3 %"}, seconds=0.0)
+    assert "the noise was cut into 4 pieces, not 256, which would take longer" in few.fed.reason
+    assert few.safe.share <= whole.safe.share
+    for one, other in zip(few.found.cover.images, whole.found.cover.images, strict=True):
+        for key, (lo, hi) in other.hulls.items():
+            wide = one.hulls[key]
+            some = (lo <= hi) & ~one.lost
+            assert (wide[0][some] <= lo[some] + 1e-9).all()  # but for rounding
+            assert (hi[some] <= wide[1][some] + 1e-9).all()
 
 
 def test_scattered_landings_are_fed_from_some_x_on():

@@ -15,7 +15,7 @@ from limitsets.cell.feeding.falling import FATES, arm_end_of
 from limitsets.cell.feeding.trials import FedShares, Trials, run_trials, success_curve
 from limitsets.face.cli.feed import _text
 from limitsets.feeder.scattering import Gaussian, Scattering, Uniform
-from limitsets.parameters.noise.sampling import binomial_interval
+from limitsets.parameters.noise.sampling import ManyParts, binomial_interval
 from tests.feeding.own_throws import shares
 from tests.feeding.scenes import with_cavity
 
@@ -193,6 +193,33 @@ def test_trials_do_not_depend_on_how_many_there_are(initial):
     assert series.size == 1000
     assert series.sum() == (trials.fate == 0).sum()
     assert series[0] == (trials.fate[:20] == 0).sum()
+
+
+def test_many_parts_are_thrown_in_blocks_between_which_ctrl_c_comes(initial, monkeypatch):
+    """All at once a throw of 1e8 parts takes ten seconds; each block draws starts and noise of its own."""
+    end, trials = initial
+    sizes, told = [], []
+    throw = ManyParts.throw
+
+    def counted(many):
+        sizes.append(many.x.size)
+        return throw(many)
+
+    monkeypatch.setattr(ManyParts, "throw", counted)
+    monkeypatch.setattr("limitsets.cell.feeding.trials.BLOCK", 3000)
+    found = run_trials(end, NOISE, 20_000, seed=3, progress=lambda *words: told.append(words))
+    assert max(sizes) == 3000
+    assert sum(size == 3000 for size in sizes) >= 6
+    assert [done for _, done, _ in told] == sorted(done for _, done, _ in told)
+    assert {of for _, _, of in told} == {20_000}
+    for name, (low, high) in found.intervals.items():
+        least, most = trials.intervals[name]
+        assert low <= most
+        assert least <= high
+    # parts of one start: what differs between the blocks is their noise
+    same = arm_end_of(with_cavity("paper-initial"), side=2, laid={0: [(8.0, 8.0 + 1e-9)]})
+    again = run_trials(same, NOISE, 6000, seed=3)
+    assert not (again.throws[:3000] == again.throws[3000:]).all()
 
 
 def test_without_noise_all_are_fed_on_side_2():

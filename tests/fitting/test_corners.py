@@ -42,11 +42,15 @@ def test_intervals_from_corners_hold_the_truth():
         assert held[name] >= binom.ppf(1e-4, 20, 0.95), name
 
 
-def test_one_film_of_corners_gives_the_machine():
+def test_one_film_of_corners_gives_the_machine(tmp_path):
     draw = np.random.default_rng(61)
     truth = machine(draw)
-    exact = {"error": 0.0, "speed": 0.0, "landing": 0.0, "known": False, "corner": True}
-    found = ls.fit(aimed_at(), film(draw, truth, **exact))
+    seen = film(draw, truth, error=0.0, speed=0.0, landing=0.0, known=False, corner=True)
+    columns = (each.tolist() for each in (seen.x_before, seen.side_before, seen.x_after, seen.side_after))
+    path = tmp_path / "throws.csv"
+    rows = [",".join(map(repr, row)) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([HEAD.replace("mm", "in"), *rows]), encoding="utf-8")
+    found = ls.fit(aimed_at(), path)
     assert not found.misfit.lacking
     for name in PLACES:
         assert found[name].value == pytest.approx(truth[name], abs=1e-4)

@@ -87,6 +87,15 @@ def test_without_a_boundary_there_is_no_exponent():
     assert (found.shares == 0.0).all()
 
 
+def test_shares_weigh_in_the_exponent_by_the_variance_of_a_binomial():
+    """The logarithm of a share f of n starts has the variance (1 - f) / n: against the weighted fit of numpy."""
+    apart, starts = np.geomspace(1.0, 100.0, 6), 400.0
+    shares = np.array([0.02, 0.06, 0.12, 0.35, 0.7, 0.95])
+    slope, _ = uncertainty._fit(apart, shares, starts * shares)
+    sizes = 1.0 / np.sqrt((1.0 - shares) / (starts * shares))
+    assert slope == pytest.approx(np.polyfit(np.log(apart), np.log(shares), 1, w=sizes)[0], rel=1e-9)
+
+
 # ---------------------------------------------------------------- Wada
 
 

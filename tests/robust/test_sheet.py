@@ -8,6 +8,7 @@ import json
 import math
 import pickle
 import re
+import time
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 from types import SimpleNamespace
@@ -19,10 +20,14 @@ from mpmath import mpf
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.face.plot import tolerance_box
-from limitsets.face.report.robust_pages import answer, robustness_page, tightest
+from limitsets.face.report.robust_pages import answer, robustness_page, tightest, write_robustness
 from limitsets.feeder.goals import OrientedBeyond
+from limitsets.feeder.scattering import Gaussian, Scattering
 from limitsets.parameters.margins.margin_result import bound
 from limitsets.parameters.margins.single import MarginsBeyond
+from limitsets.parameters.noise import statistics
+from limitsets.parameters.noise import statistics as chain_solution
+from limitsets.parameters.noise.ulam import STRATA
 from limitsets.parameters.sheet import sheet_run
 from limitsets.parameters.sheet import summary as margin_curve
 from limitsets.parameters.sheet.entries import Checkpoint, Entry, in_unit_of, percent_of
@@ -379,6 +384,62 @@ def test_the_seconds_of_a_sheet_bound_the_proofs(monkeypatch):
     assert "6 more places" in found.left_out["rest of the curve"]
     with pytest.raises(LimitsetsError, match="the seconds"):
         ls.robustness("paper-designed", seconds=-1.0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "errors", "slopes", "levels", "said"),
+    [
+        # 20 s until the errors are known: less are left than the 50 s of the derivatives, more than those of all levels
+        (
+            12.0,
+            True,
+            [],
+            [0.0, 0.5, 1.0, 1.5, 2.0],
+            "for what more noise of speed changes, what more noise of landing",
+        ),
+        # 12.5 s are left after the derivatives by the speed, for two levels
+        (
+            16.5,
+            True,
+            ["speed"],
+            [0.0, 0.5],
+            "for what more noise of landing changes, noise 1 and 1.5 and 2 times",
+        ),
+        (0.0, False, [], [0.0], "for how its numbers change on halving, what more noise of speed changes"),
+        (3600.0, True, ["speed", "landing"], [0.0, 0.5, 1.0, 1.5, 2.0], None),
+    ],
+)
+def test_the_seconds_of_a_sheet_bound_the_noise(tmp_path, monkeypatch, seconds, errors, slopes, levels, said):
+    """A solution takes ten seconds by this clock, one with half the cells or strata half of it."""
+    now = [0.0]
+
+    def slow(*about):
+        now[0] += 10.0 * (about[0].cells / 16) * (about[0].strata / STRATA)
+        return solve_of(*about)
+
+    solve_of = statistics.solve
+    monkeypatch.setattr(statistics, "solve", slow)
+    monkeypatch.setattr(chain_solution, "solve", slow)
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    found = ls.robustness(
+        "paper-designed",
+        scatter=Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02)),
+        leave_out=["margins", "joint", "curve", "audit"],
+        cells=16,
+        seconds=seconds,
+    )
+    assert bool(found.noise.errors) is errors
+    assert list(found.noise.sensitivity) == slopes
+    assert found.levels.factors.tolist() == levels
+    words = found.left_out.get("rest of the noise")
+    page = write_robustness(found, tmp_path)[0].read_text(encoding="utf-8")
+    if said is None:
+        assert words is None
+        assert "there was no time" not in page
+    else:
+        assert said in words
+        assert f"(There was no time{words.removeprefix('there was no time')}.)" in page
+        assert now[0] <= max(5.0 * seconds, 15.0)
 
 
 def test_the_page_names_first_what_the_limit_set_calls_for(sheet):

@@ -1,3 +1,4 @@
+import re
 from decimal import Decimal
 from fractions import Fraction
 
@@ -125,7 +126,19 @@ def test_refuses(text: object, words: str) -> None:
         ("25 RPM", "angular speed", "did you mean 'rpm'?"),
         ("158 \u00b0/s", "angular speed", "did you mean 'deg/s'?"),
         ("6 rad/min", "angular speed", 'write "0.1 rad/s"'),
-        ("25 Hz", "angular speed", "Hz is a unit of frequency: the dimension is wrong"),
+        ("25 Hz", "angular speed", 'Hz is a unit of frequency: if it counts turns, write "1500 rpm"'),
+        ("120 /min", "angular speed", 'if it counts turns, write "120 rpm"'),
+        ("90 rpm", "frequency", 'rpm is a unit of angular speed: if each turn throws once, write "1.5 Hz"'),
+        ("540 deg/s", "frequency", 'if each turn throws once, write "1.5 Hz"'),
+        ("6.283185307179586 rad/s", "frequency", 'if each turn throws once, write "1 Hz"'),
+        ("90 rev/min", "frequency", 'if each turn throws once, write "1.5 Hz"'),
+        ("90 throws/min", "frequency", 'write "1.5 Hz"'),
+        ("0.5 s", "frequency", 's is a unit of time: if it is that from throw to throw, write "2 Hz"'),
+        ("250 ms", "frequency", 'write "4 Hz"'),
+        ("0 s", "frequency", "convert the value"),
+        ("0.5 turn", "angle", 'write "180 deg"'),
+        ("0.5 g", "acceleration", 'g is a unit of mass: if it is that of free fall, write "4.903325 m/s^2"'),
+        ("0.5 kg", "acceleration", "kg is a unit of mass: the dimension is wrong"),
         ("25 kHz", "angular speed", "convert the value"),  # of what, is not said
         ("45 \u00ba", "angle", "did you mean 'deg'?"),  # the sign of an ordinal
         ("3 km", "length", 'write "3000 m"'),
@@ -153,6 +166,24 @@ def test_what_is_proposed_is_the_same_value(text: str, dimension: str, words: st
     with pytest.raises(SceneError) as caught:
         parse(text, dimension)
     assert words in caught.value.remedy
+
+
+@pytest.mark.parametrize("text", ["5", "banana", "5,75 mm", 5.75])
+@pytest.mark.parametrize(
+    ("dimension", "units"), [("length", ("mm", "in")), ("acceleration", ("mm/s^2", "in/s^2"))]
+)
+def test_examples_are_in_millimetres_and_in_inches(
+    text: object, dimension: str, units: tuple[str, str]
+) -> None:
+    """A scene has one or the other, and an example in the other alone looks like a demand."""
+    with pytest.raises(SceneError) as caught:
+        parse(text, dimension)
+    examples = re.findall(r'"[0-9.]+ ([^"]+)"', caught.value.remedy)
+    assert tuple(examples) == units
+    values = [
+        convert(parse(each, dimension), units[0]) for each in re.findall(r'"([^"]+)"', caught.value.remedy)
+    ]
+    assert values[0] == pytest.approx(values[1], rel=0.01)
 
 
 def test_spellings_for_certificates() -> None:

@@ -5,12 +5,14 @@ x + 1/2 at 0 and at 1/2 has the cycle {0, 1/2}, of multiplier (1 - k - m) (1 + k
 """
 
 import math
+import re
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets.parameters.atlas import Axis
 
 
 class Times(NamedTuple):
@@ -80,3 +82,57 @@ def test_a_cycle_on_the_cut_is_all_that_attracts():
     # What is left open lies at the repelling cycle, not in all that meets the jump.
     assert ls.basins(graph, (attractor,)).attractors[0] > 0.98
     assert min(c.multiplier for c in ls.cycles(graph, 2)) == pytest.approx((1 - 0.9) * (1 + 0.5), abs=1e-9)
+
+
+def test_basins_say_that_starts_are_undecided_by_the_enclosed_image_of_a_jump():
+    """Cells that lead to the jump, counted apart: the lift rises, so that its ends bound the image of a cell."""
+    params, cells = Waves(0.34, 0.95, 0.0), 1024
+    graph = ls.transitions(params, ls.grid([(0.0, 1.0)], cells=cells), "boxes")
+    ends = np.linspace(0.0, 1.0, cells + 1)
+    after = ends + 0.34 - 0.95 / (2.0 * np.pi) * np.sin(2.0 * np.pi * ends)
+    first, last = np.floor(after[:-1] * cells).astype(int), np.floor(after[1:] * cells).astype(int)
+    leads = (first < cells) & (last >= cells)
+    for _ in range(cells):
+        leads = leads | np.array(
+            [leads[np.arange(a, b + 1) % cells].any() for a, b in zip(first, last, strict=True)]
+        )
+    found = ls.basins(graph, ls.attractors(graph))
+    assert found.undecided_between > 0.1
+    words = re.search(
+        r"from (.*) % of the starts .*, from (.*) % a cell whose enclosed image is a whole", found.advice
+    )
+    assert float(words[2]) / 100.0 == pytest.approx(leads.mean(), abs=0.003)
+    assert "one branch before the jump" in found.advice
+    sampled = graph_of(params, cells)
+    assert "enclosed image" not in ls.basins(sampled, ls.attractors(sampled)).advice
+
+
+def test_the_atlas_decides_circle_maps_with_a_floor():
+    """Denjoy: with an irrational rotation number the whole circle is the attractor, and its exponent is 0.
+
+    Below omega = k / (2 pi) the map is locked to a fixed point; the rotation by 1/4 has a cycle through each point.
+    """
+    axis = Axis("omega", [0.05, 0.30001, (math.sqrt(5.0) - 1.0) / 2.0])
+    wanted = ["lyapunov", "lyapunov_error", "bands", "lowest", "reach", "period", "undecided"]
+    found = ls.atlas(Waves(0.5, 0.5, 0.0), axis, domain=[(0.0, 1.0)], variables=wanted).dataset
+    assert found.undecided.values.tolist() == [0, 0, 0]
+    assert found.period.values[:, 0].tolist() == [1, 0, 0]
+    assert found.lowest.values[0, 0, 0] == pytest.approx(
+        math.asin(2.0 * math.pi * 0.05 / 0.5) / math.tau, abs=1e-6
+    )
+    for point in (1, 2):
+        assert found.bands.values[point, 0, 0] == 1
+        ends = found.lowest.values[point, 0, 0], found.reach.values[point, 0, 0]
+        assert ends == pytest.approx((0.0, 1.0), abs=1e-9)
+        assert abs(found.lyapunov.values[point, 0]) < 1e-3
+    quarter = ls.atlas(Waves(0.5, 0.0, 0.0), "omega=0.25:0.25:1", domain=[(0.0, 1.0)]).dataset
+    assert quarter.undecided.attrs["flag_meanings"].split()[int(quarter.undecided.values[0])] == "not_one"
+
+
+def test_the_atlas_finds_the_bands_of_a_falling_map_with_a_floor():
+    """x -> -5 x / 2 mod 1 expands, and its images of any interval fill [0, 1]."""
+    found = ls.atlas(Times(-2.5), "m=-2.5:-2.25:2", domain=[(0.0, 1.0)]).dataset
+    assert found.undecided.values.tolist() == [0, 0]
+    assert found.bands.values[:, 0, 0].tolist() == [1, 1]
+    assert found.lowest.values[:, 0, 0] == pytest.approx(0.0, abs=1e-9)
+    assert found.reach.values[:, 0, 0] == pytest.approx(1.0, abs=1e-9)

@@ -17,6 +17,7 @@ from limitsets.base.errors import LimitsetsError, SceneError
 from limitsets.parameters.atlas import Axis, atlas
 from limitsets.parameters.atlas.plan import chunk_shape
 from limitsets.parameters.atlas.subjects import SceneSubject, axis_of
+from tests.maps_of_tests import Tent
 from tests.sweep.stores import Shuffled, bytes_of, run
 from tests.sweep.tasks_of_tests import TASK, X, Y
 
@@ -172,7 +173,17 @@ def test_any_registered_map(tmp_path):
     with pytest.raises(LimitsetsError, match="parameters of a map have none"):
         atlas(maps.Logistic(4), "r=2 in:4 in:5", task=task)
     with pytest.raises(LimitsetsError, match="pass domain="):
-        atlas(maps.Logistic(4), "r=2:4:5", task=BLOCKS)
+        atlas(Tent(1.8), "slope=1.5:1.9:5", task=BLOCKS)
+
+
+def test_a_textbook_map_has_a_domain_of_its_own():
+    """The fixed point 1 - 1/r attracts at r = 2.5, a cycle of two at 3.25; the domain is told as if it were given."""
+    found = ls.atlas(maps.Logistic(2.0), "r=2.5:3.25:2")
+    assert found.dataset.period.values[:, 0].tolist() == [1, 2]
+    assert found.dataset.lowest.values[0, 0, 0] == pytest.approx(0.6, abs=1e-6)
+    assert found.to_json()["domain"] == {"lo": [[0.0]], "hi": [[1.0]]}
+    given = ls.atlas(maps.Logistic(2.0), "r=2.5:3.25:2", domain=[(0.0, 1.0)])
+    assert given.dataset.attrs["plan_hash"] == found.dataset.attrs["plan_hash"]
 
 
 def test_fields_of_sides_and_of_inner_tuples_vary_too():

@@ -298,7 +298,8 @@ def feed(
     prove : bool
         Whether to prove safety and progress.
     seconds : float
-        Finer cells than the first are tried in these proofs only if they are likely to be done in so many seconds.
+        Finer cells than the first are tried in these proofs only if they are likely to be done in so many seconds; the
+        first cut the noise into fewer pieces than 256 where it would take longer than this, and than 10 s.
     level : bool
         Whether to look for the level of the noise at which 95 % are fed rightly.
     trials : int, optional

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -33,8 +33,9 @@ from limitsets.proofs.prover.goals import State, hexed
 from limitsets.proofs.prover.goals.kind import above, below
 from limitsets.proofs.prover.goals.recurrent_orbits import Refutation, cycle_that, meets
 from limitsets.proofs.prover.goals.violating_orbits import one_throw
-from limitsets.proofs.prover.parameters import joined, parameter_box, scattered
+from limitsets.proofs.prover.parameters import ParameterBox, joined, parameter_box, scattered
 from limitsets.proofs.prover.proof import thrown_orbit
+from limitsets.systems.graph.images.enclosed import PIECES_OF_PARAMETER
 
 # ----------------------------------------------------------------
 # Proved brackets of what becomes of parts, throw by throw, beside the probabilities that are computed.
@@ -114,6 +115,12 @@ LADDER = (2048, 8192, 32768)
 # How much longer finer cells take than the ones before.
 FINER = 4.0
 
+# Pieces of what the noise lets vary: the most that the first cells can have done in time, and in no less than SOON [s].
+PIECES = (PIECES_OF_PARAMETER[1], 64, 16, 4)
+SOON = 10.0
+# On so many cells a side it is measured how long that takes.
+FEW = 64
+
 
 class FeedingProof(NamedTuple):
     """What is proved of feeding, and the cells on which.
@@ -158,7 +165,8 @@ def proved_feeding(
     noise : mapping of str to str, optional
         ``{"throw.speed": "0.3 %"}``: what may differ at every throw, as for `limitsets.certify`.
     seconds : float
-        Finer cells than the first are tried only if they are likely to be done in so many seconds from the start.
+        Finer cells than the first are tried only if they are likely to be done in so many seconds from the start.  The
+        first cut what the noise lets vary into fewer pieces where they would take longer, and longer than 10 s.
     progress : callable, optional
         Told (stage, done, all); the stage names the shares that are proved so far.
 
@@ -184,10 +192,11 @@ def proved_feeding(
     shown: tuple[State, ...] = ()
     never = Refutation()
     begin, proved = time.perf_counter(), ""
+    pieces = _pieces(box, cuts, seconds) if every else PIECES[0]
     for step, cells in enumerate(LADDER):
         began = time.perf_counter()
         tell(f"proof on {cells} cells a side{proved}", step, len(LADDER) + 2)
-        region = attraction(cover(box, cells, cuts))
+        region = attraction(cover(box, cells, cuts, pieces))
         paths = Paths.of(region, end)
         safe, fed = paths.safe(), paths.fed()
         if safe.verdict != "proved":
@@ -214,7 +223,24 @@ def proved_feeding(
             open_ = f"finer cells than {cells} a side were not tried: they would take more than {seconds:g} s"
             fed = replace(fed, reason="; ".join(filter(None, (fed.reason, open_))))
             break
+    if pieces < PIECES[0] and not (safe.verdict == fed.verdict == "proved"):
+        open_ = f"the noise was cut into {pieces} pieces, not {PIECES[0]}, which would take longer"
+        fed = replace(fed, reason="; ".join(filter(None, (fed.reason, open_))))
     return FeedingProof(safe, fed, region)
+
+
+def _pieces(box: ParameterBox, cuts: Mapping[int, Sequence[float]], seconds: float) -> int:
+    """Say into how many pieces the noise can be cut in time, by what a few cells take."""
+    if math.isinf(seconds):
+        return PIECES[0]
+    took = math.inf
+    for _ in range(2):  # the first run may compile
+        began = time.perf_counter()
+        cover(box, FEW, cuts)
+        took = min(took, (time.perf_counter() - began) * LADDER[0] / FEW)
+        if took <= max(seconds, SOON):
+            return PIECES[0]
+    return next((n for n in PIECES if took * n / PIECES[0] <= max(seconds, SOON)), PIECES[-1])
 
 
 # ----------------------------------------------------------------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -22,6 +22,8 @@ SERIES = 20
 MOST_THROWS = 20_000
 NEVER = FATES.index("never")
 
+# Parts thrown at once: Ctrl-C waits for one throw of all of them.
+BLOCK = 1 << 20
 # Parts thrown to find how many throws a part takes.
 PILOT = 200
 # Share of a_i within which a part that creeps to the joint is followed no farther.
@@ -49,7 +51,7 @@ class Trials:
     beyond: NDArray[np.bool_]
     seed: int
 
-    @property
+    @cached_property
     def counts(self) -> dict[str, int]:
         """How many met each fate."""
         return dict(zip(FATES, np.bincount(self.fate, minlength=len(FATES)).tolist(), strict=True))
@@ -140,18 +142,35 @@ def run_trials(
     -------
     Trials
     """
-    scene = end.scene
     random = np.random.Generator(np.random.Philox(seed))
-    many = ManyParts(scattering_map(scene, scatter, seed), *end.drawn(random, count))
+    params, creeping = scattering_map(end.scene, scatter, seed), creeping_below(end, scatter)
     fate = np.full(count, NEVER, dtype=np.int64)
     throws = np.full(count, MOST_THROWS, dtype=np.int64)
     beyond = np.zeros(count, dtype=bool)
-    waiting = np.arange(count)
-    a, right = scene.sides.a, scene.sides.right
-    creeping = creeping_below(end, scatter)
+    drawn = 0
+    for first in range(0, count, BLOCK):
+        here = slice(first, min(first + BLOCK, count))
+        many = ManyParts(params, *end.drawn(random, here.stop - first), drawn)
+        for waiting in _to_their_fates(end, many, creeping, fate[here], throws[here], beyond[here]):
+            if progress is not None:
+                progress("trials", here.stop - waiting, count)
+        drawn = many.drawn
+    return Trials(fate, throws, beyond, seed)
+
+
+def _to_their_fates(
+    end: ArmEnd,
+    many: ManyParts,
+    creeping: NDArray[np.float64],
+    fate: NDArray[np.int64],
+    throws: NDArray[np.int64],
+    beyond: NDArray[np.bool_],
+) -> Iterator[int]:
+    """Throw parts until each has met its fate, and fill in what is asked of each; before every throw, how many wait."""
+    waiting = np.arange(fate.size)
+    a, right = end.scene.sides.a, end.scene.sides.right
     for number in range(1, MOST_THROWS + 1):
-        if progress is not None:
-            progress("trials", count - waiting.size, count)
+        yield waiting.size
         edge = end.at_edge(many.x, many.side)
         code = many.throw()
         # a jog lands on the left corner of its side, a flip on the right corner of the next one
@@ -166,7 +185,6 @@ def run_trials(
         waiting = waiting[~done]
         if not waiting.size:
             break
-    return Trials(fate, throws, beyond, seed)
 
 
 # ----------------------------------------------------------------
@@ -233,10 +251,15 @@ class FedShares:
         """Share that is on the arm still after the last throw made."""
         return self.shares["never"]
 
+    @cached_property
+    def _ended(self) -> NDArray[np.int64]:
+        """How many have ended, by whatever fate, after each number of throws from 0 on."""
+        return np.cumsum(np.bincount(self.trials.throws[self.trials.fate < len(FATES) - 1], minlength=1))
+
     @property
     def ended(self) -> NDArray[np.float64]:
         """Share that has ended, by whatever fate, after each number of throws from 0 on."""
-        return np.concatenate([[0.0], np.cumsum(self.by_throw.sum(axis=1))])
+        return self._ended / self.trials.fate.size
 
     @property
     def mean_throws(self) -> float:
@@ -247,8 +270,7 @@ class FedShares:
     def quantile(self, share: float) -> int | None:
         """Throws after which `share` of all starts have ended; None where so many never do."""
         needed = math.ceil(share * self.trials.fate.size - 1e-9)
-        throws = np.sort(self.trials.throws[self.trials.fate < len(FATES) - 1])
-        return int(throws[needed - 1]) if 0 < needed <= throws.size else None
+        return int(np.searchsorted(self._ended, needed)) if 0 < needed <= self._ended[-1] else None
 
     def per_minute(self, throw_rate: float | None) -> float | None:
         """Parts fed rightly per minute where the next part starts as soon as one has ended; None if one never may."""

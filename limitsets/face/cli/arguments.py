@@ -12,7 +12,7 @@ from zipfile import BadZipFile, ZipFile
 
 from limitsets.base.errors import LimitsetsError
 from limitsets.base.proposals import proposed
-from limitsets.face.cli.output import saved, stem_of
+from limitsets.face.cli.output import refuse_other, saved, say_other, stem_of
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
@@ -143,16 +143,31 @@ def bounds_of(scene: Scene, words: list[str] | None) -> dict[str, tuple[float | 
 
 
 def own_file(scene: Scene) -> Path:
-    """Name a certificate after the scene's file; refuse to overwrite the certificate of another scene."""
-    file, name = Path(f"{stem_of(scene)}.proof.zip"), scene.name
-    with suppress(OSError, BadZipFile, ValueError, TypeError, LookupError), ZipFile(file) as other:
-        name = loads(other.read("header.json"))["boxes"][0]["scene"]["name"]
-    if name != scene.name:
-        raise LimitsetsError(
-            "the certificate", str(file), f"one of {scene.name}, or a new one",
-            f"it is one of {name}; name another with --out, or delete it",
-        )  # fmt: skip
+    """Name a certificate after the scene's file; a certificate of another scene that has this name stays."""
+    file = Path(f"{stem_of(scene)}.proof.zip")
+    if question := _question_of(file):
+        refuse_other("the certificate", file, question[0]["name"], scene)
     return file
+
+
+def _question_of(file: Path) -> tuple[Any, ...]:
+    """Read of which scene and of which deviations a certificate is; empty where there is none that says so."""
+    with suppress(OSError, BadZipFile, ValueError, TypeError, LookupError), ZipFile(file) as zipped:
+        header = loads(zipped.read("header.json"))
+        scene = header["boxes"][0]["scene"]
+        return scene | {"name": str(scene["name"])}, header.get("noise"), header.get("tolerance")
+    return ()
+
+
+def say_replaced(file: Path, draft: Path) -> None:
+    """Say that a certificate of other values or deviations gives way to a draft.
+
+    It may be the last that knows those values; not to replace it would be in the way of everyone who edits a scene and
+    proves again.  What differs is known once the new one is written, for both have one form then.
+    """
+    before, after = _question_of(file), _question_of(draft)
+    if before and after and before != after:
+        say_other("the certificate", file, before[0]["name"])
 
 
 def with_ending(file: Path) -> Path:
@@ -175,6 +190,7 @@ def certified(
         except DeniedError as error:
             kept = str(file.with_name(Path(error.file or "").name))
             return answer.denied(error.claims[claim]), {"file": kept, "denied": True, "recheck": None}
+        say_replaced(file, draft)
     seconds = time.perf_counter() - begin if recheck else None
     return answer, {"file": str(file), "denied": False, "recheck": seconds}
 

@@ -18,6 +18,7 @@ from limitsets.face.cli.arguments import (
     deviations,
     laid_ranges,
     own_file,
+    say_replaced,
     with_ending,
 )
 from limitsets.face.cli.output import Csv, Json, Out, Scene, Words, answer, option, progress, saved, table
@@ -83,6 +84,7 @@ def certify(
                     proof.save(draft, recheck=not no_recheck, workers=None)
                 except DeniedError as error:
                     proof, kept = proof.denied(error.claims), str(file.with_name(Path(error.file or "").name))
+            say_replaced(file, draft)
             seconds = None if no_recheck or not written else time.perf_counter() - begin
     records = [each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]
     place = file if written else None

@@ -51,7 +51,9 @@ HELP_SCATTER = (
     "Default: the scene's [world] scatter where [effects] has spread, else none."
 )
 HELP_TRIALS = "Parts thrown from random starts. Default: 100 000, fewer where that takes over 5e7 throws."
-HELP_SECONDS = "For the proofs: finer cells are tried only if they are likely to be done by then."
+HELP_SECONDS = (
+    "For the proofs: finer cells and pieces of the noise are tried only if likely to be done by then."
+)
 HELP_NO_LEVEL = (
     "Do not look for the noise at which 95 % are fed: most of the time that scattered trials take."
 )

@@ -170,6 +170,7 @@ HELP_TOLERANCE = "Of the joint margin, like throw.speed='1 %'; repeatable. Defau
 HELP_SCATTER = (
     "Noise at every throw, like throw.speed='0.5 %'; repeatable. Default: the scatter in the scene's [world]."
 )
+HELP_SECONDS = "For the proofs of the joint margin and of the curve; five times as many for the noise."
 HELP_WITHOUT = "What not to do: margins, joint, curve, noise or audit; repeatable."
 
 
@@ -189,9 +190,7 @@ def robustness(
     cells: Annotated[
         int, option("--cells", "N", "Cells per side, for the noise.", min=8, max=100_000)
     ] = 1024,
-    seconds: Annotated[
-        float, option("--seconds", "S", "For the proofs of the joint margin and of the curve.", min=0.0)
-    ] = 12.0,
+    seconds: Annotated[float, option("--seconds", "S", HELP_SECONDS, min=0.0)] = 12.0,
     workers: Annotated[
         int | None, option("--workers", "N", "Processes that search for margins; default: one a core.", min=1)
     ] = None,
@@ -251,7 +250,8 @@ def _text_of_sheet(given: SceneOf, sheet: Robustness, files: list[Any]) -> None:
     elif sheet.singles:
         typer.echo(none_holds(sheet))
         typer.echo(f"next: {without_margin(given, sheet.goals, fails=sheet.decided == 'refuted')}")
-    for part in dict.fromkeys(("joint", "curve", "noise", *sheet.failed)):
+    rests = ("rest of the curve", "rest of the noise")
+    for part in dict.fromkeys(("joint", "curve", "noise", *rests, *sheet.failed)):
         reason = sheet.left_out.get(part)
         if reason and reason != "it was not asked for":
             typer.echo(f"no {part}: {reason}")

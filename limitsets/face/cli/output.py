@@ -181,15 +181,23 @@ def _require_own(folder: Path, scene: SceneOf) -> None:
         record = {}
         with suppress(OSError, ValueError, TypeError, KeyError):
             record = dict(loads(file.read_text(encoding="utf-8"))["scene"])
-        if record and record.get("name") != scene.name:
-            raise LimitsetsError(
-                "the folder of the report", str(folder), f"one of {scene.name}, or a new one",
-                f"it holds that of {record.get('name')}; name another with --out, or delete it",
-            )  # fmt: skip
+        if record:
+            refuse_other("the report", folder, str(record.get("name")), scene)
         if record and record != scene.as_dict():
-            said = f"limitsets: {folder} holds the report of {scene.name} with other values: it is replaced"
-            print(said, file=sys.stderr)
+            say_other("the report", folder, scene.name)
             return
+
+
+def refuse_other(what: str, place: Path, name: str, scene: SceneOf) -> None:
+    """Refuse a place that holds what is of a scene of another name."""
+    if name != scene.name:
+        remedy = f"it is of {name}; name another with --out, or delete it"
+        raise LimitsetsError(f"the place of {what}", str(place), f"one of {scene.name}, or a new one", remedy)
+
+
+def say_other(what: str, place: Path, name: str) -> None:
+    """Say that what is of other values of this scene is replaced: whoever edits a scene wants the new answer."""
+    print(f"limitsets: {place}: {what} of {name} with other values is replaced", file=sys.stderr, flush=True)
 
 
 @contextmanager
@@ -283,11 +291,18 @@ def show_scene(scene: SceneOf, files: list[Path], about: About | None) -> None:
 class _Interrupts:
     """Remember Ctrl-C: an exception raised inside a callback from foreign C code may be lost.
 
-    The next step of progress raises it again, so that no file is replaced after Ctrl-C.
+    The next step raises it again, so that no file is replaced after it; an error that comes of it is it, and Python's
+    words on what was lost are not shown.
     """
 
     def __init__(self) -> None:
         self.pressed = False
+        self.told_before = sys.unraisablehook
+
+    def lost(self, found: sys.UnraisableHookArgs) -> None:
+        """Hear of an exception that could not be raised."""
+        if not self.pressed:
+            self.told_before(found)
 
     def __call__(self, *_: object) -> None:
         self.pressed = True
@@ -326,6 +341,7 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
     )
     if ours:
         signal.signal(signal.SIGINT, interrupts)
+        sys.unraisablehook = interrupts.lost
     try:
         with bar() as shown:
 
@@ -338,7 +354,11 @@ def progress() -> Iterator[Callable[[str, int, int], None]]:
         if notes := getattr(error, "__notes__", ()):
             raise InterruptedRun("; ".join(notes)) from None
         raise
+    except Exception:
+        interrupts.check()
+        raise
     finally:
         if ours:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+            sys.unraisablehook = interrupts.told_before
     interrupts.check()

@@ -354,14 +354,18 @@ def _drawn(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
 
 
 def _noise(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
-    """Draw the noise: there is no density if no part stays, and no number of throws if no part is fed."""
+    """Draw the noise: there is no density if no part stays, and no number of throws if no part is fed.
+
+    Of a single level, where there was no time for others, there is nothing to see.
+    """
     if sheet.noise is None or sheet.levels is None:
         return
     if sheet.noise.classes:
         yield "density", plot.noise_density(sheet.noise)
     if sheet.noise.feeding.mean is not None:
         yield "throws", plot.noise_arrivals(sheet.noise)
-    yield "levels", plot.noise_levels(sheet.levels, {"level of the noise, as given = 1": 1.0})
+    if sheet.levels.factors.size > 1:
+        yield "levels", plot.noise_levels(sheet.levels, {"level of the noise, as given = 1": 1.0})
 
 
 def write_robustness(

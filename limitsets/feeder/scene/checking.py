@@ -124,10 +124,34 @@ def _rows(scene: Scene) -> Iterator[Row]:
         elif deviation.relative or name != "gravity.tilt" or "tilt" in text["gravity"]:
             share = deviation.value if deviation.relative else deviation.value / abs(scene.value(name))
             yield key, given, share, 0.0, 0.5, "{} times the value itself", "below 0.1 times"
-    if "throw_rate" in text.get("world", {}):
-        rate = scene.world.more["throw_rate"]
-        given, said = text["world"]["throw_rate"], "{} throws a second"
-        yield "world.throw_rate", given, rate, 0.01, 20.0, said, "0.1 to 10"
+    scatter = scene.world.scatter
+    speed = None if scatter is None else scatter.speed
+    # a throw given by kappa without gravity has no speed
+    if speed is not None and (speed.relative or scene.gravity is not None):
+        share = speed.value if speed.relative else speed.value / scene.value("throw.speed")
+        said, given = "{} times the speed itself", text["world"]["scatter"]["speed"]
+        yield "world.scatter.speed", given, share, 0.0, 0.2, said, "below 0.03 times"
+    if scatter is not None and scatter.landing is not None:
+        given = text["world"]["scatter"]["landing"]
+        yield (
+            "world.scatter.landing",
+            given,
+            scatter.landing.value / size,
+            0.0,
+            0.25,
+            over,
+            "below 0.05 times",
+        )
+    # what a fact of the world is measured in, and what is believed of it
+    facts = {
+        "friction": (1.0, 0.0, 3.0, "a coefficient of {}", "0.1 to 1"),
+        "bounce_threshold": (size, 0.0, 0.25, over, "below 0.05 times"),
+        "throw_rate": (1.0, 0.01, 20.0, "{} throws a second", "0.1 to 10"),
+    }
+    for name, (one, least, most, said, usual) in facts.items():
+        if name in text.get("world", {}):
+            given, measured = str(text["world"][name]), getattr(scene.world, name) / one
+            yield f"world.{name}", given, measured, least, most, said, usual
 
 
 def _in_words(scene: Scene, word: str, turned: float) -> float:

@@ -46,16 +46,17 @@ _PLAIN_SIGNS = str.maketrans(
 
 _SHARES_OF_PI = {"deg": Fraction(1, 180), "deg/s": Fraction(1, 180), "rpm": Fraction(1, 30)}
 
+# In millimetres and in inches, for a scene has either.
 _EXAMPLES = {
-    "length": "5.75 in",
-    "angle": "30 deg",
-    "angular speed": "158 deg/s",
-    "acceleration": "193.045 in/s^2",
-    "mass": "20 g",
-    "mass per area": "1.5 kg/m^2",
-    "mass per volume": "7850 kg/m^3",
-    "frequency": "2 Hz",
-    "share": "1 %",
+    "length": '"146 mm" or "5.75 in"',
+    "angle": '"30 deg"',
+    "angular speed": '"158 deg/s"',
+    "acceleration": '"4900 mm/s^2" or "193 in/s^2"',
+    "mass": '"20 g"',
+    "mass per area": '"1.5 kg/m^2"',
+    "mass per volume": '"7850 kg/m^3"',
+    "frequency": '"2 Hz"',
+    "share": '"1 %"',
 }
 
 # What people write instead: how much of which unit one of it is.
@@ -71,8 +72,9 @@ _OTHER_NAMES = {
     "rad/min": "1/60 rad/s",
     "oz": "28.349523125 g",
     "ug": "1/1000000 g",
-    **dict.fromkeys(("hz", "/s", "1/s"), "1 Hz"),
-    **dict.fromkeys(("/min", "1/min"), "1/60 Hz"),
+    **dict.fromkeys(("hz", "/s", "1/s", "throws/s"), "1 Hz"),
+    **dict.fromkeys(("/min", "1/min", "throws/min"), "1/60 Hz"),
+    **dict.fromkeys(("rev", "turn", "turns"), "360 deg"),
     **dict.fromkeys(("meter", "metre", "meters", "metres"), "1 m"),
     **dict.fromkeys(("inch", "inches", '"'), "1 in"),
     **dict.fromkeys(("foot", "feet"), "1 ft"),
@@ -85,11 +87,23 @@ _OTHER_NAMES = {
     **dict.fromkeys(("tonne", "tonnes", "Mg"), "1 t"),
     **dict.fromkeys(("g/cc", "g/ml", "kg/l", "kg/dm^3"), "1 g/cm^3"),
 }
+# What people write for a rate of throws: the time from one to the next [s].
+_PERIODS = {"s": Fraction(1), "ms": Fraction(1, 1000), "min": Fraction(60)}
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?"
 _QUANTITY = re.compile(rf"({_NUMBER})(?: +|(?=[%\u00b0]))([^\s].*)")
 _SMALLEST, _LARGEST = 1e-300, 1e12
 
 _PI = Fraction("3.1415926535897932384626433832795028841971693993751")
+
+# Of a dimension that is wanted and a unit of another that is plainly read as one of it: when, the factor, the unit.
+_EACH_TURN = "if each turn throws once"
+_READ_AS = {
+    ("frequency", "rpm"): (_EACH_TURN, Fraction(1, 60), "Hz"),
+    ("frequency", "deg/s"): (_EACH_TURN, Fraction(1, 360), "Hz"),
+    ("frequency", "rad/s"): (_EACH_TURN, Fraction(1, 2) / _PI, "Hz"),
+    ("angular speed", "Hz"): ("if it counts turns", Fraction(60), "rpm"),
+    ("acceleration", "g"): ("if it is that of free fall", Fraction("9.80665"), "m/s^2"),
+}
 
 # Sizes in m, kg, rad and s, by what the units measure; a test compares quotients of them with those of pint.
 _SIZES_BY_KIND: dict[str, dict[str, str | Fraction]] = {
@@ -159,7 +173,7 @@ def parse(
         return SceneError(f"this {dimension}", value, allowed, remedy, key=key, file=file)
 
     if not isinstance(text, str):
-        raise refuse(shown(text), f'write it as text with its unit, like "{example}"')
+        raise refuse(shown(text), f"write it as text with its unit, like {example}")
     if len(text) > LONGEST:
         raise refuse(shown(text), "shorten it")
     match = _QUANTITY.fullmatch(text.strip(" "))
@@ -191,16 +205,16 @@ def _is_zero(number: str) -> bool:
 def _why_no_quantity(text: str, dimension: str) -> str:
     example = _EXAMPLES[dimension]
     if "," in text:
-        return f'write the decimal point as a point and leave no commas, like "{example}"'
+        return f"write the decimal point as a point and leave no commas, like {example}"
     if re.fullmatch(_NUMBER, text.strip()):
-        return f'add the unit, like "{example}"'
+        return f"add the unit, like {example}"
     close = re.fullmatch(rf"({_NUMBER})([a-zA-Z\u00b5\u03bc]\S*)", text.strip(" "))
     if close is not None:
         return f'put a space between number and unit: "{close[1]} {close[2]}"'
     rate = re.fullmatch(rf"({_NUMBER})(/[a-z]+)", text.strip(" "))
     if rate is not None and dimension == "frequency" and fits(float(rate[1])):
         return _why_not_unit(rate[1], rate[2], dimension)
-    return f'write one finite decimal number, a space and the unit, like "{example}"'
+    return f"write one finite decimal number, a space and the unit, like {example}"
 
 
 def _why_not_unit(number: str, unit: str, dimension: str) -> str:
@@ -211,7 +225,14 @@ def _why_not_unit(number: str, unit: str, dimension: str) -> str:
     size, name = _in_known_unit(unit)
     for other, units in UNITS.items():
         if name in units and other != dimension:
-            return f"{unit} is a unit of {other}: the dimension is wrong"
+            if (dimension, name) not in _READ_AS:
+                return f"{unit} is a unit of {other}: the dimension is wrong"
+            words, factor, own = _READ_AS[dimension, name]
+            value = float(Fraction(number) * size * factor)
+            return f'{unit} is a unit of {other}: {words}, write "{value:.15g} {own}"'
+    if dimension == "frequency" and unit in _PERIODS and not _is_zero(number):
+        rate = 1 / (Fraction(number) * _PERIODS[unit])
+        return f'{unit} is a unit of time: if it is that from throw to throw, write "{float(rate):.15g} Hz"'
     if not name:
         return f"the unit {unit!r} is not known; convert the value to one of these"
     if size == 1:

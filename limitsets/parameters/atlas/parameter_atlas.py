@@ -14,7 +14,7 @@ import numpy as np
 
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.campaign import Progress, Work, chosen_pool, drive, imported
-from limitsets.base.errors import LimitsetsError
+from limitsets.base.errors import LimitsetsError, MapError
 from limitsets.base.files import as_plain, locked
 from limitsets.base.progress import shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled
@@ -25,8 +25,8 @@ from limitsets.parameters.atlas.plan import Plan, chunk_shape, code_of, named, r
 from limitsets.parameters.atlas.store import CHECKSUM, SEAL, Store
 from limitsets.parameters.atlas.subjects import Axis, MapSubject, SceneSubject, Subject, axis_of
 from limitsets.parameters.atlas.work import STEP, answer
-from limitsets.systems.cells import as_domain
-from limitsets.systems.maps import coerce, kind_of
+from limitsets.systems.cells import Domain, as_domain
+from limitsets.systems.maps import coerce, domain_of, kind_of
 from limitsets.systems.maps.contract import require_dimension
 
 if TYPE_CHECKING:
@@ -271,7 +271,7 @@ def atlas(
     options : mapping, optional
         Keyword arguments of the task.
     domain : Domain or array_like, optional
-        Of a map, for tasks that need one; see `limitsets.grid`.
+        Of a map, for tasks that need one; see `limitsets.grid`.  Textbook maps have one of their own.
     chunk : sequence of int, optional
         Points of a chunk along y and x (or x); chosen by the number of points otherwise.
     seed : int
@@ -392,10 +392,19 @@ def _subject(subject: Any, domain: Any) -> Subject:
             )
         return SceneSubject(subject)
     kind_of(subject)
-    box = None if domain is None else as_domain(domain)
+    chosen = coerce(subject)
+    box = _own_domain(chosen) if domain is None else as_domain(domain)
     if box is not None:
         require_dimension(subject, "domain", box.dimension)
-    return MapSubject(coerce(subject), box)
+    return MapSubject(chosen, box)
+
+
+def _own_domain(params: Any) -> Domain | None:
+    """Give the domain of a textbook map; other maps have none of their own."""
+    try:
+        return as_domain(domain_of(params))
+    except MapError:
+        return None
 
 
 def _work(plan: Plan) -> Work:

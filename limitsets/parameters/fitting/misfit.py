@@ -140,9 +140,13 @@ def _cleared(residual: Array, slopes: Array) -> Array:
 
 def _ratio(z: Array) -> Array:
     """Logarithm of the likelihood ratio, the largest over share and width; shape (m,)."""
-    share, wide = (each.reshape(-1, 1, 1) for each in np.meshgrid(SHARES, WIDER))
-    gain = np.exp(np.minimum(0.5 * z**2 * (1.0 - 1.0 / wide**2), 700.0)) / wide
-    ratio: Array = np.log1p(share * (gain - 1.0)).sum(axis=2).max(axis=0)
+    ratio = np.full(z.shape[0], -np.inf)
+    for wide in WIDER:
+        gain = np.exp(np.minimum(0.5 * z**2 * (1.0 - 1.0 / wide**2), 700.0)) / wide
+        for (
+            share
+        ) in SHARES:  # one at a time: all at once hold a Ctrl-C back, and take gigabytes for long films
+            ratio = np.maximum(ratio, np.log1p(share * (gain - 1.0)).sum(axis=1))
     return ratio
 
 

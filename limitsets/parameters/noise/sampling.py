@@ -121,10 +121,10 @@ def _scale(law: Any) -> float:
 
 
 class ManyParts:
-    """Parts under way; every throw of every part draws numbers of its own."""
+    """Parts under way; every throw of every part draws numbers of its own, the first the one after `drawn` others."""
 
-    def __init__(self, params: Any, x: NDArray[np.float64], side: NDArray[np.int64]) -> None:
-        self.params, self.x, self.side, self.drawn = params, x, side, 0
+    def __init__(self, params: Any, x: NDArray[np.float64], side: NDArray[np.int64], drawn: int = 0) -> None:
+        self.params, self.x, self.side, self.drawn = params, x, side, drawn
 
     def throw(self) -> NDArray[np.int64]:
         """Throw each once; what happened to them."""

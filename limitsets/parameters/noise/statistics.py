@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -242,6 +243,12 @@ def _differences(problem: ChainProblem, noise: Scattering, name: str, step: floa
 
 CELLS = 1024
 
+# Levels of the noise.
+FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)
+
+# What the derivatives by one quantity take: four solutions on all cells, two on half as many.
+OF_SLOPES = 5.0
+
 Progress = Callable[[str, int, int], None]
 
 
@@ -280,9 +287,9 @@ class NoiseStatistics(ChainSolution, Tabled):
         The answers in numbers, nan where there is none; see the notes.
     errors : dict of str to float
         How much each changes from half as many cells and from half as many strata: an estimate of the error, on the
-        safe side as long as it falls with their width.
+        safe side as long as it falls with their width; empty where there was no time for it.
     sensitivity : dict of str to dict of str to LevelSensitivity
-        By quantity, then by number.
+        By quantity, then by number; without the quantities that there was no time for.
     how : str
         "sampled".
 
@@ -357,6 +364,7 @@ def noise_statistics(
     strata: int = STRATA,
     offset: float | None = None,
     sensitivity: bool = True,
+    seconds: float = math.inf,
     progress: Progress | None = None,
 ) -> NoiseStatistics:
     """Find what noise makes of a scene, by the transfer operator.
@@ -377,6 +385,9 @@ def noise_statistics(
         How far beyond a_i random starts begin; by default a twentieth of the arm [length].
     sensitivity : bool
         Compute the derivatives with respect to the noise of each quantity: six more solutions for each.
+    seconds : float
+        Errors, then the derivatives by each quantity, are begun only if they are likely to be done by then; the first
+        solution takes what it takes.
     progress : callable, optional
         Told (stage, done, all).
 
@@ -405,12 +416,16 @@ def noise_statistics(
     names = noise.given() if sensitivity else ()
     stages = 3 + 6 * len(names)
     tell = progress or (lambda stage, done, total: None)
+    begin = time.perf_counter()
     tell("noise", 0, stages)
     solution = solve(problem, noise)
+    once, end = time.perf_counter() - begin, begin + seconds
     tell("noise", 1, stages)
-    errors = errors_of(problem, noise, solution.numbers)
+    errors = errors_of(problem, noise, solution.numbers) if time.perf_counter() + once <= end else {}
     slopes = {}
     for number, name in enumerate(names):
+        if time.perf_counter() + OF_SLOPES * once > end:
+            break
         tell("noise", 3 + 6 * number, stages)
         slopes[name] = slopes_of(problem, noise, name)
     tell("noise", stages, stages)
@@ -429,11 +444,12 @@ def noise_levels(
     scene: Scene | str,
     scatter: Scattering | None = None,
     *,
-    factors: Sequence[float] = (0.0, 0.5, 1.0, 1.5, 2.0),
+    factors: Sequence[float] = FACTORS,
     goal: Any = None,
     cells: int = CELLS,
     strata: int = STRATA,
     offset: float | None = None,
+    seconds: float = math.inf,
 ) -> Levels:
     """Find the numbers of `noise_statistics` at several levels of the noise; parameters as there.
 
@@ -441,10 +457,19 @@ def noise_levels(
     ----------
     factors : sequence of float
         Factors on all deviations; 0 is the throw without noise.
+    seconds : float
+        None but the first is begun for which less is left than the dearest before took.
     """
+    end, dearest = time.perf_counter() + seconds, 0.0
     problem = chain_problem_of(scene, goal, cells, strata, offset)
     noise = scattering_of(problem.scene) if scatter is None else scatter
-    rows = [solve(problem, noise.scaled(float(factor))).numbers for factor in factors]
+    rows: list[dict[str, float]] = []
+    for factor in factors:
+        begin = time.perf_counter()
+        if rows and begin + dearest > end:
+            break
+        rows.append(solve(problem, noise.scaled(float(factor))).numbers)
+        dearest = max(dearest, time.perf_counter() - begin)
     names = {name: None for row in rows for name in row}
     table = {name: np.array([row.get(name, math.nan) for row in rows]) for name in names}
-    return Levels(np.array(factors, dtype=np.float64), table)
+    return Levels(np.array(factors[: len(rows)], dtype=np.float64), table)

@@ -31,6 +31,7 @@ from limitsets.parameters.margins.margin_result import failure, reach_of
 from limitsets.parameters.margins.single import GoalLike, MarginsBeyond, goals_of, margin
 from limitsets.parameters.noise.statistics import (
     CELLS,
+    FACTORS,
     Levels,
     NoiseStatistics,
     noise_levels,
@@ -54,8 +55,8 @@ NO_NOISE = (
 )
 NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reaches"
 
-# For the proofs, and of what is left the share for the joint margin.
-SECONDS, FOR_JOINT = 12.0, 0.5
+# For the proofs; of what is left the share for the joint margin; how many times as many for the noise.
+SECONDS, FOR_JOINT, FOR_NOISE = 12.0, 0.5, 5.0
 
 Progress = Callable[[str, int, int], None]
 
@@ -181,9 +182,25 @@ class _SheetRun:
             self.tell("noise", done / of)
 
         with self.step("noise"):
-            statistics = noise_statistics(scene, noise, goal=place, cells=cells, progress=told)
+            seconds = FOR_NOISE * self.seconds
+            end = time.perf_counter() + seconds
+            statistics = noise_statistics(
+                scene, noise, goal=place, cells=cells, seconds=seconds, progress=told
+            )
         with self.step("noise at other levels"):
-            levels = noise_levels(scene, noise, goal=place, cells=max(cells // 2, 1))
+            seconds = max(end - time.perf_counter(), 0.0)
+            levels = noise_levels(scene, noise, goal=place, cells=max(cells // 2, 1), seconds=seconds)
+        late = [] if statistics.errors else ["how its numbers change on halving"]
+        late += [
+            f"what more noise of {name} changes"
+            for name in noise.given()
+            if name not in statistics.sensitivity
+        ]
+        if beyond := FACTORS[levels.factors.size :]:
+            late.append(f"noise {' and '.join(f'{factor:g}' for factor in beyond)} times as large")
+        if late:
+            words = f"there was no time for {', '.join(late)}; more seconds take them along"
+            self.left_out["rest of the noise"] = words
         return statistics, levels
 
 
@@ -288,8 +305,9 @@ def robustness(
     leave_out : sequence of str
         Which of "margins", "joint", "curve", "noise" and "audit" not to do.
     seconds : float
-        Shared by the proof of the joint margin and those of the curve: what they prove by then counts.  The margins of
-        single quantities, the noise and the audit take what they take.
+        Shared by the proof of the joint margin and those of the curve: what they prove by then counts.  The noise has
+        five times as many: no solution but its first is begun that is likely to end later, and `left_out` says which
+        were not.  The margins of single quantities and the audit take what they take.
     folder : str or Path, optional
         Margins are written there as they are found, with their certificates, and found again by the next run.
     recheck : bool

@@ -18,6 +18,7 @@ from limitsets.systems.cells import Grid
 from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.components import reach
 from limitsets.systems.graph.images.enclosed import BOTH, NOTHING, BoxImages
+from limitsets.systems.graph.ranges import RUN, SIDE
 from limitsets.systems.maps import codes, images
 from limitsets.systems.sets.attracting import Attractor
 
@@ -354,12 +355,15 @@ def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | N
     """Say from how many starts a recurrent set that is not closed can be reached, and what to do."""
     if not lasting:
         return None
-    marks = np.zeros(graph.n_cells, dtype=np.uint8)
-    for cells in lasting:
-        marks[cells] = 1
-    weight = graph.grid.measure
-    share = float(weight[reach(graph.ranges, graph.components(), marks) > 0].sum() / weight.sum())
+    share = _share_reaching(graph, np.concatenate(lasting))
     reached = f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached"
+    spread = _share_reaching(graph, _spread_over_a_side(graph))
+    if spread:
+        return (
+            f"{reached}, from {100 * spread:.3g} % a cell whose enclosed image is a whole side: the map jumps there "
+            "within a branch (a floor), and finer cells decide few more starts; give it one branch before the jump and "
+            "one after it (docs/own_map.md), or sample the images: limitsets.transitions(map, grid)"
+        )
     coarse = "an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
     if max(map(len, lasting)) <= MOST_OF_A_CYCLE:
         return f"{reached}, an unstable cycle or {coarse}"
@@ -367,3 +371,20 @@ def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | N
         f"{reached}, a chaotic repeller or {coarse}; near a repeller they decide few more starts, sample the shares: "
         "limitsets.resilience.basin_stability(graph, found, starts=10000)"
     )
+
+
+def _share_reaching(graph: TransitionGraph, cells: NDArray[np.integer]) -> float:
+    """Share of the starts from which some of the cells can be reached."""
+    marks = np.zeros(graph.n_cells, dtype=np.uint8)
+    marks[cells] = 1
+    weight = graph.grid.measure
+    return float(weight[reach(graph.ranges, graph.components(), marks) > 0].sum() / weight.sum())
+
+
+def _spread_over_a_side(graph: TransitionGraph) -> NDArray[np.integer]:
+    """Cells on a line of which one enclosed image is a whole side."""
+    if graph.method != "boxes" or graph.grid.dimension > 1:
+        return np.zeros(0, dtype=np.int64)
+    box, shape = graph.ranges.box, graph.grid.shape
+    whole = box[:, RUN] == shape[box[:, SIDE], 0]
+    return np.searchsorted(graph.ranges.first, np.flatnonzero(whole), side="right") - 1

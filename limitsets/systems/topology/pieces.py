@@ -19,6 +19,8 @@ MOST_STEPS, CLOSE = 100, 1e-15
 # A dip is followed where a parabola through three samples comes below this share of the lowest.
 FOLLOWED = 0.75
 MARGIN, SLOPE, CODE = 0, 1, 2
+# A step of the image across one such bracket that is longer, in brackets, is a jump.
+JUMP = 1e6
 
 
 @kernel
@@ -93,6 +95,25 @@ def _bottom(here: Any, side: int, branch: int, what: int, a: float, m: float, b:
     return float("nan")
 
 
+@kernel(entry=True, counting=False)
+def _jump(
+    here: Any, side: int, branch: int, a: float, b: float, rising: bool, close: float
+) -> tuple[float, float]:
+    """Return both sides of a jump against the slope, as a floor makes one; nan where there is none between a and b."""
+    sign = 1.0 if rising else -1.0
+    y_a, y_b = image_on(here, a, side, branch)[0], image_on(here, b, side, branch)[0]
+    while sign * y_b < sign * y_a and b - a > close:
+        x = 0.5 * (a + b)
+        y = image_on(here, x, side, branch)[0]
+        if sign * y < sign * y_a:
+            b, y_b = x, y
+        else:
+            a, y_a = x, y
+    if sign * (y_a - y_b) > JUMP * close:
+        return a, b
+    return float("nan"), float("nan")
+
+
 @kernel
 def _dips(left: float, here: float, right: float) -> bool:
     """Whether three values of one sign may hide a zero beside the middle: by the parabola through them."""
@@ -143,6 +164,11 @@ def _cuts(here: Any, side: int, decided: bool, close: float, s: Samples) -> int:
         elif branch >= 0 and (s.slope[j] > 0.0) != (s.slope[j + 1] > 0.0):
             s.cuts[n] = _change(here, side, branch, SLOPE, a, b, s.slope[j], s.slope[j + 1], close)
             n += 1
+        elif branch >= 0 and s.margin[j] == s.margin[j + 1]:  # no number tells where the image jumps
+            left, right = _jump(here, side, branch, a, b, s.slope[j] > 0.0, close)
+            if left < right:  # what lies between is too short for a piece
+                s.cuts[n], s.cuts[n + 1] = left, right
+                n += 2
         if j == 0 or branch < 0 or s.branch[j - 1] != branch or s.branch[j + 1] != branch:
             continue
         for what in range(2):

@@ -311,6 +311,10 @@ def enclosures(
         below, above = _cut(tuple(x[rest] for x in lo), tuple(x[rest] for x in hi), parts)
         owner = np.repeat(rest, parts ** len(axes))
         for one, two in _parameter_pieces(map, upper, pieces or PIECES_OF_PARAMETER[len(axes)]):
+            if lost[rest].any():  # the other parameters tell nothing of what is lost
+                kept = ~lost[owner]
+                below, above = (tuple(x[kept] for x in corner) for corner in (below, above))
+                rest, owner = rest[~lost[rest]], owner[kept]
             part = BoxImages(one, two, side, below, above)
             lost[owner[part.count == NOTHING]] = True
             hulls.join(part, part.count != NOTHING, 0, rest)
