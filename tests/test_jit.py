@@ -204,7 +204,7 @@ ANSWERS = {
 # Edits (folder, file, old text, new text), and the answers after them.
 EXP = "(1.0 + (r + r * r * tail))"
 EDITS = [
-    ("maps", "textbook/exponential.py", EXP, EXP.replace("1.0", "3.0")),
+    ("maps", "textbook/shared.py", EXP, EXP.replace("1.0", "3.0")),
     ("maps", "textbook/henon.py", "    a: float = 1.4\n    b: float", "    b: float = 1.4\n    a: float"),
     ("user", "helper.py", "x + params.size", "x - params.size"),
     ("user", "deeper.py", "10.0 * size", "20.0 * size"),
@@ -229,17 +229,18 @@ class Place:
 
     def __init__(self, folder: Path) -> None:
         self.copy, self.user, self.cache = folder / "copy", folder / "user", folder / "cache"
-        self.maps = self.copy / "limitsets" / "maps"
+        self.maps = self.copy / "limitsets" / "systems" / "maps"
 
     def fill(self) -> None:
-        source = Path(limitsets.__file__).parent
-        for room in ("jit", "interval", "maps"):  # the box kernels of the maps stand on the rooms below
-            shutil.copytree(
-                source / room, self.maps.parent / room, ignore=shutil.ignore_patterns("__pycache__")
-            )
-        for file in source.glob("[!_]*.py"):  # what stands beside the rooms, for all of them
-            shutil.copy(file, self.maps.parent / file.name)
-        (self.maps.parent / "__init__.py").write_text("from limitsets.maps import register\n")
+        source, copy = Path(limitsets.__file__).parent, self.copy / "limitsets"
+        for part in (
+            "base",
+            "numbers",
+            "systems/maps",
+        ):  # the box kernels of the maps stand on the wings below
+            shutil.copytree(source / part, copy / part, ignore=shutil.ignore_patterns("__pycache__"))
+        (copy / "systems" / "__init__.py").touch()
+        shutil.copy(source / "__init__.py", copy / "__init__.py")
         (self.maps / "probe.py").write_text(PROBE)
         self.user.mkdir()
         for name, text in USER_FILES.items():
@@ -313,8 +314,8 @@ def place(folder: Path, life: dict[str, Any], tmp_path: Path) -> Place:
 
 
 def test_an_edit_of_a_room_without_kernels_keeps_the_code(place: Place) -> None:
-    room = place.maps.parent / "plot"
-    room.mkdir()
+    room = place.maps.parents[1] / "face" / "plot"
+    room.mkdir(parents=True)
     (room / "colours.py").write_text("RED = 1\n")
     assert place.run(PACKAGE_ALONE)["leslie"] == [ANSWERS["leslie"], 1]
 

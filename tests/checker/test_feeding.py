@@ -188,14 +188,14 @@ def test_what_lands_before_the_first_cell_is_thrown_on(made_up):
     quiet, near, back = 400, 9, int(np.flatnonzero(c.rank >= 0)[0])
     c.jog[:], c.flip[:] = quiet, -1
     c.jog[near], c.jog[0], c.rank[0] = int(c.start[1]) - 1, [0, 0], -1
-    bad, gaps = checker.arm_end.unsafe_starts(checker.arm_end.arm_end(c, scene), scene, 2)
+    bad, gaps = checker.feeding.unsafe_starts(checker.feeding.arm_end(c, scene), scene, 2)
     # parts of side 0 fall from cell 0 to before it, and are thrown from there to cells up to 0.02 in beyond its border
     assert c.edges[0][near] - c.edges[0][0] < 0.02
     assert gaps == [True, False, False]
     assert np.flatnonzero(bad).tolist() == [0, near]
     c.jog[near] = quiet
     c.jog[back + 200] = int(c.start[1]) - 1  # too far from the first border
-    bad, gaps = checker.arm_end.unsafe_starts(checker.arm_end.arm_end(c, scene), scene, 2)
+    bad, gaps = checker.feeding.unsafe_starts(checker.feeding.arm_end(c, scene), scene, 2)
     assert not any(gaps)
     assert np.flatnonzero(bad).tolist() == [back + 200]
 
@@ -206,9 +206,9 @@ def test_what_may_leave_does_not_arrive(made_up):
     c.jog[:], c.flip[:], c.rank[:] = int(c.start[3]) - 5, -1, 0
     c.jog[40], c.rank[40] = [0, 0], -1
     c.jog[50] = 40
-    end = checker.arm_end.arm_end(c, scene)
-    assert np.flatnonzero(checker.arm_end.late_within(end, 9)).tolist() == [40, 50]
-    assert np.flatnonzero(checker.arm_end.cells_that_may_leave(end)).tolist() == [40, 50]
+    end = checker.feeding.arm_end(c, scene)
+    assert np.flatnonzero(checker.feeding.late_within(end, 9)).tolist() == [40, 50]
+    assert np.flatnonzero(checker.feeding.cells_that_may_leave(end)).tolist() == [40, 50]
 
 
 # ------------------------------------------------------------------------------ what is denied

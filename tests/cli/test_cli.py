@@ -360,7 +360,7 @@ def test_a_full_disk():
 
 
 @pytest.mark.parametrize(
-    "module", ["limitsets.cli", "limitsets.face.cli.app", "typer", "limitsets.face.cli.output"]
+    "module", ["limitsets.face.cli", "limitsets.face.cli.app", "typer", "limitsets.face.cli.output"]
 )
 def test_ctrl_c_while_the_package_is_imported(module):
     """A finder sends the signal where the module is asked for."""

@@ -40,7 +40,7 @@ def chain_of(speed, landing, strata, tmp_path):
         strata=strata,
     )
     path = forged.write(tmp_path / "x.proof.zip")
-    claim = of_checker("chances").read_chances(*checker.report.open_and_look(path))
+    claim = of_checker("brackets").read_chances(*checker.report.open_and_look(path))
     whole = of_checker("brackets").mesh_of(claim.edges)
     kinds, absorbed = of_checker("brackets").kinds_of(claim, whole)
     chain = of_checker("links").chain_of(claim.noisy, whole, kinds, absorbed, lambda more: None)

@@ -170,7 +170,7 @@ def good(tmp_path_factory):
     """The certificate that claims what the checker finds, and no more."""
     with flint.ctx.workprec(checker.balls.PRECISION):
         chances, module, links = (
-            sys.modules[f"{checker.__name__}.{name}"] for name in ("chances", "brackets", "links")
+            sys.modules[f"{checker.__name__}.{name}"] for name in ("brackets", "brackets", "links")
         )
         claim = chances.read_chances(*entries_of(noisy(), tmp_path_factory.mktemp("probabilities")))
         whole = module.mesh_of(claim.edges)

@@ -716,7 +716,7 @@ def test_a_file_that_is_not_there(tmp_path):
 
 
 def test_text_of_a_stranger_is_cleaned():
-    assert checker.texts.plain("a\x1b[31mb\u202ec\nd") == "a?[31mb?c?d"
+    assert checker.file.plain("a\x1b[31mb\u202ec\nd") == "a?[31mb?c?d"
 
 
 # ------------------------------------------------------------------------------------------------ scenes and numbers
@@ -788,7 +788,7 @@ def test_a_plate_of_some_thickness_in_small_units():
         {"plate_density": "1 g/cm^3", "plate_thickness": "-1 mm"},
     ):
         raw["part"]["mass"] = {**wrong, "points": [point]}
-        with pytest.raises(checker.texts.BadFileError):
+        with pytest.raises(checker.file.BadFileError):
             checker.scene.read_scene(raw, None)
 
 
@@ -805,7 +805,7 @@ def test_turns_per_minute_are_multiples_of_pi_as_degrees_are():
     scene = checker.scene.read_scene(raw | {"throw": {"speed": "15 rpm"}}, {"throw.speed": "0.15 rpm"})
     assert abs(scene.k_lo - want / arb("1.01") ** 2) < 1e-20
     raw["throw"] = {"speed": ["15 rpm", "1.6 rad/s"]}
-    with pytest.raises(checker.texts.BadFileError, match="mixes degrees and radians"):
+    with pytest.raises(checker.file.BadFileError, match="mixes degrees and radians"):
         checker.scene.read_scene(raw, None)
 
 
@@ -819,13 +819,13 @@ CHECKERS = {  # the checker's words for the package's
 @pytest.mark.parametrize("dimension", UNITS)
 def test_checker_and_package_know_the_same_units(dimension):
     kind = CHECKERS.get(dimension, dimension)
-    assert set(checker.texts.UNITS[kind]) == set(UNITS[dimension])
+    assert set(checker.file.UNITS[kind]) == set(UNITS[dimension])
     base = {"share": ""}.get(dimension, base_unit(dimension, "m"))
     signs = {"um": ["\u00b5m", "\u03bcm"], "deg": ["\u00b0"]}
     for unit in UNITS[dimension]:
         for sign in [unit, *signs.get(unit, [])]:
             (text,) = spelled_plainly([f"2.5 {sign}"])
-            read = checker.texts.quantity(text, kind, "here")
+            read = checker.file.quantity(text, kind, "here")
             mine = convert(parse(f"2.5 {sign}", dimension), base)
             assert float(read.lo) * (math.pi if read.pi else 1.0) == pytest.approx(mine, rel=1e-15)
 
@@ -838,7 +838,7 @@ def test_lengths_are_spelled_spelled_plainly(text):
     raw["arm"]["length"] = "700000 um"
     assert checker.scene.read_scene(raw, None).unit == "um"
     raw["arm"]["length"] = text
-    with pytest.raises(checker.texts.BadFileError):
+    with pytest.raises(checker.file.BadFileError):
         checker.scene.read_scene(raw, None)
 
 
@@ -859,7 +859,7 @@ def test_kappa_from_speed_gravity_and_noise():
 
 
 def test_a_quantity_is_exact():
-    q = checker.texts.quantity(["1 ft", "1.5e0 ft"], "length", "x")
+    q = checker.file.quantity(["1 ft", "1.5e0 ft"], "length", "x")
     assert (q.lo, q.hi) == (Fraction(3048, 10000), Fraction(4572, 10000))
 
 

@@ -111,15 +111,15 @@ def test_numbers_as_a_scene_may_write_them(tmp_path, old, new):
 
 @pytest.mark.parametrize("text", [". in", "5.5.5 in", ".e5 in", "1e13 in", "1e-301 in", "1e9999 in", "5in"])
 def test_numbers_no_scene_has(text):
-    with pytest.raises(checker.texts.BadFileError):
-        checker.texts.quantity(text, "length", "x")
+    with pytest.raises(checker.file.BadFileError):
+        checker.file.quantity(text, "length", "x")
 
 
 def test_equal_numbers_in_other_words():
     for text in (".5 in", "0.5 in", "+.5 in", "5e-1 in", "50.e-002 in"):
         assert (
-            checker.texts.quantity(text, "length", "x").lo
-            == checker.texts.quantity("12.7 mm", "length", "x").lo
+            checker.file.quantity(text, "length", "x").lo
+            == checker.file.quantity("12.7 mm", "length", "x").lo
         )
 
 
@@ -430,11 +430,11 @@ def test_what_fails_is_named_and_the_rest_is_proved(good, tmp_path):
 
 def test_an_orbit_outside_of_the_attracting_cells_is_none_in_them(good):
     throws = checker.end_points.Throws(checker.scene.read_scene(forge.scene("designed"), None))
-    (orbit, *_) = checker.orbits.read_orbits(sections(good["designed"])[1], 3)["orbits"]
-    checker.orbits.prove_orbit(throws, [[(orbit.lo, orbit.hi)], [], []], orbit)
+    (orbit, *_) = checker.refutations.read_orbits(sections(good["designed"])[1], 3)["orbits"]
+    checker.refutations.prove_orbit(throws, [[(orbit.lo, orbit.hi)], [], []], orbit)
     for cells in ([[], [], []], [[(orbit.lo + 1e-12, orbit.hi)], [(0.0, 30.0)], [(0.0, 30.0)]]):
         with pytest.raises(checker.balls.UnprovedError, match="not in the attracting cells"):
-            checker.orbits.prove_orbit(throws, cells, orbit)
+            checker.refutations.prove_orbit(throws, cells, orbit)
 
 
 def test_an_itinerary_that_the_map_does_not_take_is_none():
@@ -442,9 +442,9 @@ def test_an_itinerary_that_the_map_does_not_take_is_none():
     throws = checker.end_points.Throws(checker.scene.read_scene(forge.scene("designed"), None))
     m = forge.Plain(forge.scene("designed"))
     cycle = forge.refined(m, np.array([1, 1, *[0] * 11, 1]), 6.0, 26.0)
-    (orbit,) = checker.orbits.read_orbits({"cycles": [cycle], "complete": False}, 3)["orbits"]
+    (orbit,) = checker.refutations.read_orbits({"cycles": [cycle], "complete": False}, 3)["orbits"]
     with pytest.raises(checker.balls.UnprovedError, match="throw 14: that it is a flip is not proved"):
-        checker.orbits.prove_orbit(throws, [[(0.0, 30.0)]] * 3, orbit)
+        checker.refutations.prove_orbit(throws, [[(0.0, 30.0)]] * 3, orbit)
 
 
 def test_orbits_are_of_one_speed(tmp_path):
@@ -535,7 +535,9 @@ def test_where_there_may_be_several_impacts_nothing_is_proved(good, tmp_path):
     assert "several impacts" in checker.end_points.check_ends(
         scene, cells, checker.end_points.read_ends(ends, 3)
     )
-    assert "kappa > ell" in checker.orbits.check_orbits(scene, cells, checker.orbits.read_orbits(cycles, 3))
+    assert "kappa > ell" in checker.refutations.check_orbits(
+        scene, cells, checker.refutations.read_orbits(cycles, 3)
+    )
 
 
 def test_the_impact_is_bracketed_next_to_the_joint():
@@ -546,7 +548,7 @@ def test_the_impact_is_bracketed_next_to_the_joint():
         raw = case(seed).scene
         try:
             scene = checker.scene.read_scene(raw, None)
-        except checker.texts.BadFileError:  # the part does not rest on all of its sides
+        except checker.file.BadFileError:  # the part does not rest on all of its sides
             continue
         for s in scene.sides:
             x = arb(float(s.a) + float(s.arm - s.a) * 10 ** rng.uniform(-7, -2))

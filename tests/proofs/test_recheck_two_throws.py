@@ -240,7 +240,7 @@ def read_wide(model, landing):
     scene, wide = boxed(written("paper-designed", model), WIDTHS)
     noise = {"landing.x": f"{landing!r} in"} if landing else None
     read = checker.scene.read_scene(copy.deepcopy(wide), noise)
-    known = checker.part.read_lengths(read.raw["part"], checker.texts.LENGTHS[read.unit])
+    known = checker.part.read_lengths(read.raw["part"], checker.file.LENGTHS[read.unit])
     return scene, read, known
 
 

@@ -415,5 +415,5 @@ def test_what_is_shown_is_what_was_read(good, tmp_path):
      ("1e20", "1e20"), ("-12.5e18", "-1.25e19"), ("0.000001", "0.000001"), ("1/3", "1/3")],
 )  # fmt: skip
 def test_a_decimal_is_written_as_it_is(value, text):
-    assert checker.texts.decimal(Fraction(value)) == text
+    assert checker.file.decimal(Fraction(value)) == text
     assert Fraction(text) == Fraction(value)

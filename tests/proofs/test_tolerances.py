@@ -155,8 +155,8 @@ def test_halves_hold_the_whole_together_and_narrow_it():
 
     def ends(piece, name):
         value = dict(checker.scene.quantities(piece.raw))[name]
-        q = checker.texts.quantity(value, "length", name)
-        return q.lo / checker.texts.INCH, q.hi / checker.texts.INCH
+        q = checker.file.quantity(value, "length", name)
+        return q.lo / checker.file.INCH, q.hi / checker.file.INCH
 
     names = ("part.mass.center.along", "part.sides[0]", "arm.surface_height")
     volume = sum(np.prod([float(hi - lo) for lo, hi in (ends(p, n) for n in names)]) for p in pieces)

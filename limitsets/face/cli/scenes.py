@@ -263,7 +263,7 @@ def explore(
 ) -> None:
     """Open a page where sliders move a scene, and its limit sets, basins and goal follow."""
     from limitsets.face.explorer import explore as open_page
-    from limitsets.face.explorer.visits import required
+    from limitsets.face.explorer.exploring import required
 
     required()
     from limitsets.face.explorer.visits import stored_atlas

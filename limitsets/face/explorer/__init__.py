@@ -6,6 +6,6 @@ Proofs and margins are computed once the slider rests, in a separate process (`B
 neither the page nor another visitor waits for them.
 """
 
-from limitsets.face.explorer.visits import explore
+from limitsets.face.explorer.exploring import explore
 
 __all__ = ["explore"]

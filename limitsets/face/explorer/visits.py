@@ -1,4 +1,4 @@
-"""`limitsets.explore`: visitors with a page each, in a browser or a notebook, and the server on this machine."""
+"""Visitors, with a page each in a browser or a notebook, and the server on this machine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from jinja2 import Template
 from panel.io.callbacks import PeriodicCallback
 from tornado.websocket import WebSocketClosedError
 
-from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError, LimitsetsError, MapError
 from limitsets.base.progress import Progress, bar, in_notebook
 from limitsets.face.explorer.canvas import PAGE, Canvas
@@ -271,76 +270,3 @@ def stored_atlas(store: Path) -> tuple[Scene, dict[str, Any]]:
     if "scene" not in data.attrs.get("plan", {}):
         raise LimitsetsError("the atlas", str(store), "one of a scene", "explore the map itself")
     return load(data.attrs["plan"]["scene"]), table_of(data)
-
-
-# ----------------------------------------------------------------
-# `limitsets.explore`: a scene or a map as a page that sliders move.
-
-
-def required() -> None:
-    """Refuse to go on without the libraries of the extra.
-
-    Raises
-    ------
-    LimitsetsError
-        Panel or Bokeh is missing; with the command that installs them.
-    """
-    for library in ("bokeh", "panel"):
-        try:
-            __import__(library)
-        except ImportError:
-            raise LimitsetsError(
-                f"the library {library}", "missing", "the extra explore", "pip install 'limitsets[explore]'"
-            ) from None
-
-
-@arguments_checked
-def explore(
-    scene: Any = "paper-designed", *, domain: Any = None, atlas: str | Path | None = None
-) -> Explorer:
-    """Open a scene, or a map, as a page: sliders move it, and limit sets, basins and the goal's threshold follow.
-
-    What follows a slider is an estimate; proofs and margins are computed once it rests.
-
-    Parameters
-    ----------
-    scene : Scene, str, Path, mapping, or a map's parameters
-        A scene, what `limitsets.load` reads, or the parameters of a registered map of one to three dimensions.
-    domain : Domain or array_like, optional
-        Of a map: a pair (lo, hi) for each coordinate; textbook maps have one of their own.
-    atlas : str or Path, optional
-        The store of an atlas of two quantities of the scene (`limitsets.atlas`), for its picture.
-
-    Returns
-    -------
-    Explorer
-        A Panel viewable: a notebook shows it, ``.servable()`` and ``.show()`` serve it, and every visitor has a page
-        of his own.
-
-    Raises
-    ------
-    LimitsetsError
-        The extra `explore` is not installed, or an atlas of something else.
-    SceneError
-        For a scene that cannot be read, or has too many sides.
-    AnswerError
-        For a map without a domain.
-
-    Examples
-    --------
-    >>> import limitsets as ls
-    >>> page = ls.explore("paper-designed").page()
-    >>> page.sliders.put({"throw.speed": 150.0})
-    >>> page.beat()
-    >>> round(page.scene.kappa, 3)
-    28.166
-    >>> page.close()
-    """
-    required()
-
-    if isinstance(scene, tuple | type):
-        return Explorer.of_map(scene, domain)
-    if domain is not None:
-        raise AnswerError("the domain", "given", "none beside a scene", "a scene has one: leave it out")
-    loaded = load(scene)
-    return Explorer.of_scene(loaded, None if atlas is None else Path(atlas))

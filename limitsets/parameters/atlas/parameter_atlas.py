@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from limitsets.parameters.regions import Regions
 
 
-TOPOLOGY = "limitsets.parameters.atlas.of_topology:topology"
+TOPOLOGY = "limitsets.sweep.of_topology:topology"  # by the public name: stores and plans hold it
 
 
 @dataclass(frozen=True, eq=False)

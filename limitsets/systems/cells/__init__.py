@@ -4,6 +4,6 @@ Cells are closed, so neighbours share their border, and are numbered side by sid
 last axis runs fastest): the numbers are the nodes of the transition graph.
 """
 
-from limitsets.systems.cells.grid import CellSet, Domain, Grid, as_domain, grid
+from limitsets.systems.cells.grids import CellSet, Domain, Grid, as_domain, grid
 
 __all__ = ["CellSet", "Domain", "Grid", "as_domain", "grid"]
