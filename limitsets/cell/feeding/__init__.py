@@ -1,8 +1,8 @@
 """Feeding: the arm ends in a cavity, and a part that comes to rest beyond the end falls in.
 
-`falling` says what becomes of such a part, `tipping` how long it takes; `proving` which sides can be fed, and that
-every start is; `trials` throws parts as experimenters do, `fed_shares` counts their fates, and finds the noise at which
-success falls to a share; `bracketing` proves brackets of the probabilities; `crowd` throws many at once, in the engine.
+`falling` says what becomes of such a part and how long it takes to tip.  `paths` and `proving` prove which sides can be
+fed, that every start is, and brackets of the probabilities.  `trials` throws parts as experimenters do, counts their
+fates, and finds the noise at which success falls to a share.  `crowd` throws many at once, in the engine.
 `feeding_run` joins them (`limitsets.feed`).
 """
 

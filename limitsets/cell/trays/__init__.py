@@ -1,10 +1,8 @@
 """A tray: parts wash over a plate's depressions again and again, and stay where they fall in rightly.
 
-`passing` draws a part that comes by and a kick of the plate; `counting` counts what a depression does with both, in the
-engine; `chain` says what follows for n passes; `histories` follows one depression pass by pass, and asks whether it
-forgets; `filling` joins them (`limitsets.tray`).
-`filming` keeps the passes of one depression for a film.  `pouring` lets many parts come by many
-depressions at once, and `crowd` counts them.
+`passing` draws a part that comes by and a kick of the plate, counts in the engine what a depression does with both,
+follows one depression pass by pass, and keeps its passes for a film.  `pouring` lets many parts come by many depressions
+at once.  `filling` says what follows for n passes (`limitsets.tray`).
 """
 
 from limitsets.cell.trays.filling import Chain as Chain

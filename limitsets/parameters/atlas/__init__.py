@@ -1,11 +1,9 @@
 """Many points of a parameter space: a plan, a task, workers, and a store that grows in whole chunks.
 
-A plan says what is varied and what is asked (`plan`, `axes`, `subjects`).  A task answers for a chunk of the points
-(`tasks`, `work`).  Any executor of `concurrent.futures` runs the chunks (`executors`, `driving`), and one process, the
-driver, writes them to a Zarr store that can be continued (`store`).  `parameter_atlas` is the call that users make.
-`classes` gives points of one topology one number, and `boundaries` finds where they meet from few points.
-`continuation` follows attractors along a curve instead.  `trial_file` keeps random trials, which the same
-driver hands out.
+A plan says what is varied and what is asked (`plan`, `subjects`).  A task answers for a chunk of the points (`work`).
+Any executor of `concurrent.futures` runs the chunks (`limitsets.base.campaign`), and one process, the driver, writes
+them to a Zarr store that can be continued (`store`).  `parameter_atlas` is the call that users make.  `classes` gives
+points of one topology one number.
 
 xarray, zarr, pandas and distributed are imported where they are used: the extras `atlas` and `cluster`.
 """

@@ -1,8 +1,9 @@
 """Inverse problems: critical points with their derivatives, design for critical points, and design for a margin.
 
-`critical` differentiates critical points by the implicit function theorem, on dual numbers, and finds roots with that
-(`design`); `margin` looks for a large margin by the floats of `limitsets.robust`, counts throws to feed, and has what
-it ends with proved there (`robust_design`).  Nothing here is compiled or proved.
+`derivatives` differentiates critical points by the implicit function theorem, on dual numbers; `solving` and
+`for_critical` find roots with that (`design`).  `search` looks for a large margin by the floats of
+`limitsets.parameters.margins`; `for_margin` and `for_goal` have the result proved there (`robust_design`).  Nothing in
+this room is compiled or proved.
 """
 
 from limitsets.parameters.design.derivatives import CriticalJacobian, critical_jacobian

@@ -2,9 +2,9 @@
 
     found = limitsets.fit("paper-designed", "throws.csv", error="0.5 mm")
 
-`throws` reads the film, `rows` says what each throw was, `likelihood` how likely it all is; `starting`, `searching` and
-`maximising` find the most likely machine and how far it may be from the true one; `misfit` tests the model itself;
-`further` says what to film next, `enough` whether the goal's margin is larger than what was found.
+`throws` reads the film.  `likelihood` says what each throw was, how likely the film is, and what to film next.
+`searching` finds the most likely machine and how far it may be from the true one.  `misfit` tests the model itself and
+looks for a misreading of the film.  `fit_result` says whether the goal's margin is large enough.
 """
 
 from limitsets.parameters.fitting.fit_result import Enough, Fit, Fitted, Scatter, enough

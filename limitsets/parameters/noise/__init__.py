@@ -1,8 +1,8 @@
-"""Robustness: margins of goals under deviations, and random noise by the transfer operator.
+"""Random noise by the transfer operator and by trials.  The public name `limitsets.robust` is this room.
 
-A margin is a bracket of deviations: up to its lower end the goal is proved, at its upper end an orbit refutes it.
 Noise with a probability law is a Markov chain on cells (generalised cell mapping); its answers are numerical
-approximations, never proofs, and say so.
+approximations, never proofs, and say so.  Margins and proved brackets of probabilities, which `limitsets.robust` also
+has, come from `limitsets.parameters.margins` and `limitsets.proofs.chances`.
 """
 
 from __future__ import annotations

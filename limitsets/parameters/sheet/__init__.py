@@ -1,5 +1,5 @@
-"""The tolerance sheet of a scene: all margins, the joint margin, the margin curve and noise, stored as they are found.
+"""The tolerance sheet of a scene: all margins, the joint margin, the margin curve and noise, stored as they come.
 
-`gathering` runs the parts, `keeping` resumes an earlier run, `entries` and `summary` hold the answers; `chance` reads
-the noise, `against_x` computes the margin curve.
+`sheet_run` runs the parts.  `entries` holds single margins and reads those of an earlier run; `summary` holds the whole
+answer, reads the noise and computes the margin curve.
 """
