@@ -166,7 +166,7 @@ def arguments_checked(function: Callable[P, R], public: str = "") -> Callable[P,
     ...     return 2 * count
     >>> twice("many")
     Traceback (most recent call last):
-    limitsets.errors.AnswerError: the argument count of twice is 'many'; allowed: a whole number; pass count=3
+    limitsets.base.errors.AnswerError: the argument count of twice is 'many'; allowed: a whole number; pass count=3
     """
     parameters = inspect.signature(function).parameters
     kinds = {

@@ -108,7 +108,7 @@ def test_when_time_is_up_what_is_proved_is_the_answer():
     assert found.safe.verdict == "proved"
     assert found.fed.verdict == "undecided"
     assert "finer cells than 2048 a side were not tried" in found.fed.reason
-    assert found.found.cover.grid.n_cells < 8192
+    assert found.attraction.cover.grid.n_cells < 8192
     assert not any("8192" in stage for stage, _, _ in told)
 
 
@@ -168,7 +168,7 @@ def test_fewer_pieces_of_the_noise_prove_less_and_say_so(monkeypatch):
     few = proved_feeding(end, {"throw.speed": "3 %"}, seconds=0.0)
     assert "the noise was cut into 4 pieces, not 256, which would take longer" in few.fed.reason
     assert few.safe.share <= whole.safe.share
-    for one, other in zip(few.found.cover.images, whole.found.cover.images, strict=True):
+    for one, other in zip(few.attraction.cover.images, whole.attraction.cover.images, strict=True):
         for key, (lo, hi) in other.hulls.items():
             wide = one.hulls[key]
             some = (lo <= hi) & ~one.lost

@@ -17,9 +17,8 @@ import json, re, sys
 import numba
 import numpy as np
 import limitsets as ls
-from limitsets.systems.graph.images import hulls
+from limitsets.systems.graph.images.enclosed import _enclose, enclosures
 from limitsets.systems.graph.images.sampled import _hulls
-from limitsets.systems.graph.images.enclosed import enclosures
 from limitsets.maps import drivers, images
 
 fused = re.compile(r"\bvfn?m(add|sub)|\bvfm(addsub|subadd)")
@@ -29,7 +28,7 @@ for flight, flip in json.loads(sys.argv[1]):
     enclosures(scene.map, scene.map, x, 0)
     images(scene.map, x, 0)
 ls.transitions(scene.map, ls.grid(scene.domain, cells=8))
-codes = {"boxes": hulls._enclose.inspect_asm(), "floats": drivers.fill_images.inspect_asm()}
+codes = {"boxes": _enclose.inspect_asm(), "floats": drivers.fill_images.inspect_asm()}
 found = {key: [len(fused.findall(code)) for code in found.values()] for key, found in codes.items()}
 found["widest"] = [code.count("zmm") for code in codes["floats"].values()]
 found["counted"] = [code.count("NRT_") for code in _hulls.inspect_asm().values()]

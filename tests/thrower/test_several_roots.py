@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.feeder.thrower.trace import impact_angles
+from limitsets.feeder.thrower.traced import impact_angles
 from limitsets.systems.graph.images.enclosed import enclosures
 from limitsets.systems.maps import OUTSIDE_MODEL, images
 

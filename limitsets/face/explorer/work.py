@@ -48,7 +48,7 @@ def scene_from(text: str) -> Scene:
     --------
     >>> scene_from("/etc/passwd")
     Traceback (most recent call last):
-    limitsets.errors.SceneError: the text of the scene is 'not valid'; allowed: TOML; ...
+    limitsets.base.errors.SceneError: the text of the scene is 'not valid'; allowed: TOML; ...
     """
     size = len(text.encode("utf-8", "surrogatepass"))
     if size > MOST_BYTES:

@@ -13,7 +13,7 @@ with the misprints corrected as listed in docs/model.md.
 """
 
 from limitsets.feeder.thrower.params import Energy, Exact, Signed, SmallAngle, SmallAngle2, Throw, throw_map
-from limitsets.feeder.thrower.trace import Flight, Trace, fly, impact_angles, trace
+from limitsets.feeder.thrower.traced import Flight, Trace, fly, impact_angles, trace
 
 __all__ = [
     "Energy",

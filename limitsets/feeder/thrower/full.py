@@ -35,7 +35,7 @@ from limitsets.feeder.thrower.motion import (
 )
 from limitsets.feeder.thrower.params import Exact, Throw, gather
 from limitsets.feeder.thrower.throw import EXITS
-from limitsets.feeder.thrower.trace import details
+from limitsets.feeder.thrower.traced import details
 from limitsets.numbers.jit import entry_of, kernel
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.contract import register

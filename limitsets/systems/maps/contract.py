@@ -464,7 +464,7 @@ def require_corners(lower: Any, upper: Any) -> None:
     >>> require_corners(maps.Logistic(3.2), maps.Logistic(3.1))
     Traceback (most recent call last):
     ...
-    limitsets.errors.AnswerError: the upper corner of r is 3.1; allowed: at least the lower one, 3.2; swap them
+    limitsets.base.errors.AnswerError: the upper corner of r is 3.1; allowed: at least the lower one, 3.2; swap them
     """
     if type(upper) is not type(lower):
         allowed = f"parameters of {kind_of(lower).name}"

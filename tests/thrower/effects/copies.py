@@ -14,7 +14,7 @@ def environment_of_copy(folder: Path, word: str) -> dict[str, str]:
     copy = folder / word / "limitsets"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     if word == "without":
-        shutil.rmtree(copy / "thrower" / "effects")
-        (copy / "thrower" / "full.py").unlink()
+        shutil.rmtree(copy / "feeder" / "thrower" / "effects")
+        (copy / "feeder" / "thrower" / "full.py").unlink()
     cache = folder / word / "cache"
     return {**os.environ, "PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}
