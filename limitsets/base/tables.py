@@ -231,9 +231,9 @@ class Tabled:
     def __init_subclass__(cls, **words: Any) -> None:
         super().__init_subclass__(**words)
         # IPython takes what stands in the class itself, and a dataclass makes no __repr__ where one stands
-        cls._repr_pretty_ = Tabled._repr_pretty_  # type: ignore[method-assign]
+        cls._repr_pretty_ = Tabled._repr_pretty_  # type: ignore[method-assign]  # set in the class on purpose
         if "__repr__" not in vars(cls):
-            cls.__repr__ = Tabled.__repr__  # type: ignore[method-assign]
+            cls.__repr__ = Tabled.__repr__  # type: ignore[method-assign]  # likewise on purpose
 
     def __repr__(self) -> str:
         """Name it in a line, with as much of its fields as fits; its tables show all."""

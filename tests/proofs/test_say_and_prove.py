@@ -332,7 +332,7 @@ def dropped(found, component, starts, tmp_path, **more):
     section = {"kind": "reaches", "x": "69.0806 mm", "side": 1, "every_orbit": True}
     claims = [{"claim": "goal", "section": section | {"throws": throws, "starts": starts} | more}]
     path = tmp_path / "x.proof.zip"
-    write(path, [doctored], claims, noise=None, tolerance=None, unit="mm", producer={}, recheck=False)
+    write(path, [doctored], claims, noise=None, tolerance=None, unit="mm", recheck=False)
     return checker.recheck(path, workers=1), left.size
 
 

@@ -14,7 +14,6 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -318,10 +317,6 @@ def write_proof(
     if not section:
         remedy = "see the reason in .fed; a part without a proof is in no certificate"
         raise AnswerError("the certificate", "without a proved claim", "safety or progress", remedy)
-    try:
-        producer = {"limitsets": version("limitsets")}
-    except PackageNotFoundError:  # sources that are not installed
-        producer = {}
     claim = {"claim": "feeds", "section": section, "verdict": verdict_of(proof, laid=bool(end.laid))}
     write(
         path,
@@ -330,7 +325,6 @@ def write_proof(
         noise=box.noise or None,
         tolerance=None,
         unit=end.scene.unit,
-        producer=producer,
         recheck=recheck,
         workers=workers,
     )

@@ -141,11 +141,10 @@ def _cleared(residual: Array, slopes: Array) -> Array:
 def _ratio(z: Array) -> Array:
     """Logarithm of the likelihood ratio, the largest over share and width; shape (m,)."""
     ratio = np.full(z.shape[0], -np.inf)
+    # one alternative at a time: all at once take gigabytes for a long film, and hold a Ctrl-C back
     for wide in WIDER:
         gain = np.exp(np.minimum(0.5 * z**2 * (1.0 - 1.0 / wide**2), 700.0)) / wide
-        for (
-            share
-        ) in SHARES:  # one at a time: all at once hold a Ctrl-C back, and take gigabytes for long films
+        for share in SHARES:
             ratio = np.maximum(ratio, np.log1p(share * (gain - 1.0)).sum(axis=1))
     return ratio
 

@@ -10,7 +10,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import NOISE_ONLY, find
-from limitsets.feeder.scene.units import parse, spelled_plainly
+from limitsets.feeder.scene.units import parse
 from limitsets.parameters.regions.record import Record
 from limitsets.proofs.prover.certificate import pack, tidy
 from limitsets.proofs.prover.goals import rechecked
@@ -178,18 +177,7 @@ def write(
             {"quantity": axis.quantity, "borders": texts} for axis, texts in zip(axes, borders, strict=True)
         ],
     }
-    try:
-        producer = {"limitsets": version("limitsets")}
-    except PackageNotFoundError:  # sources that are not installed
-        producer = {}
-    header = {
-        "map": model,
-        "noise": None,
-        "tolerance": None,
-        "boxes": [],
-        "claims": spelled_plainly([{"claim": "region", "section": section}]),
-        "producer": producer,
-    }
+    claims = [{"claim": "region", "section": section}]
     held = (
         arrays
         | _of_records(records, scene.sides.a.size)
@@ -197,7 +185,7 @@ def write(
         | _of_chains(records)
     )
     held = {name: np.ascontiguousarray(value) for name, value in held.items()}
-    pack(path, header, held, scene.unit, {"region": "proved"} if recheck else None, workers)
+    pack(path, model, claims, held, unit=scene.unit, recheck=recheck, workers=workers)
     return Path(path)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scattering import Scattering, Uniform
 from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.units import spelled_plainly
 from limitsets.proofs.chances.averages import CLOSE, FAR, Average, Nodes, extra, nodes_of
 from limitsets.proofs.chances.deficits import Staircase, landing_average, staircase
 from limitsets.proofs.chances.landings import OneSide, crossings, one_side
@@ -263,19 +261,8 @@ def write(
     for side in range(len(scene.sides)):
         # the outermost nodes lie far beyond everything
         arrays[f"edges.{side}"] = _cut(nodes.place[nodes.of_side(side)][1:-1], finer)
-    try:
-        producer = {"limitsets": version("limitsets")}
-    except PackageNotFoundError:  # sources that are not installed
-        producer = {}
-    header = {
-        "map": section["scene"]["model"],
-        "noise": None,
-        "tolerance": None,
-        "boxes": [],
-        "claims": spelled_plainly([{"claim": "probabilities", "section": section}]),
-        "producer": producer,
-    }
-    pack(path, header, arrays, scene.unit, {"probabilities": "proved"} if recheck else None)
+    claims = [{"claim": "probabilities", "section": section}]
+    pack(path, section["scene"]["model"], claims, arrays, unit=scene.unit, recheck=recheck)
     return Path(path)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,7 +18,6 @@ from limitsets.base.tables import Table, Tabled, facts
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
 from limitsets.feeder.scene.surroundings import BeyondSensor, Sensor, exact_text
-from limitsets.feeder.scene.units import spelled_plainly
 from limitsets.proofs.policies.board import Board, Progress, Starts, board_of
 from limitsets.proofs.policies.policy import NONE, NOT_DECIDED, SOLVED, Found, Policy, search
 from limitsets.proofs.prover.certificate import brackets, pack, tidy
@@ -64,20 +62,11 @@ def write(
         "within": max((int(policy.left[k]) for k in policy.first if k != NONE), default=0),
         "first": policy.to_json()["first"],
     }
-    try:
-        producer = {"limitsets": version("limitsets")}
-    except PackageNotFoundError:  # sources that are not installed
-        producer = {}
-    header = {
-        "map": model,
-        "noise": spelled_plainly(board.noise) if board.noise else None,
-        "tolerance": None,
-        "boxes": [],
-        "claims": [{"claim": "policy", "section": spelled_plainly(section)}],
-        "producer": producer,
-    }
+    claims = [{"claim": "policy", "section": section}]
     held = _of_policy(policy) | _of_throws(board, policy)
-    pack(path, header, held, board.scene.unit, {"policy": "proved"} if recheck else None, workers)
+    pack(
+        path, model, claims, held, unit=board.scene.unit, noise=board.noise, recheck=recheck, workers=workers
+    )
     return Path(path)
 
 

@@ -13,6 +13,7 @@ import json
 import math
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -253,7 +254,6 @@ def write(
     noise: Mapping[str, str] | None,
     tolerance: Mapping[str, str] | None,
     unit: str,
-    producer: Mapping[str, str],
     recheck: bool = True,
     workers: int | None = 1,
 ) -> float | None:
@@ -271,8 +271,6 @@ def write(
         Deviations of the parameters for which the claims are proved.
     unit : str
         Unit of length.
-    producer : mapping
-        Versions, for information.
     recheck : bool
         Whether to check it first.
     workers : int, optional
@@ -299,40 +297,61 @@ def write(
         if cover.box.scene.get("effects", {}).get("spread"):
             scene["effects"] = {"spread": cover.box.scene["effects"]["spread"]}
         boxes.append({"scene": scene, "parameters": _parameters(cover), "prefix": f"{number}."})
-    header = {
-        "map": _model(proofs[0].cover),
-        "noise": spelled_plainly(noise) if noise else None,
-        "tolerance": spelled_plainly(tolerance) if tolerance else None,
-        "boxes": spelled_plainly(boxes),
-        "claims": spelled_plainly([{"claim": each["claim"], "section": each["section"]} for each in claims]),
-        "producer": dict(producer),
-    }
-    verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
-    return pack(path, header, arrays, unit, verdicts if recheck else None, workers)
+    return pack(
+        path,
+        _model(proofs[0].cover),
+        claims,
+        arrays,
+        unit=unit,
+        boxes=boxes,
+        noise=noise,
+        tolerance=tolerance,
+        recheck=recheck,
+        workers=workers,
+    )
+
+
+def _producer() -> dict[str, str]:
+    """Name the version of the package, for information; nothing where the sources are not installed."""
+    try:
+        return {"limitsets": version("limitsets")}
+    except PackageNotFoundError:
+        return {}
 
 
 def pack(
     path: str | Path,
-    header: Mapping[str, Any],
+    model: Mapping[str, str],
+    claims: Sequence[Mapping[str, Any]],
     arrays: Mapping[str, NDArray[Any]],
+    *,
     unit: str,
-    verdicts: Mapping[str, str] | None,
+    boxes: Sequence[Mapping[str, Any]] = (),
+    noise: Mapping[str, str] | None = None,
+    tolerance: Mapping[str, str] | None = None,
+    recheck: bool = True,
     workers: int | None = 1,
 ) -> float | None:
-    """Write header and arrays, replacing an older file whole.
+    """Write what a certificate of any kind has, replacing an older file whole.
 
     Parameters
     ----------
     path : str or Path
         The file.
-    header : mapping
-        What it says besides format, state and arrays; of the map flight and flip.
+    model : mapping of str to str
+        Of the map `flight` and `flip`.
+    claims : sequence of mapping
+        ``{"claim": ..., "section": {...}}`` each, and the ``verdict`` where it is not "proved".
     arrays : mapping of str to ndarray
         By name.
     unit : str
         Unit of length.
-    verdicts : mapping of str to str, optional
-        What the checker has to find of each claim before the file gets its name; without it nothing is checked.
+    boxes : sequence of mapping
+        Scene, parameters and prefix of each box of parameters.
+    noise, tolerance : mapping or None
+        What the parameters were allowed to do.
+    recheck : bool
+        Whether the checker has to confirm the claims before the file gets its name.
     workers : int, optional
         Processes that check it, None for all processors.
 
@@ -349,8 +368,12 @@ def pack(
     whole = {
         "format": FORMAT,
         "version": VERSION,
-        **header,
-        "map": {"name": "throw", "version": 1, **header["map"], "formulas": FORMULAS},
+        "map": {"name": "throw", "version": 1, **model, "formulas": FORMULAS},
+        "noise": spelled_plainly(noise) if noise else None,
+        "tolerance": spelled_plainly(tolerance) if tolerance else None,
+        "boxes": spelled_plainly(list(boxes)),
+        "claims": spelled_plainly([{"claim": each["claim"], "section": each["section"]} for each in claims]),
+        "producer": _producer(),
         "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
         "arrays": {
             name: {
@@ -363,13 +386,14 @@ def pack(
     }
     packed = io.BytesIO()
     np.savez(packed, **arrays)  # type: ignore[arg-type]  # arrays by name
+    verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
     target, seconds, denied = Path(path), None, None
     with replaced(target.parent) as draft:
         written = draft / target.name
         with zipfile.ZipFile(written, "w", zipfile.ZIP_STORED) as file:
             file.writestr("header.json", json.dumps(whole, indent=1))
             file.writestr("arrays.npz", packed.getvalue())
-        if verdicts is not None:
+        if recheck:
             kept = target.with_name(target.name.removesuffix(".zip").removesuffix(".proof") + ".denied.zip")
             try:
                 seconds = require_confirmed(written, kept, verdicts, workers)

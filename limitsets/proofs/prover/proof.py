@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -131,7 +130,6 @@ def write_refutation(
         noise=box.noise or None,
         tolerance=None,
         unit=scene.unit,
-        producer={},
         recheck=recheck,
     )
 
@@ -439,10 +437,6 @@ class Proof(Tabled):
             raise AnswerError(
                 "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
             )
-        try:
-            producer = {"limitsets": version("limitsets")}
-        except PackageNotFoundError:  # sources that are not installed
-            producer = {}
         write(
             path,
             self.attractions,
@@ -450,7 +444,6 @@ class Proof(Tabled):
             noise=self.noise,
             tolerance=self.tolerance,
             unit=self.scene.unit,
-            producer=producer,
             recheck=recheck,
             workers=workers,
         )

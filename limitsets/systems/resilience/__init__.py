@@ -9,47 +9,19 @@ told.  `docs/resilience.md` has the definitions and their sources.
 
 from __future__ import annotations
 
-from limitsets.systems.resilience.mixing import (
-    BasinEntropy as BasinEntropy,
-)
-from limitsets.systems.resilience.mixing import (
-    basin_entropy as basin_entropy,
-)
-from limitsets.systems.resilience.mixing import (
-    boundary_basin_entropy as boundary_basin_entropy,
-)
+from limitsets.systems.resilience.mixing import BasinEntropy, basin_entropy, boundary_basin_entropy
 from limitsets.systems.resilience.stability import (
-    BasinStability as BasinStability,
+    BasinStability,
+    ConvergenceTimes,
+    FatalShock,
+    Share,
+    Times,
+    basin_stability,
+    convergence_times,
+    minimal_fatal_shock,
 )
-from limitsets.systems.resilience.stability import (
-    ConvergenceTimes as ConvergenceTimes,
-)
-from limitsets.systems.resilience.stability import (
-    FatalShock as FatalShock,
-)
-from limitsets.systems.resilience.stability import (
-    Share as Share,
-)
-from limitsets.systems.resilience.stability import (
-    Times as Times,
-)
-from limitsets.systems.resilience.stability import (
-    basin_stability as basin_stability,
-)
-from limitsets.systems.resilience.stability import (
-    convergence_times as convergence_times,
-)
-from limitsets.systems.resilience.stability import (
-    minimal_fatal_shock as minimal_fatal_shock,
-)
-from limitsets.systems.resilience.uncertainty import (
-    UncertaintyExponent as UncertaintyExponent,
-)
-from limitsets.systems.resilience.uncertainty import (
-    uncertainty_exponent as uncertainty_exponent,
-)
-from limitsets.systems.resilience.wada_boxes import Wada as Wada
-from limitsets.systems.resilience.wada_boxes import wada as wada
+from limitsets.systems.resilience.uncertainty import UncertaintyExponent, uncertainty_exponent
+from limitsets.systems.resilience.wada_boxes import Wada, wada
 
 __all__ = [
     "BasinEntropy",
