@@ -225,10 +225,11 @@ def _value_of(answers: Atlas, name: str) -> float | None:
 
 # Faces of cycles: Paul Tol's light scheme, made for areas and colour-blind readers, without its orange.
 FACES = ("#EEDD88", "#44BB99", "#77AADD", "#FFAABB", "#99DDFF", "#BBCC33", "#AAAA00")
-# Attractors other than cycles are darker by this share of ink; classes without an attractor have the faces below.
+# Attractors other than cycles are darker by this share of ink.
 DARKER = 0.16
 # Shares of white that separate classes with the same face: other bands by side, another order, seven more bands.
 LIGHTER = (0.0, 0.32, 0.58)
+# Faces of classes without an attractor.
 ALL_LEAVE, ALL_COLLAPSE, NEITHER_ALL = "#EE9A62", "#6A4C93", "#F6D9C4"
 DOUBT, DOUBT_HATCH = "#B4B4B4", "xxxx"
 LEAVE_HATCH, COLLAPSE_HATCH = "////", "...."

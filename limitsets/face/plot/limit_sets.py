@@ -90,7 +90,7 @@ def limit_set(scene: Scene | TransitionGraph, found: Any, *, axes: Axes | None =
 
 
 def _lanes_of(about: Subject) -> int:
-    """Lanes from top to bottom: one per side, and the first one again if there are several."""
+    """Count the lanes: one per side, and that of the first side again if there are several."""
     return about.sides + (about.sides > 1)
 
 

@@ -76,7 +76,7 @@ def centre_in_flight(
 # bounce), the way between the two is drawn: `Turning.drawn` says so.
 
 
-# Longest time of a turn about a vertex that is shown [1/w], also of a turn that is drawn.
+# Longest time of a turn that is computed, and time of a motion that is drawn [1/w].
 LONGEST, DRAWN = 40.0, 1.0
 MOST_FACES = 60
 # Places closer than this share of the part's size count as the same.

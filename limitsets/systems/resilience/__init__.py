@@ -20,8 +20,7 @@ from limitsets.systems.resilience.stability import (
     convergence_times,
     minimal_fatal_shock,
 )
-from limitsets.systems.resilience.uncertainty import UncertaintyExponent, uncertainty_exponent
-from limitsets.systems.resilience.wada_boxes import Wada, wada
+from limitsets.systems.resilience.uncertainty import UncertaintyExponent, Wada, uncertainty_exponent, wada
 
 __all__ = [
     "BasinEntropy",
