@@ -318,7 +318,8 @@ def _line(x: Floats, y: Floats, variance: Floats) -> tuple[float, float, float]:
 # Wada test: whether boxes on a boundary meet all basins once one looks closely enough.
 #
 # A basin boundary has the Wada property where each of its points is a boundary point of three basins or more.  No
-# finite number of starts shows it: the share of boundary boxes that meet all basins is given as found, at one resolution.
+# finite number of starts shows it: the share of boundary boxes that meet all basins is given as found, at one
+# resolution.
 #
 # Source: Daza, Wagemakers, Sanjuan, Yorke, "Testing for basins of Wada", Scientific Reports 5, 16579, 2015 (the grid
 # method, used here); Daza, Wagemakers, Sanjuan, "Ascertaining when a basin is Wada: the merging method", Scientific
