@@ -3,12 +3,14 @@
 import io
 import json
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import limitsets as ls
 from limitsets.cell.feeding.falling import arm_end_of
+from limitsets.cell.feeding.paths import Paths
 from limitsets.cell.feeding.proving import proved_feeding, write_proof
 from limitsets.systems.maps import advance
 from tests.feeding.scenes import with_cavity
@@ -104,3 +106,21 @@ def test_random_starts_lie_where_parts_are_laid_down():
         throws[going & (places >= 20.0)] = number
     assert found.shares.mean_throws == pytest.approx(throws.mean(), rel=0.05)
     assert found.trials.throws.mean() == pytest.approx(throws.mean(), rel=0.1)
+
+
+def test_a_share_of_all_but_a_sliver_is_not_the_whole(fed):
+    """A range that reaches into an unproved cell by the last digit: the quotient of the lengths rounds to 1."""
+    end, proof, _ = fed
+    grid = proof.attraction.cover.grid
+    (edges,) = grid.edges[0]
+    j = int(np.searchsorted(edges, 20.0))
+    k, least = next(  # the first range whose length in proved cells is its whole length in floats
+        (k, least)
+        for k in range(int(np.searchsorted(edges, 6.5)), j - 100)
+        if np.diff(edges[k : j + 1]).sum() == edges[j] - (least := float(np.nextafter(edges[k], 0.0)))
+    )
+    some = np.ones(grid.n_cells, dtype=bool)
+    some[k - 1] = False  # cells of side 0 are numbered from 0
+    near = np.ones(grid.sides, dtype=bool)
+    share = Paths.of(proof.attraction, replace(end, laid=((0, least, float(edges[j])),))).share(some, near)
+    assert 1.0 - 1e-6 < share < 1.0
