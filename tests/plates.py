@@ -1,5 +1,48 @@
-"""A steel plate with a lead weight, in millimetres, and scenes that differ from it in a few lines."""
+"""Parts of some centimetres as an engineer writes them, in millimetres: three plates with a lead weight."""
 
+from copy import deepcopy
+
+# The scene of docs/scene.md: four corners.
+LEAD_QUAD = {
+    "name": "lead-quad",
+    "part": {
+        "vertices": [["0 mm", "0 mm"], ["130 mm", "0 mm"], ["150 mm", "70 mm"], ["30 mm", "100 mm"]],
+        "mass": {"plate_density": "3 kg/m^2", "points": [{"x": "110 mm", "y": "15 mm", "mass": "60 g"}]},
+    },
+    "arm": {"surface_height": "-15 mm", "length": "700 mm"},
+    "throw": {"speed": "160 deg/s"},
+    "gravity": {"tilt": "30 deg"},
+    "goal": {"oriented_beyond": {"x": "52 cm", "side": 0}},
+}
+
+# A triangle.
+LEAD_TRIANGLE = {
+    "name": "lead-triangle",
+    "part": {
+        "sides": ["46 mm", "30 mm", "54 mm"],
+        "mass": {
+            "plate_density": "7850 kg/m^3",
+            "plate_thickness": "2 mm",
+            "points": [{"x": "30 mm", "y": "8 mm", "mass": "20 g"}],
+        },
+    },
+    "arm": {"surface_height": "-2 mm", "length": "300 mm"},
+    "throw": {"speed": "200 deg/s"},
+    "gravity": {"tilt": "30 deg"},
+    "goal": {"oriented_beyond": {"x": "160 mm", "side": 2}},
+}
+
+
+def left_by_some():
+    """Give the same plate as a feeder that meets its goal on the limit set, and which parts leave from some starts."""
+    found = deepcopy(LEAD_TRIANGLE)
+    found["part"]["mass"]["points"] = [{"x": "2.1097 mm", "y": "16.2608 mm", "mass": "24.653 g"}]
+    found["arm"]["surface_height"] = "-0.4074 mm"
+    found["throw"]["speed"] = "279.3797 deg/s"
+    return found
+
+
+# A steel plate, and scenes that differ from it in a few lines.
 PLATE = """
 [part]
 vertices = [["0 mm", "0 mm"], ["80 mm", "0 mm"], ["62 mm", "45 mm"], ["12 mm", "45 mm"]]

@@ -1,8 +1,23 @@
-"""The count of lines of code and the sizes of the house, on files that are counted by hand."""
+"""The counts of lines and sizes, and the architecture."""
 
 import ast
+import importlib
+import re
+import shutil
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+from pkgutil import iter_modules
 
+import pytest
+
+import limitsets
 from tests import lines, sizes
+
+# ----------------------------------------------------------------
+# The count of lines of code and the sizes of the house, on files that are counted by hand.
+
 
 SOURCE = '''"""A docstring
 of two lines."""
@@ -103,3 +118,181 @@ def test_a_size_above_the_record_fails(tmp_path, monkeypatch, capsys):
 
 def test_a_docstring_is_no_statement():
     assert sizes.statements(ast.parse('"""Text."""\nx = """Text."""\n')) == 1
+
+
+# ----------------------------------------------------------------
+# What the package promises about its own build: who imports whom, what an import costs, which names it shows.
+
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "limitsets"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+LATE = ["numba", "scipy", "networkx", "matplotlib", "pydantic", "typer", "rich", "jinja2", "tomlkit"]
+LATE += ["pymunk", "xarray", "zarr", "pandas", "pyarrow", "dask", "distributed"]
+
+
+def run_python(code: str, cwd: Path = ROOT) -> str:
+    """Run code in a new interpreter, as a user's first lines would be, and return what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", textwrap.dedent(code)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def imported_names(source: Path) -> set[str]:
+    """Top-level names that a file imports, in whichever way and however late."""
+    names = set()
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            names.add(node.module.split(".")[0])
+        elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+            called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            if called in ("import_module", "__import__"):
+                names.add(str(node.args[0].value).split(".")[0])
+    return names
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_only_jit_imports_numba(source):
+    numba = {"numba", "llvmlite"} & imported_names(source)
+    assert not numba or source.parent == PACKAGE / "numbers" / "jit"
+
+
+def test_the_checker_imports_nothing_of_ours():
+    """So that it can be copied, shares no error with the prover, and cannot reach compiled code."""
+    for source in (PACKAGE / "checker").glob("*.py"):
+        assert imported_names(source) <= {*sys.stdlib_module_names, "numpy", "flint"}
+
+
+def test_every_name_of_the_checker_is_defined_once():
+    """In one of its files, once: a second definition would silently change what the first one's readers see."""
+    defined = []
+    for source in (PACKAGE / "checker").glob("*.py"):
+        for node in ast.parse(source.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                defined.append(node.name)
+            elif isinstance(node, ast.Assign | ast.AnnAssign):
+                stored = (each for each in ast.walk(node) if isinstance(each, ast.Name))
+                defined += [each.id for each in stored if isinstance(each.ctx, ast.Store)]
+    assert {name for name in defined if defined.count(name) > 1} == set()
+    assert "PRECISION" in defined
+
+
+def test_no_result_of_a_run_is_kept_at_the_top():
+    """Figures and reports of a trial were committed once, by `git add` in the checkout."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("git says what is kept: this is no checkout, or there is no git")
+    kept = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    top = {line.split("/")[0] for line in kept.splitlines() if not line.startswith(".")}
+    pages = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "CITATION.cff"}
+    assert top == pages | {
+        *("Makefile", "constraints.txt", "pyproject.toml"),
+        *("docs", "limitsets", "notebooks", "studies", "tests"),
+    }
+
+
+def test_the_names_of_a_room_are_listed_by_its_face_alone():
+    """A list in an inner file repeats its definitions: nobody imports a star from an inner file."""
+    inner = [path for path in SOURCES if path.name != "__init__.py" and path.parent != PACKAGE]
+    assert inner
+    assert not [path for path in inner if "__all__" in path.read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_only_the_engine_room_imports_pymunk(source):
+    assert "pymunk" not in imported_names(source) or source.parent == PACKAGE / "feeder" / "engine"
+
+
+def test_import_loads_none_of_the_late_packages():
+    loaded = run_python("import sys, limitsets; print(*sys.modules)").split()
+    assert "limitsets" in loaded
+    assert not set(LATE) & set(loaded)
+
+
+def test_networkx_finds_the_backend_without_importing_it():
+    loaded = run_python("""
+        import sys, networkx
+        assert "limitsets" in networkx.utils.backends.backends, "not installed: run make test"
+        print(*sys.modules)
+    """).split()
+    assert "limitsets" not in loaded
+
+
+def test_import_contracts_hold():
+    code = "from importlinter.cli import lint_imports_command; lint_imports_command(['--no-cache'])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_at_most_36_public_names():
+    assert len(limitsets.__all__) == len(set(limitsets.__all__)) <= 36
+    assert set(limitsets.__all__) <= set(dir(limitsets))
+
+
+# A lazy name that is spelt like a module is replaced by that module as soon as something imports it: `limitsets.x` is
+# then one thing at the first touch and another at the second.
+@pytest.mark.parametrize("order", ["limitsets.__all__", "limitsets.__all__[::-1]"])
+def test_public_names_stay_what_they_are(order):
+    run_python(f"""
+        import importlib, pkgutil, limitsets
+
+        first = {{name: getattr(limitsets, name) for name in {order}}}
+        second = {{name: getattr(limitsets, name) for name in {order}}}
+        for module in pkgutil.walk_packages(limitsets.__path__, "limitsets."):
+            if module.name != "limitsets.__main__":
+                importlib.import_module(module.name)
+        for name in first:
+            assert first[name] is second[name] is getattr(limitsets, name), name
+    """)
+
+
+def test_the_listing_of_the_package_is_its_nine_wings():
+    listed = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
+    wings = {"base", "numbers", "systems", "feeder", "proofs", "checker", "parameters", "cell", "face"}
+    assert listed == wings | {"__init__.py", "__main__.py", "py.typed"}
+
+
+@pytest.mark.parametrize(
+    "room", sorted(name for name, place in limitsets._PUBLIC.items() if ":" not in place)
+)
+def test_a_room_under_its_public_name_is_that_room(room):
+    """The same object, also of what is in it: a second import would register its kernels a second time."""
+    place = importlib.import_module(f"limitsets.{limitsets._PUBLIC[room]}")
+    assert importlib.import_module(f"limitsets.{room}") is place is getattr(limitsets, room)
+    assert place.__name__ == place.__spec__.name == f"limitsets.{limitsets._PUBLIC[room]}"
+    for file in iter_modules(getattr(place, "__path__", ())):
+        if not file.ispkg and file.name != "__main__":
+            inner = importlib.import_module(f"limitsets.{room}.{file.name}")
+            assert inner is importlib.import_module(f"{place.__name__}.{file.name}")
+
+
+def test_a_room_that_is_not_there_is_missed_by_the_name_that_was_asked_for():
+    with pytest.raises(ModuleNotFoundError, match=r"limitsets\.rooms"):
+        importlib.import_module("limitsets.rooms")
+    with pytest.raises(AttributeError, match="has no attribute 'rooms'"):
+        limitsets.rooms  # noqa: B018
+
+
+def test_files_that_the_glossary_names_are_there():
+    """docs/words.md says for each word where in the package it stands."""
+    named = re.findall(
+        r"`([a-z_]+/[a-z_/]+(?:\.py)?)`", (ROOT / "docs" / "words.md").read_text(encoding="utf-8")
+    )
+    assert len(named) > 40
+    assert [name for name in named if not (PACKAGE / name).exists()] == []
+
+
+def test_the_citation_and_the_changelog_name_this_version():
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {limitsets.__version__}\n" in text
+    released = re.search(r"\ndate-released: (\S+)\n", text)
+    assert released
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"\n## [{limitsets.__version__}] - {released[1]}\n" in changes

@@ -1,17 +1,29 @@
-"""All answers at once: the paper's scenes, parts with more sides, goals of every kind, and the JSON form."""
+"""The command that does all, for the paper's scenes and any other, and what accuracy costs."""
+
+from __future__ import annotations
 
 import json
+import math
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import limitsets as ls
-from limitsets.base.errors import AnswerError, GridError, SceneError
+from limitsets.base.errors import AnswerError, GridError, LimitsetsError, SceneError
 from limitsets.feeder.thrower import impact_angles
-from limitsets.parameters.analysis import in_limit_sets, other_vertex_first
+from limitsets.parameters.analysis import in_limit_sets, other_vertex_first, plan_for
+from limitsets.parameters.analysis.accuracy import _distance, _Visited
+from limitsets.systems.maps import codes
 from tests.scene.four_gon import FOUR_GON
+
+# ----------------------------------------------------------------
+# All answers at once: the paper's scenes, parts with more sides, goals of every kind, and the JSON form.
+
 
 HERE = Path(__file__).parent
 PAPER = ["paper-designed", "paper-designed-small-angle", "paper-initial", "paper-initial-small-angle"]
@@ -300,3 +312,187 @@ def test_a_goal_does_not_hold_where_starts_stay_that_nothing_is_known_of():
     goal = {"oriented_beyond": {"x": "200 mm", "side": 3}}
     found = ls.analyse({**FOUR_GON, "goal": goal}, 4096)
     assert found.goal.holds is None  # of the fixed point on side 3 alone it would hold
+
+
+# ----------------------------------------------------------------
+# Random scenes, some of them broken: an answer or an error of the package's own, in bounded time, and no nan.
+
+
+UNITS = st.sampled_from(["m", "cm", "mm", "in", "ft"])
+
+
+def powers(least: float, most: float) -> st.SearchStrategy[float]:
+    return st.floats(least, most).map(lambda power: 10.0**power)
+
+
+def triangle(size: float, draw: Any) -> dict[str, Any]:
+    return {"sides": [size * draw(st.floats(0.5, 1.0)) for _ in range(3)]}
+
+
+def needle(size: float, draw: Any) -> dict[str, Any]:
+    top = [size * draw(st.floats(0.3, 0.7)), size * draw(powers(-13.0, -1.0))]
+    return {"vertices": [[0.0, 0.0], [size, 0.0], top]}
+
+
+def polygon(size: float, draw: Any) -> dict[str, Any]:
+    count = draw(st.integers(3, 64))
+    angle = (
+        2.0 * math.pi * (np.arange(count) + np.array(draw(st.floats(0.0, 0.3))) * np.cos(np.arange(count)))
+    )
+    return {"vertices": [[size * math.cos(t / count), size * math.sin(t / count)] for t in angle]}
+
+
+@st.composite
+def scenes(draw: Any) -> dict[str, Any]:
+    """Sizes from 1e-7 to 1e4, gravity and speed over all their range; some parts cannot rest, some are none."""
+    unit, size = draw(UNITS), draw(powers(-7.0, 4.0))
+
+    def written(value: Any) -> Any:
+        return [written(entry) for entry in value] if isinstance(value, list) else f"{float(value)!r} {unit}"
+
+    shape = draw(st.sampled_from([triangle, needle, polygon]))(size, draw)
+    part: dict[str, Any] = {key: written(value) for key, value in shape.items()}
+    if draw(st.booleans()):
+        part["mass"] = {"plate_density": "1 kg/m^2"}
+    else:
+        centre = {
+            "side": draw(st.integers(0, 3)),
+            "along": written(size * draw(st.floats(-0.1, 0.9))),
+            "above": written(size * draw(powers(-12.0, -0.3))),
+        }
+        part["mass"] = {"center": centre, "radius_of_gyration": written(size * draw(powers(-3.0, 1.0)))}
+    if draw(st.booleans()):
+        throw = {"throw": {"kappa": written(size * draw(powers(-6.0, 12.0) | powers(-0.5, 1.5)))}}
+    else:
+        speed = f"{draw(powers(-9.0, 9.0))!r} {draw(st.sampled_from(['deg/s', 'rad/s']))}"
+        throw = {"throw": {"speed": speed}, "gravity": {"tilt": "30 deg"}}
+    height = draw(st.sampled_from([-1.0, 1.0, 0.0])) * size * draw(powers(-6.0, 0.5))
+    arm = {"surface_height": written(height), "length": written(size * draw(powers(-0.2, 2.0)))}
+    model = {"flip": draw(st.sampled_from(["signed", "energy"]))}
+    return {"name": "any", "part": part, "arm": arm, "model": model, **throw}
+
+
+def check_throws(scene: ls.scene.Scene) -> None:
+    for side in range(len(scene.sides)):
+        a = float(scene.sides.a[side])
+        for share in (1e-15, 1e-6, 0.1, 0.5, 1.0):
+            path = ls.orbit(scene.map, a + (scene.arm_length - a) * share, side, 100)
+            assert np.isfinite(path.x).all()
+            assert (path.code[:-1] >= 0).all()
+            assert path.code.size == 100 or path.stopped is not None
+            assert ((path.side >= 0) & (path.side < len(scene.sides))).all()
+
+
+@pytest.mark.sweep
+@settings(max_examples=30, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@given(scenes())
+def test_an_answer_or_an_error(table: dict[str, Any]) -> None:
+    try:
+        scene = ls.load(table)
+        found = ls.analyse(scene, cells=16, throws=100)
+    except LimitsetsError:
+        return
+    check_throws(scene)
+    shares = [*found.basins.attractors, found.basins.undecided_between, *found.basins.exits.values()]
+    assert math.isclose(sum(shares), 1.0, rel_tol=1e-9)
+    assert found.basins.labels.min() >= codes.UNDEFINED
+    assert found.basins.labels.max() < len(found.attractors)
+    for limit, attractor in zip(found.limit_sets, found.attractors, strict=True):
+        assert limit.converged or limit.advice
+        assert attractor.stopped in (None, "stalled", *found.graph.exits)
+    json.dumps(found.to_json(), allow_nan=False)
+
+
+# ----------------------------------------------------------------
+# An error asked for: which method is picked for it, and whether what is reached is true.
+
+
+# From the decimal scenes at 40 digits.
+EXACT = {
+    "paper-designed": {
+        0: [(15.205338825681, 19.75268801485)],
+        1: [(12.637023572659, 17.439819281769)],
+        2: [(8.9140259080455, 23.383151921158)],
+    },
+    "paper-initial": {
+        0: [(13.522673689975, 20.915912223359)],
+        1: [(18.994941734574, 19.975954977782), (20.434045200511, 21.554457325114)],
+        2: [(16.262705754072, 21.886351326378)],
+    },
+}
+
+
+def true_error(found, name):
+    exact = EXACT[name]
+    return _distance(found.extents[0], exact)
+
+
+@pytest.mark.parametrize("name", sorted(EXACT))
+@pytest.mark.parametrize("error", [0.5, 0.05, 1e-3, 1e-6, 1e-10])
+def test_the_error_asked_for_is_met_and_known(name, error):
+    plans = []
+    found = ls.analyse(name, error=error, announce=plans.append)
+    reached = found.accuracy
+    assert plans == [reached.plan]
+    assert reached.plan.expected
+    assert reached.met
+    assert true_error(found, name) <= reached.reached + 1e-12  # the ends above have twelve digits
+    assert found.extents_from == (reached.plan.chosen.method,)
+    assert found.graph.grid.shape[0, 0] == reached.plan.chosen.cells
+    assert reached.plan.chosen.error <= error
+
+
+def test_cells_never_do_for_a_small_error():
+    plan = plan_for(ls.load("paper-designed"), 1e-6)
+    assert plan.chosen.method == "end points"
+    assert plan.other.method == "cells"
+    assert plan.other.error > 1e-6
+
+
+def test_what_cannot_be_met_is_told():
+    found = ls.analyse("paper-designed", error=1e-16)
+    assert not found.accuracy.plan.expected
+    assert not found.accuracy.met
+    assert "rounding" in found.accuracy.advice
+    assert found.accuracy.proved < 1e-10
+    record = json.loads(json.dumps(found.to_json(), allow_nan=False))["accuracy"]
+    assert record["met"] is False
+    assert record["reached"] > record["asked"] == 1e-16
+
+
+def test_where_nothing_stays_there_is_nothing_to_meet():
+    scene = ls.load(HERE / "five-sides.toml").with_values(
+        {"throw.kappa": 60.0, "arm.surface_height": -0.5}  # weak throws with a high arm
+    )
+    found = ls.analyse(scene, error=1e-3)
+    assert found.attractors == ()
+    assert found.accuracy.reached is None
+    assert not found.accuracy.met
+    json.dumps(found.to_json(), allow_nan=False)
+
+
+def test_nothing_is_planned_where_nothing_is_asked():
+    assert ls.analyse("paper-designed").to_json()["accuracy"] is None
+
+
+@pytest.mark.parametrize("error", [0, -1.0, float("nan"), float("inf"), "fine"])
+def test_errors_that_cannot_be(error):
+    with pytest.raises(AnswerError, match="error"):
+        ls.analyse("paper-designed", error=error)
+
+
+def test_cells_and_an_error():
+    with pytest.raises(AnswerError, match="not both"):
+        ls.analyse("paper-designed", 64, error=1e-3)
+
+
+def test_distance_of_unions():
+    assert _distance({0: [(0.0, 1.0)]}, {0: [(0.25, 1.5)]}) == 0.5
+    assert _distance({0: [(0.0, 4.0)]}, {0: [(0.0, 1.0), (3.0, 4.0)]}) == 1.0  # the middle of the gap
+    assert _distance({0: [(0.0, 4.0)]}, {0: [(0.0, 4.0)], 1: [(0.0, 1.0)]}) == float("inf")
+
+
+def test_a_hole_counts_by_half():
+    seen = _Visited(0, 0.0, 10.0, 0.01)
+    seen.add(np.concatenate([np.arange(0.0, 4.0, 0.005), np.arange(6.0, 10.0, 0.005)]))
+    assert seen.gap() == pytest.approx(1.0, abs=0.03)

@@ -1,4 +1,4 @@
-"""Films of feeding, feedback, margins and recordings, and what cannot be shown."""
+"""The films: each kind shows what was computed, with the part where the throw puts it."""
 
 import math
 
@@ -6,14 +6,25 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.base.errors import AnswerError
+from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.cell.feeding import time_to_tip
-from limitsets.cell.feeding.falling import arm_end_of
+from limitsets.cell.feeding.falling import arm_end_of, tipping_times
 from limitsets.face.animation import film_of
-from limitsets.feeder.engine.member import Recording
+from limitsets.face.animation.fed import film_of_recording
+from limitsets.face.animation.film import Asked
+from limitsets.face.animation.picture import Picture
+from limitsets.face.plot.throwing import about_centre, motion, throws_of, turned
+from limitsets.feeder.engine import Crowd
+from limitsets.feeder.engine.crowd import depth_of_overlap
+from limitsets.feeder.engine.member import Recording, ground_of
+from limitsets.feeder.thrower import trace
 from tests.assembly.pairs import pair as pair_of_tests
+from tests.cli.command import run
 from tests.feeding.scenes import with_cavity
 from tests.trays.scenes import with_tray
+
+# ----------------------------------------------------------------
+# Films of feeding, feedback, margins and recordings, and what cannot be shown.
 
 
 def test_a_part_is_fed_tips_in_its_time_and_lies_on_the_ramp():
@@ -192,3 +203,235 @@ def test_a_tray_shows_its_passes():
     assert film.surface is None
     assert any(caption.startswith("Kick") for caption in film.captions)
     assert len(film.ground) == 3
+
+
+# ----------------------------------------------------------------
+# The cavity in films: it turns with the arm, and no part is swept through it.
+
+
+ASKED = Asked(None, None, 20.0, 3.0)
+
+
+def deepest(film, scene):
+    """How deep any part is in the ramp, the floor or the wall, as the arm of that frame holds them."""
+    blocks = [piece.corners for piece in ground_of(scene).pieces if piece.name != "arm"]
+    worst = -math.inf
+    for frame in range(film.frames):
+        angle = float(film.arm[frame])
+        back = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+        for part in np.flatnonzero(np.isfinite(film.poses[frame, :, 0])):  # those in play
+            corners = (film.polygon(frame, part) @ back).tolist()  # as seen from the arm
+            worst = max(worst, *(depth_of_overlap(corners, block.tolist()) for block in blocks))
+    return worst
+
+
+@pytest.mark.parametrize("start", [(19.59, 0), (18.2, 2)])
+def test_a_part_that_hangs_over_the_end_swings_with_the_cavity(start):
+    scene = with_cavity()
+    film = film_of(arm_end_of(scene), start=start)
+    assert film.arm.min() < -0.05
+    hangs = [film.polygon(k)[:, 0].max() > 20.0 for k in np.flatnonzero(film.arm == 0.0)]
+    assert any(hangs)
+    assert deepest(film, scene) < 0.01
+
+
+@pytest.mark.parametrize("carried", [True, False])
+def test_parts_in_the_cavity_are_not_swept_through_it(carried):
+    """One lies in the cavity, one hangs over the end, and both are thrown where the cavity is part of the arm."""
+    pytest.importorskip("pymunk")
+    scene = with_cavity(tables={"effects": {"contact": True}, "world": {"friction": 0.9}})
+    crowd = Crowd([scene, scene], carried=carried, record=True)
+    crowd.place(0, 21.0, 2)
+    crowd.settle()
+    crowd.place(1, 19.0, 2)
+    crowd.throw()
+    film = film_of_recording(crowd.recording(), ASKED, [scene, scene], carried=carried)
+    assert bool(film.arm.min() < -0.05) is carried  # a standing cavity is in the way of the arm's swing
+    assert ("with the cavity" in film.about) is carried
+    # in one step a corner comes as deep as it is fast, 25 in x 4e-3; swept through the ramp it would be inches
+    assert deepest(film, scene) < 0.15
+    shown = [
+        shape.points
+        for shape in Picture.of(film).moving(int(film.arm.argmin()))
+        if shape.look.get("what") == "ground"
+    ]
+    assert bool(shown) is carried  # else it is drawn once
+    low, high = np.array([0.0, 0.0]), np.array(Picture.of(film).size)
+    assert all((low <= each).all() and (each <= high).all() for each in shown)
+
+
+def test_it_tips_as_fast_as_it_came_down():
+    for tips in ("moving", "rest"):
+        scene = with_cavity(tips=tips)
+        film = film_of(arm_end_of(scene), start=(17.7, 2), throws=1)
+        tipping = np.flatnonzero([film.captions[k].startswith("It tips") for k in film.caption])
+        shown = film.times[tipping[-1]] - film.times[tipping[0] - 1]
+        beyond = np.array([film.rests[-1].x - 20.0])
+        assert shown == pytest.approx(float(tipping_times(scene, 2)(beyond)[0]), rel=1e-4)
+
+
+def test_a_part_from_which_the_throw_acts_beyond_the_end_is_not_thrown():
+    with pytest.raises(AnswerError, match="where throws act beyond the end"):
+        film_of(arm_end_of(with_cavity()), start=(19.95, 2))
+
+
+def test_a_standing_cavity_is_one_of_assembly(capfd):
+    code, _, err = run(capfd, "animate", "paper-triangle", "--feed", "--standing")
+    assert code == 2
+    assert "--assemble" in err
+    with pytest.raises(LimitsetsError, match=r"effects\.contact"):
+        ls.assemble("paper-triangle", "paper-quadrilateral", carried=False, trials=1)
+
+
+# ----------------------------------------------------------------
+# Films of throws: what is shown at the release, the impact and the rest are the map's numbers; nothing sinks in.
+
+
+ROLLING = {"effects": {"landing": True, "roll": True}}
+SCATTERED = {
+    "effects": {"spread": "bounded"},
+    "world": {"scatter": {"speed": "0.5 %", "landing": "0.05 in"}},
+}
+DRIVEN = {"effects": {"drive": True}, "world": {"stroke": "8 deg"}}
+SLIPPING = {"effects": {"slip": True}, "world": {"friction": 0.6}}
+
+
+def scene_of(name, **more):
+    return ls.load({**ls.load(name).as_dict(), **more})
+
+
+def frames_of(film, word):
+    return [mark.frame for mark in film.marks if mark.word == word]
+
+
+def heights(film, frame):
+    """Of the corners over the arm, in the frame of the arm, which turns about the joint."""
+    corners = film.polygon(frame)
+    angle = -film.arm[frame]
+    return math.sin(angle) * corners[:, 0] + math.cos(angle) * corners[:, 1] - film.surface[0]
+
+
+@pytest.mark.parametrize("name", ["paper-designed", "paper-initial", "paper-designed-small-angle"])
+def test_release_impact_and_rest_are_those_of_the_map(name):
+    """In the exact model by an independent formula: R - (h + d) phi - a cos phi + d sin phi is the stuck vertex."""
+    scene = ls.load(name)
+    film = film_of(scene, start=(15.0, 2), throws=3)
+    path = trace(scene.map, 15.0, 2, 3)
+    a, d, h = scene.sides.a, scene.sides.d, scene.surface_height
+    for k, (released, struck, rested) in enumerate(
+        zip(*(frames_of(film, word) for word in ("thrown", "impact", "rest")), strict=True)
+    ):
+        x, side, phi = path.x[k], path.side[k], path.phi[k]
+        assert film.arm[released] == film.arm[struck] == film.arm[rested] == 0.0
+        assert film.poses[released, 0, :2] == pytest.approx([x, h + d[side]], abs=1e-9)
+        assert film.poses[struck, 0, 2] - film.poses[released, 0, 2] == pytest.approx(phi, abs=1e-12)
+        left = -side % 3
+        corner = film.polygon(struck)[left]
+        at = x - h * phi - a[side]
+        if scene.flight == "exact":
+            at = x - (h + d[side]) * phi - a[side] * math.cos(phi) + d[side] * math.sin(phi)
+        assert corner == pytest.approx([at, h], abs=1e-9)
+        after, on = path.x[k + 1], path.side[k + 1]
+        assert film.poses[rested, 0, :2] == pytest.approx([after, h + d[on]], abs=1e-9)
+        bottom = film.polygon(rested)[[-on % 3, (1 - on) % 3]]
+        assert bottom[:, 1] == pytest.approx([h, h], abs=1e-9)
+        assert bottom[0, 0] == pytest.approx(after - a[on], abs=1e-9)
+        assert film.rests[k].x == after
+        assert film.rests[k].side == on
+
+
+@pytest.mark.parametrize("name", ["paper-designed", "paper-initial", "paper-initial-small-angle"])
+def test_no_corner_is_below_the_arm_in_any_frame(name):
+    film = film_of(name, throws=6)
+    assert min(heights(film, k).min() for k in range(film.frames)) > -1e-9
+
+
+def test_a_part_lies_on_the_arm_while_that_swings():
+    film = film_of("paper-designed", start=(15.0, 2), throws=1)
+    released = frames_of(film, "thrown")[0]
+    assert film.arm.min() == pytest.approx(-math.radians(12.0))
+    for k in range(released + 1):
+        assert sorted(heights(film, k))[:2] == pytest.approx([0.0, 0.0], abs=1e-9)
+    # constant acceleration from rest: the angle to go falls as 1 - share^2
+    swing = film.arm[np.argmin(film.arm) : released + 1] / film.arm.min()
+    share = np.linspace(0.0, 1.0, swing.size)
+    assert swing == pytest.approx(1.0 - share**2, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "more", "starts"),
+    [
+        ("paper-initial", ROLLING, [(19.5, 1), (27.0, 0), (24.0, 1)]),
+        ("paper-designed", SCATTERED, [(15.0, 2), (19.0, 0)]),
+        pytest.param("paper-designed", DRIVEN, [(15.0, 2), (19.0, 0)], marks=pytest.mark.sweep),
+        pytest.param("paper-designed", SLIPPING, [(15.0, 2), (19.0, 0)], marks=pytest.mark.sweep),
+    ],
+)
+def test_effects_join_without_a_jump_and_end_where_the_map_says(name, more, starts):
+    scene = scene_of(name, **more)
+    body, share = about_centre(scene), np.linspace(0.0, 1.0, 31)
+    for x, side in starts:
+        for throw in throws_of(scene, trace(scene.map, x, side, 5)):
+            moves = motion(scene, throw)
+            flight, turning = moves.flight(share), moves.turning.pose(share)
+            assert moves.struck[1] == pytest.approx(scene.surface_height, abs=1e-9)
+            assert flight[-1] == pytest.approx(turning[0], abs=1e-9)
+            at_rest = throw.after, scene.surface_height + scene.sides.d[throw.side_after]
+            assert turning[-1, :2] == pytest.approx(at_rest, abs=1e-9)
+            lowest = min(float((turned(body, pose[2])[:, 1] + pose[1]).min()) for pose in (*flight, *turning))
+            assert lowest > scene.surface_height - 1e-9
+            assert moves.turning.drawn == ("slip" in more["effects"])
+
+
+def test_a_roll_shows_the_vertex_it_rolls_on_over():
+    scene = scene_of("paper-initial", **ROLLING)
+    (throw,) = throws_of(scene, trace(scene.map, 19.5, 1, 1))
+    assert throw.word == "roll"
+    assert len(motion(scene, throw).turning.faces) >= 1
+    film = film_of(scene, start=(19.5, 1), throws=1)
+    assert frames_of(film, "roll")
+
+
+def test_the_turn_about_the_vertex_conserves_energy():
+    """(1/2) M omega^2 + kappa H, with M = rho^2 + ell^2 about the struck vertex (docs/model.md)."""
+    scene = ls.load("paper-designed")
+    (throw,) = throws_of(scene, trace(scene.map, 21.0, 2, 1))
+    moves = motion(scene, throw)
+    share = np.linspace(0.0, 1.0, 2001)
+    poses = moves.turning.pose(share)
+    rate = np.gradient(poses[:, 2], share * moves.turning.time, edge_order=2)
+    arm = poses[:, :2] - np.array(moves.struck)
+    inertia = scene.radius_of_gyration**2 + (arm**2).sum(axis=1)
+    energy = 0.5 * inertia * rate**2 + scene.kappa * arm[:, 1]
+    assert energy == pytest.approx(energy[0], rel=1e-4)
+
+
+def test_times_are_seconds_by_gravity_and_else_in_1_over_w():
+    """phi / w with w = sqrt(g / kappa), the time of flight; without gravity w is 1."""
+    scene = ls.load("paper-designed")
+    tree = scene.as_dict()
+    del tree["gravity"]
+    for each, rate, clock in ((scene, math.sqrt(193.045 / 25.3778518), "s"), (ls.load(tree), 1.0, "1/w")):
+        film = film_of(each, start=(15.0, 2), throws=1, fps=100.0, slow=20.0)
+        released, struck = frames_of(film, "thrown")[0], frames_of(film, "impact")[0]
+        phi = trace(each.map, 15.0, 2, 1).phi[0]
+        assert film.clock == clock
+        assert film.times[struck] - film.times[released] == pytest.approx(phi / rate, rel=1e-9)
+        assert np.all(np.diff(film.times) > 0.0)
+
+
+def test_slow_motion_makes_more_frames_of_the_same_times():
+    short, long = (film_of("paper-designed", start=(15.0, 2), throws=1, slow=slow) for slow in (2.0, 8.0))
+    flown = [frames_of(film, "impact")[0] - frames_of(film, "thrown")[0] for film in (short, long)]
+    assert flown[1] == pytest.approx(4 * flown[0], abs=4)
+
+
+def test_lanes_show_the_limit_set_and_the_part_over_its_place():
+    film = film_of("paper-designed", throws=3)
+    ((lo, hi),) = film.lanes.sets[0][2]
+    assert (lo, hi) == pytest.approx((8.9140259080455, 23.383151921158), abs=1e-6)  # docs: from 40 digits
+    assert film.lanes.critical[2] == pytest.approx((20.0,), abs=1e-5)
+    assert film.lanes.goal == (20.0, 2)
+    for rest in film.rests:
+        assert film.position[rest.frame] == pytest.approx([rest.x, rest.side])
+        assert any(lo <= rest.x <= hi for lo, hi in film.lanes.sets[0][rest.side])

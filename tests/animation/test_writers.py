@@ -12,7 +12,7 @@ from limitsets.base.errors import AnswerError
 from limitsets.face.animation import animating, film_of
 from limitsets.face.animation.picture import Picture
 from limitsets.face.animation.writers import frames
-from tests.test_architecture import LATE, run_python
+from tests.test_lines import LATE, run_python
 
 SHORT = {"start": (21.0, 2), "throws": 1, "slow": 1.0, "fps": 20.0}
 

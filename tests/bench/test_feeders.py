@@ -1,13 +1,9 @@
-"""Random feeders: do the shares by `feed` lie within their stated errors of a million parts thrown in C?
+"""Fed parts by the million and fits of machines, with their rivals."""
 
-``--feeders=200`` draws so many in place of 12 (about 5 s each).  The rule is fixed beforehand and no feeder is chosen
-by its answer: what is left out is left out by a pilot of 300 parts in C, and counted.
-
-By theory the share fed rightly is within its error in 93.8 of 100, and the median stated error of 200 feeders is 3.02
-+- 0.25 times the median deviation: 1.96 / 0.707 where all shares are alike, more where their errors differ.
-"""
+from __future__ import annotations
 
 import ctypes
+import os
 import subprocess
 from collections import Counter
 from pathlib import Path
@@ -21,7 +17,19 @@ from limitsets.base.errors import LimitsetsError
 from limitsets.cell.feeding.falling import FATES, arm_end_of
 from limitsets.feeder.scattering import Gaussian, Scattering, Uniform
 from tests.bench.compiled import compiler
+from tests.bench.fitted_machines import EFFECTS, measured
 from tests.bench.measure import limit
+from tests.fitting.machines import RADIUS
+from tests.fitting.test_fit import PLACES
+from tests.fitting.test_throws import FIVE, covered
+
+# ----------------------------------------------------------------
+# Random feeders: do the shares by `feed` lie within their stated errors of a million parts thrown in C?
+# ``--feeders=200`` draws so many in place of 12 (about 5 s each).  The rule is fixed beforehand and no feeder is
+# chosen by its answer: what is left out is left out by a pilot of 300 parts in C, and counted.
+# By theory the share fed rightly is within its error in 93.8 of 100, and the median stated error of 200 feeders is
+# 3.02 +- 0.25 times the median deviation: 1.96 / 0.707 where all shares are alike, more where their errors differ.
+
 
 SOURCE = Path(__file__).with_name("feeder.c")
 # Parts of the truth, and of the pilot; feeders whose parts take more throws in the mean are left out, as are those
@@ -153,3 +161,50 @@ def test_shares_are_within_their_stated_errors(table, fates, request, capsys):
     for why, times in left_out.most_common():
         table.append(limit(f"feed: left out: {why}", float(times), "", None))
     assert inside.min() >= binom.ppf(1e-3, count, INSIDE)
+
+
+# ----------------------------------------------------------------
+# Fits of a thousand machines of known truth: coverage, sides recorded wrong, level and power of the misfit test.
+
+
+MACHINES, FILMS = 1000, 1000
+# 99 % of the counts of 1000 intervals of 95 %; at a bound, and of what decisions alone tell, they hold more often.
+LEAST, MOST = 932, 966
+
+
+@pytest.mark.bench
+def test_a_thousand_machines(table):
+    found = measured(MACHINES, FILMS, os.cpu_count() or 1)
+    assert found["errors"] == []
+    for share, least in (("clean", LEAST), ("flipped", 930)):
+        counts = found[share]["intervals"]
+        for name in (*PLACES, "region"):
+            each = counts[name]
+            table.append(limit(f"fit, {share} sides: {name} held, of {each['told']}", each["held"], "", None))
+            assert each["told"] == MACHINES
+            assert least <= each["held"]
+            assert share == "flipped" or each["held"] <= MOST
+        for name in (RADIUS, "speed", "landing"):
+            each = counts[name]
+            what = f"fit, {share} sides: {name} held, of {each['told']}, {each['open']} open"
+            table.append(limit(what, each["held"], "", None))
+            assert each["held"] >= binom.ppf(0.005, each["told"], 0.95)
+    for kind in ("median off, standard errors", "median moved, standard errors"):
+        for name, size in found["flipped"][kind].items():
+            table.append(limit(f"fit, 5 % of sides wrong: {name}, {kind}", abs(size), "", 1.0))
+            assert abs(size) < 1.0
+    for share, rejected in found["level"].items():
+        table.append(limit(f"misfit test at 5 %: rejected with {share} of sides wrong", rejected, "", None))
+        assert rejected <= binom.ppf(0.999, MACHINES, 0.05)
+    for effect in EFFECTS:
+        table.append(limit(f"misfit test: {effect} told apart, of {FILMS}", found["power"][effect], "", None))
+        assert found["power"][effect] >= 0.9 * FILMS
+    table.append(limit("fit of fifty throws", found["seconds"]["fit, median"], "s", None))
+
+
+@pytest.mark.bench
+def test_two_hundred_films_of_corners(table):
+    held = covered(200, 3)
+    for name in FIVE:
+        table.append(limit(f"fit, corners: {name} held, of 200", held[name], "", None))
+        assert held[name] >= 184

@@ -1,9 +1,15 @@
-"""Map, components, order and basins of the Leslie map, against CMGDB and against numpy and scipy."""
+"""Graphs of cells against their rivals: Leslie, networkx, a million cells."""
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+from dataclasses import replace
 from importlib.util import find_spec
+from pathlib import Path
 
+import networkx as nx
 import numpy as np
 import pytest
 
@@ -12,10 +18,9 @@ from limitsets.systems.graph.components import reach
 from tests.bench.leslie_rivals import HI, LO, Answer, by_cmgdb, by_scipy
 from tests.bench.measure import Turns, limit, take_turns, versus
 
-pytestmark = [
-    pytest.mark.bench,
-    pytest.mark.skipif(find_spec("CMGDB") is None, reason="CMGDB is not installed: make bench does it"),
-]
+# ----------------------------------------------------------------
+# Map, components, order and basins of the Leslie map, against CMGDB and against numpy and scipy.
+
 
 CMGDB, SCIPY = "CMGDB 1.5.2, batch", "numpy and scipy"
 ROUNDS = {16: 15, 18: 7, 20: 5}
@@ -47,6 +52,8 @@ def reached_sets(graph):
     return dict(zip(names, counts.tolist(), strict=True))
 
 
+@pytest.mark.bench
+@pytest.mark.skipif(find_spec("CMGDB") is None, reason="CMGDB is not installed: make bench does it")
 @pytest.mark.parametrize("depth", [16, 18, 20])
 def test_leslie(benchmark, depth, table):
     to_order = []
@@ -86,3 +93,73 @@ def test_leslie(benchmark, depth, table):
                 None,
             )
         )
+
+
+# ----------------------------------------------------------------
+# networkx's own function on our graph and on a networkx.DiGraph of the same edges.
+
+
+PLAIN, KEPT = "networkx.DiGraph", "ours, components kept from before"
+
+
+def paper():
+    scene = ls.load("paper-designed")
+    return ls.transitions(scene.map, ls.grid(scene.domain, cells=33_334))
+
+
+def leslie():
+    return ls.transitions(ls.maps.Leslie(), ls.grid([(-0.001, 90), (-0.001, 70)], cells=(317, 316)))
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("build", [paper, leslie])
+def test_attracting_components(benchmark, build, table):
+    graph = build()
+    plain = graph.to_networkx()
+    list(nx.attracting_components(graph))
+
+    def cold():
+        fresh = replace(graph)  # the same ranges, nothing computed yet
+        return list(nx.attracting_components(fresh))
+
+    rivals = {
+        PLAIN: lambda: list(nx.attracting_components(plain)),
+        KEPT: lambda: list(nx.attracting_components(graph)),
+    }
+    turns = take_turns(benchmark, cold, rivals, 7)
+    for name in rivals:
+        assert sorted(map(sorted, turns.answer)) == sorted(map(sorted, turns.answers[name]))
+    what = f"nx.attracting_components, {build.__name__}, {graph.n_cells} cells"
+    table += [versus(what, turns, PLAIN, unit="ms", faster=50), versus(what, turns, KEPT, unit="ms")]
+
+
+# ----------------------------------------------------------------
+# 1e6 cells of the paper scene: how long, and how much memory above what the process held before.
+
+
+# Ends of the limit set, side by side, from the decimal scene at 40 digits.
+LIMIT_SET = {
+    "0": (15.205338825681, 19.75268801485),
+    "1": (12.637023572659, 17.439819281769),
+    "2": (8.9140259080455, 23.383151921158),
+}
+
+
+@pytest.mark.bench
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peak memory is read from /proc")
+def test_million_cells(table):
+    script = Path(__file__).with_name("million_cells.py")
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True)
+    answer = json.loads(done.stdout)
+    assert answer["attractors"] == [pytest.approx(1.0, abs=1e-4)]
+    assert answer["undecided"] == pytest.approx(0.0, abs=1e-4)
+    for side, (lo, hi) in LIMIT_SET.items():
+        ((found_lo, found_hi),) = answer["extents"][side]
+        assert found_lo == pytest.approx(lo, abs=2e-3)
+        assert found_hi == pytest.approx(hi, abs=2e-3)
+    what = "paper-designed, 1e6 cells"
+    table += [
+        limit(f"{what}: grid, graph, components, survey", answer["seconds"], "s", None),
+        limit(f"{what}: the same with attractors and basins", answer["seconds_with_basins"], "s", 0.5),
+        limit(f"{what}: peak memory above the process before", answer["peak"], "MB", 300),
+    ]

@@ -1,4 +1,4 @@
-"""Grids cover the domain exactly, graded ones shrink towards the anchor, and cells are found where they are."""
+"""Cells of a grid, and sets of cells."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,11 @@ from hypothesis import strategies as st
 
 import limitsets as ls
 from limitsets.base.errors import GridError
-from limitsets.systems.cells import Domain, Grid, as_domain
+from limitsets.systems.cells import CellSet, Domain, Grid, as_domain
+
+# ----------------------------------------------------------------
+# Grids cover the domain exactly, graded ones shrink towards the anchor, and cells are found where they are.
+
 
 ANCHORED = Domain([[1.001], [2.0005]], [[28.0], [20.0]], [1.0, 2.0])
 
@@ -139,3 +143,70 @@ def test_a_grid_is_shown_as_a_table():
     assert cover.table().shown() == [["0", "0", "4", "0 to 1", "0.25"], ["0", "1", "8", "0 to 4", "0.5"]]
     assert "Grid of 32 cells" in cover._repr_html_()
     assert repr(cover) == "Grid(32 cells: 4x8)"
+
+
+# ----------------------------------------------------------------
+# The set algebra obeys the laws of sets, and extents are the intervals a person would draw.
+
+
+COVER = ls.grid(Domain([[0.0], [10.0]], [[1.0], [12.0]]), cells=8)
+subsets = st.lists(st.booleans(), min_size=16, max_size=16).map(lambda bits: CellSet(COVER, np.array(bits)))
+
+
+@given(subsets, subsets, subsets)
+def test_the_laws_of_sets(a, b, c):
+    assert (a | b) & c == (a & c) | (b & c)
+    assert ~(a | b) == ~a & ~b
+    assert a - b == a & ~b
+    assert (a <= b) == (a | b == b)
+    assert np.isclose((a | b).measure() + (a & b).measure(), a.measure() + b.measure())
+    assert len(a) + len(~a) == COVER.n_cells
+
+
+@given(subsets)
+def test_extents_hold_the_cells_and_nothing_else(a):
+    total = sum(hi - lo for parts in a.extents().values() for lo, hi in parts)
+    assert np.isclose(total, a.measure())
+    for side, parts in a.extents().items():
+        for lo, hi in parts:
+            inside = (COVER.centres(side) > lo) & (COVER.centres(side) < hi)
+            assert a.mask[COVER.of_side(side)][inside].all()
+
+
+@given(subsets, st.sampled_from([0, 1]), st.lists(st.integers(-3, 35), min_size=1))
+def test_a_set_holds_the_states_of_its_cells(a, side, quarters):
+    """Quarters of cells: inside, on borders, beyond the domain."""
+    width = 0.125 if side == 0 else 0.25
+    x = COVER.edges[side][0][0] + width * np.array(quarters) / 4.0
+    cell = COVER.index(x, side)
+    assert np.array_equal(a.holds(x, side), a.mask[cell] & (cell >= 0))
+
+
+def test_neighbouring_cells_make_one_interval():
+    assert CellSet.of(COVER, [0, 1, 3, 8]).extents() == {0: [(0.0, 0.25), (0.375, 0.5)], 1: [(10.0, 10.25)]}
+
+
+def test_a_refined_set_is_the_same_set():
+    a = CellSet.of(COVER, [0, 5, 15])
+    fine = a.refined(COVER.refine(4))
+    assert fine.extents() == a.extents()
+    plane = ls.grid([(0, 1), (0, 1)], cells=(2, 3))
+    piece = CellSet.of(plane, [4])
+    assert np.isclose(piece.refined(plane.refine(2)).measure(), piece.measure())
+
+
+def test_sets_of_different_grids_do_not_mix():
+    other = CellSet.of(ls.grid([(0.0, 1.0)], cells=16), [0])
+    with pytest.raises(GridError, match="same grid"):
+        CellSet.of(COVER, [0]) | other
+    with pytest.raises(GridError, match="16 booleans"):
+        CellSet(COVER, np.zeros(3, dtype=bool))
+
+
+def test_ranges_along_every_axis():
+    """Cells 1 and 14 of 4 by 4 on [0, 1] x [0, 4] are (0, 1) and (3, 2), the last axis counting fastest."""
+    cells = CellSet.of(ls.grid([(0.0, 1.0), (0.0, 4.0)], cells=4), [1, 14])
+    assert cells.extents() == cells.extents(axis=0) == {0: [(0.0, 0.25), (0.75, 1.0)]}
+    assert cells.extents(axis=1) == {0: [(1.0, 3.0)]}
+    with pytest.raises(GridError, match="the axis"):
+        cells.extents(axis=2)

@@ -16,8 +16,7 @@ from limitsets.base.errors import SceneError
 from limitsets.face.cli.output import table
 from limitsets.face.report.robust_pages import robustness_page
 from tests.cli.command import run
-from tests.lead_quad import LEAD_QUAD
-from tests.lead_triangle import left_by_some
+from tests.plates import LEAD_QUAD, left_by_some
 
 SCATTER = {"world": {"scatter": {"speed": "1 %"}}, "effects": {"spread": "bounded"}}
 

@@ -1,15 +1,23 @@
-"""`limitsets design`: words, JSON, files, exit codes."""
+"""`design` and `fit` at the command line."""
 
+import csv
 import json
 import math
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.face.cli.arguments import bounds_of
 from tests.cli.command import run
+from tests.fitting.machines import ABOVE, ALONG, HEIGHT, RADIUS, farthest, film
+
+# ----------------------------------------------------------------
+# `limitsets design`: words, JSON, files, exit codes.
+
 
 VARY = "part.mass.center.along,part.mass.center.above,throw.speed"
 
@@ -117,3 +125,195 @@ def test_bare_bounds_are_in_the_unit_of_the_scenes_text():
 def test_bounds_that_are_turned_round_are_refused(word):
     with pytest.raises(LimitsetsError, match="a lower and a higher one"):
         bounds_of(ls.load("paper-initial"), [word])
+
+
+# ----------------------------------------------------------------
+# `limitsets design --robust`: search without proof, its files, and what it refuses.
+
+
+@pytest.mark.sweep
+def test_a_search_writes_scene_answer_and_figure(here, capfd):
+    tree = ls.load("paper-designed").as_dict() | {"tolerance": {"throw.speed": "1 %"}}
+    ls.dump(ls.load(tree), "given.toml")
+    code, out, _ = run(
+        capfd,
+        "design",
+        "given.toml",
+        "--robust",
+        "--evaluations",
+        "4",
+        "--vary",
+        "part.mass.center.along,throw.kappa",
+        "--seconds",
+        "0",
+        "--out",
+        "found",
+        "--json",
+    )
+    assert code == 0
+    record = json.loads(out)
+    assert record["margins"] == []
+    assert {path.name for path in Path("found").iterdir()} == {
+        "paper-designed-robust.toml",
+        "design.json",
+        "front.png",
+        "part.png",
+    }
+    kept = json.loads(Path("found/design.json").read_text(encoding="utf-8"))
+    assert isinstance(kept["model"]["assumptions_broken"], int)  # as it is printed
+    assert kept["model"] == record["model"]
+    again = ls.load(Path("found") / "paper-designed-robust.toml")
+    assert again.value("throw.kappa") == record["values"]["throw.kappa"]
+
+
+@pytest.mark.sweep
+def test_the_scene_alone(capfd):
+    words = ("--robust", "--evaluations", "20", "--seconds", "0", "-o", "found.toml")
+    code, out, _ = run(capfd, "design", "paper-designed", *words)
+    assert code == 0
+    assert out.splitlines()[-1] == "scene: found.toml"
+    assert [path.name for path in Path().iterdir()] == ["found.toml"]
+    assert ls.load("found.toml").value("throw.kappa") > 0
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ((), "give one of them"),
+        (("--robust", "--critical-points", "10,10,20", "--vary", "throw.speed"), "give one of them"),
+        (("--robust", "--bounds", "arm.length=20 in"), "QUANTITY=LOWEST:HIGHEST"),
+        (("--robust", "--bounds", "arm.length=:20 in"), "a lower and a higher one"),
+        (("--robust", "--vary", "arm.legnth"), "arm.length"),
+    ],
+)
+def test_what_it_refuses(here, capfd, words, says):
+    code, _, err = run(capfd, "design", "paper-designed", *words)
+    assert code == 2
+    assert says in err
+
+
+def test_where_nothing_is_found_the_nearest_miss_is_written(capfd):
+    words = ("--robust", "--bounds", "part.mass.center.along=0.1:0.2", "--evaluations", "20")
+    code, out, _ = run(capfd, "design", "paper-designed", *words, "-o", "missed")
+    assert code == 1
+    assert "nearest miss" in out
+    assert "none that feeds among" in out
+    assert out.splitlines()[-1] == "scene: missed/paper-designed-robust.toml (the nearest miss, no answer)"
+    record = json.loads(Path("missed/design.json").read_text(encoding="utf-8"))
+    assert sum(record["ruled_out"].values()) == record["evaluations"]
+    assert ls.load(record["scene"]) == ls.load("missed/paper-designed-robust.toml")
+    code, out, _ = run(capfd, "design", "paper-designed", *words, "--json", "--csv", "missed.csv")
+    assert (code, set(json.loads(out))) == (1, set(record))
+    assert "nearest miss" in Path("missed.csv").read_text(encoding="utf-8")
+
+
+# ----------------------------------------------------------------
+# `limitsets fit`: words, JSON as docs/json.md has it, files, exit codes.
+
+
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "json.md"
+TRUTH = {"throw.kappa": 25.6, ALONG: 4.25, ABOVE: 0.69, HEIGHT: -0.21, RADIUS: 1.25}
+
+
+@pytest.fixture
+def throws():
+    """A film in a file, in mm."""
+    made = film(np.random.default_rng(31), TRUTH, flipped=0.04)
+    lines = ["x_before [mm],side_before,x_after [mm],side_after"]
+    columns = (made.x_before * 25.4, made.side_before, made.x_after * 25.4, made.side_after)
+    lines += [f"{x!r},{i},{y!r},{j}" for x, i, y, j in zip(*(each.tolist() for each in columns), strict=True)]
+    path = Path("throws.csv")
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return path
+
+
+def keys_in_docs():
+    """The keys that docs/json.md gives for `fit`."""
+    section = DOCS.read_text(encoding="utf-8").split("## fit\n")[1].split("\n## ")[0]
+    heads = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
+    return {key for head in heads for key in re.findall(r"`(\w+)`", head)}
+
+
+def test_json_has_the_keys_of_the_docs(capfd, throws):
+    code, out, _ = run(
+        capfd, "fit", "paper-designed", str(throws), "--error", "0.508 mm", "--no-margin", "--json"
+    )
+    assert code == 0
+    record = json.loads(out)
+    assert set(record) == keys_in_docs()
+    assert record["unit"] == "in"
+    assert record["error"] == 0.02
+    assert record["throws"] == len(record["residuals"]) == 50
+    assert set(record["quantities"]["throw.speed"]) == {"value", "lo", "hi", "unit", "bounded"}
+    assert set(record["scatter"]["landing.x"]) == {"value", "lo", "hi", "at_most"}
+    assert set(record["misread_rate"]) == {"value", "lo", "hi"}
+    assert set(record["misfit"]) == {"p", "outliers", "structure", "lacking", "rows"}
+    assert {"x", "side", "gain", "shrinks"} == set(record["further"][0])
+    assert set(record["residuals"][0]) == {"row", "side", "side_after", "residual", "deviation"}
+    for each in record["misread"]:
+        assert set(each) == {"row", "column", "recorded", "fits"}
+    assert ls.load(record["scene"]).goal == ls.load("paper-designed").goal
+    assert record["enough"] is None
+
+
+def test_a_table_and_files(capfd, throws):
+    words = (
+        "fit",
+        "paper-designed",
+        str(throws),
+        "--error",
+        "0.02",
+        "--no-margin",
+        "-o",
+        "out",
+        "--csv",
+        "t.csv",
+    )
+    code, out, _ = run(capfd, *words)
+    assert code == 0
+    assert {path.name for path in Path("out").iterdir()} == {
+        "fitted.toml",
+        "fit.json",
+        "part.png",
+        "residuals.png",
+    }
+    rows = list(csv.DictReader(Path("t.csv").read_text(encoding="utf-8").splitlines()))
+    speed = rows[0]
+    assert speed["quantity"] == "throw.speed"
+    wanted = np.sqrt(193.045 / TRUTH["throw.kappa"])
+    assert float(speed["95 % interval low"]) < wanted < float(speed["95 % interval high"])
+    assert "film next: throws from x = " in out
+    assert "is recorded as" in out
+    again = ls.load("out/fitted.toml")
+    assert again.value("throw.speed") == pytest.approx(float(speed["value"]))
+    assert again.tolerance
+
+
+@pytest.mark.sweep
+def test_whether_the_margin_is_enough(capfd, throws):
+    code, out, _ = run(capfd, "fit", "paper-designed", str(throws), "--error", "0.508 mm", "--json")
+    record = json.loads(out)
+    judged = record["enough"]
+    assert set(judged) == {"verdict", "sentences", "repeats", "margins", "together", "beyond"}
+    # an orbit of this very machine lies beyond 20 in on another side than 2, by other formulas as well
+    machine = {name: each["value"] for name, each in record["quantities"].items()}
+    machine["throw.kappa"] = 193.045 / machine.pop("throw.speed") ** 2
+    assert farthest(np.random.default_rng(32), machine)[:2].max() > 20.0
+    assert (code, judged["verdict"]) == (1, "not-enough")
+    assert judged["margins"]["throw.speed"] == {"proved": 0.0, "refuted": 0.0}
+    assert judged["sentences"][0].startswith("Without any scatter an orbit of the fitted machine violates")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("paper-designed", "none.csv"), "none.csv"),
+        (("no-such-scene", "throws.csv"), "scene"),
+        (("paper-designed", "throws.csv", "--error", "2 deg"), "length"),
+        (("paper-designed", "throws.csv", "--error", "0"), "above 0"),
+    ],
+)
+def test_bad_input_is_exit_2_of_fit(capfd, throws, words, said):
+    code, out, err = run(capfd, "fit", *words)
+    assert (code, out) == (2, "")
+    assert said in err

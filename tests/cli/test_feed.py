@@ -1,4 +1,4 @@
-"""`limitsets feed`: words, JSON, files, exit codes."""
+"""`feed` at the command line: where parts are laid, chamfers, scatter."""
 
 import json
 import re
@@ -8,11 +8,19 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets.base.errors import AnswerError
 from tests.cli.command import run
+from tests.feeding.own_throws import thrown
 from tests.feeding.scenes import with_cavity
+from tests.plates import left_by_some
+from tests.scene.test_load import BOTH, chamfered
+
+# ----------------------------------------------------------------
+# `limitsets feed`: words, JSON, files, exit codes.
 
 
 def written(name, **changes):
@@ -134,3 +142,311 @@ def test_many_parts_at_once(capfd):
     code, _, err = run(capfd, "feed", written("paper-designed"), *quick)
     assert code == 2
     assert "effects.contact" in err
+
+
+# ----------------------------------------------------------------
+# `--laid SIDE=LO:HI` on the commands whose answers depend on starts.
+
+
+def test_certify_exits_with_0_where_all_that_is_laid_down_is_proved(capfd):
+    ls.dump(ls.load(left_by_some()), "left.toml")
+    assert run(capfd, "certify", "left.toml", "--claim", "goal")[0] == 1
+    scene = ls.load("left.toml")
+    words = "--laid", f"2={0.4 * scene.arm_length}:{0.5 * scene.arm_length}"
+    code, out, _ = run(capfd, "certify", "left.toml", *words, "--json")
+    (record,) = json.loads(out)
+    assert (code, record["verdict"], list(record["starts"])) == (0, "proved", ["within"])
+    assert record["laid"] == record["starts"]["within"]
+    code, out, _ = run(capfd, "recheck", "left.proof.zip")
+    assert (code, out.splitlines()[-1]) == (0, "PROVED")
+
+
+def test_certify_says_where_parts_are_laid_down(capfd):
+    code, out, _ = run(capfd, "certify", "paper-designed", "--laid", "0=8:20", "--laid", "2=12:40 cm")
+    assert code == 0
+    assert "x = 8 to 20 in on side 0, x = 4.72441 to 15.748 in on side 2" in out
+    assert "attracts-all" not in out
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("0", "SIDE=LO:HI"),
+        ("0=8", "SIDE=LO:HI"),
+        ("0=8:9:10", "SIDE=LO:HI"),
+        ("a=8:9", "SIDE=LO:HI"),
+        ("-1=8:9", "SIDE=LO:HI"),
+        ("0=eight:9", "eight"),
+        ("3=8:9", "0, 1, 2"),
+        ("0=9:8", "a lower end and a higher one"),
+        ("0=1:8", "tips over the joint"),
+        ("0=8:28.001", "the arm's end"),
+        ("0=8:9 deg", "deg"),
+    ],
+)
+@pytest.mark.parametrize("command", ["certify", "margin", "robustness", "feed"])
+def test_bad_ranges_are_refused_in_a_line(capfd, command, word, said):
+    scene = "paper-designed"
+    if command == "feed":
+        scene = "fed.toml"
+        ls.dump(with_cavity(), scene)
+    code, out, err = run(capfd, command, scene, "--laid", word)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+
+
+def test_critical_points_have_no_starts(capfd):
+    code, _, err = run(capfd, "design", "paper-designed", "--critical-points", "10,10,20", "--laid", "0=8:9")
+    assert code == 2
+    assert "critical points have no starts" in err
+
+
+def test_a_design_is_asked_for_what_is_laid_down_alone(capfd):
+    """Of the whole arm no throw of 60 is proved: from some starts parts leave; of 120 to 150 mm on side 2 one is."""
+    ls.dump(ls.load(left_by_some()).with_values({"throw.kappa": "300 mm"}), "left.toml")
+    words = "left.toml", "--goal", "--vary", "throw.kappa", "--evaluations", "60", "--json"
+    code, out, _ = run(capfd, "design", *words)
+    assert (code, json.loads(out)["verdict"]) == (1, "undecided")
+    laid = "--laid", "2=120:150"
+    code, out, _ = run(capfd, "design", *words, *laid, "-o", "found.toml")
+    record = json.loads(out)
+    assert (code, record["verdict"]) == (0, "proved")
+    assert record["room"] > 0.0 >= record["room_before"]
+    assert run(capfd, "certify", "found.toml", "--claim", "goal", *laid)[0] == 0
+    assert run(capfd, "recheck", "found.proof.zip")[0] == 0
+    # apart from the package: every part that is laid down comes beyond X, on side 2 alone, and none leaves the arm
+    scene = ls.load("found.toml")
+    x, side = np.linspace(120.0, 150.0, 3001), np.full(3001, 2)
+    met = np.zeros(x.size, dtype=bool)
+    for _ in range(2000):
+        x, side = thrown(scene, scene.kappa, x, side)
+        assert ((x > scene.sides.a[side]) & (x <= scene.arm_length)).all()
+        assert (side[x >= 160.0] == 2).all()
+        met |= x >= 160.0
+    assert met.all()
+
+
+def test_feed_says_where_parts_are_laid_down(capfd):
+    ls.dump(with_cavity(), "fed.toml")
+    words = "--laid", "0=6:14", "--trials", "50", "--certificate", "fed.proof.zip"
+    code, out, _ = run(capfd, "feed", "fed.toml", *words)
+    assert code == 0
+    assert "where parts are laid down: x = 6 to 14 in on side 0" in out
+    assert "no start that is laid down feeds another side than 2" in out
+    assert "every start that is laid down is fed within" in out
+    assert Path("fed.proof.zip").exists()
+    code, _, err = run(capfd, "feed", "fed.toml", "--laid", "0=6:21")
+    assert code == 2
+    assert "up to the end of the arm, 20 in" in err
+
+
+# ----------------------------------------------------------------
+# A part that cannot rest on a side: `analyse` alone switches landing and roll on; with them all commands go.
+
+
+FIRST = "switched on landing and roll: the part cannot rest on side 3, and tips on from there; other commands ask for"
+
+
+def written_chamfer(**tables):
+    """Write a scene's file, and return its text."""
+    ls.dump(ls.load(chamfered(**{"effects": BOTH, **tables})), "chamfered.toml")
+    return Path("chamfered.toml").read_text(encoding="utf-8")
+
+
+def without_lines():
+    """Write it without the effects; what cannot be loaded cannot be dumped."""
+    lines = ("[effects]", "landing = true", "roll = true")
+    kept = [line for line in written_chamfer().splitlines() if line not in lines]
+    Path("chamfered.toml").write_text("\n".join(kept) + "\n", encoding="utf-8")
+
+
+def test_analyse_says_in_its_first_line_what_it_switched_on(capfd):
+    without_lines()
+    code, out, _ = run(capfd, "analyse", "chamfered.toml", "--cells", "512", "-o", "found")
+    assert code == 0
+    assert out.splitlines()[0] == f"{FIRST} landing = true and roll = true in [effects]"
+    page = Path("found/report.md").read_text(encoding="utf-8")
+    assert "**Switched on landing and roll: the part cannot rest on side 3" in page.split("\n\n")[1]
+    record = json.loads(Path("found/analysis.json").read_text(encoding="utf-8"))
+    assert record["scene"]["effects"] == BOTH
+    assert record["effects"]["tipping"] == ["landing", "roll"]
+    assert "3" not in record["attractors"][0]["extents"]
+    assert record["attractors"][0]["flip_order"] == [0, 1, 2, 4]
+    assert sum(record["basins"]["attractors"]) == pytest.approx(1.0)
+    assert ls.load(record["scene"]).sides.rests.tolist() == [True, True, True, False, True]
+
+
+def test_with_the_lines_nothing_is_switched_on_and_nothing_said(capfd):
+    written_chamfer()
+    code, out, err = run(capfd, "analyse", "chamfered.toml", "--cells", "512", "-o", "found", "--json")
+    assert code == 0
+    assert "switched on" not in err
+    assert json.loads(out)["effects"]["tipping"] == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("certify", "chamfered.toml"),
+        ("throw", "chamfered.toml", "--x", "20", "--side", "0"),
+        ("audit", "chamfered.toml"),
+        ("margin", "chamfered.toml"),
+    ],
+)
+def test_all_others_name_the_lines(words, capfd):
+    without_lines()
+    code, out, err = run(capfd, *words)
+    assert (code, out) == (2, "")
+    assert "the part cannot rest on side 3" in err
+    assert "add landing = true and roll = true to [effects]" in err
+
+
+@pytest.mark.sweep
+def test_with_the_lines_all_of_them_go(capfd):
+    written_chamfer(goal={"stays_on_arm": True})
+    for kind in ("part", "limit-set", "map", "basins", "morse", "flight"):
+        assert run(capfd, "plot", "chamfered.toml", kind, "-o", f"{kind}.png")[0] == 0
+    titles = [axes.get_title() for axes in ls.plot.map(ls.load("chamfered.toml")).axes]
+    assert titles[3] == "on side 3: no part rests there"
+    code, out, _ = run(
+        capfd, "throw", "chamfered.toml", "--x", "20", "--side", "0", "--count", "50", "--json"
+    )
+    sides = {row["side"] for row in json.loads(out)}
+    assert code == 0
+    assert sides == {0, 1, 2, 4}
+    code, out, _ = run(capfd, "audit", "chamfered.toml", "--json")
+    assert code == 0
+    assert 3 not in {row["side"] for row in json.loads(out)}
+    assert all("3" not in row["ranges"] for row in json.loads(out))
+    code, _, err = run(capfd, "throw", "chamfered.toml", "--x", "20", "--side", "3")
+    assert code == 2
+    assert "tips over on side 3" in err
+
+
+# ----------------------------------------------------------------
+# Scenes that scatter their throws: each door says whether its answer has the scatter, and proposes what runs.
+
+
+LAWS = ("bounded", "gaussian")
+WITHOUT = "of the scene without its scatter"
+
+# A latch of 2 mm steel with a weight: parts leave the arm towards the joint from one start in ten.
+LATCH = {
+    "name": "latch",
+    "part": {
+        "vertices": [[f"{x} mm", f"{y} mm"] for x, y in ((0, 0), (120, 0), (140, 60), (25, 85))],
+        "mass": {
+            "plate_density": "7850 kg/m^3",
+            "plate_thickness": "2 mm",
+            "points": [{"x": "100 mm", "y": "12 mm", "mass": "45 g"}],
+        },
+    },
+    "arm": {"surface_height": "-12 mm", "length": "650 mm"},
+    "throw": {"speed": "38 rpm"},
+    "gravity": {"acceleration": "9.81 m/s^2"},
+    "goal": {"oriented_beyond": {"x": "443 mm", "side": 0}},
+    "world": {"scatter": {"speed": "0.4 %", "landing": "1 mm"}},
+}
+
+
+def scattering(law, scene="paper-designed"):
+    """Give a built-in scene whose throws scatter."""
+    world = {"scatter": {"speed": "0.1 %", "landing": "0.01 in"}}
+    return ls.load(ls.load(scene).as_dict() | {"world": world, "effects": {"spread": law}})
+
+
+def latch(law):
+    """Write the latch; without a law its scatter is a fact only."""
+    name = f"{law or 'plain'}.toml"
+    ls.dump(ls.load(LATCH | ({"effects": {"spread": law}} if law else {})), name)
+    return name
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_margin_of_a_scene_that_scatters_is_that_of_the_scene_without_its_scatter(law):
+    """Bounded scatter was refused, and normal scatter gave 0 because "there is no such part or throw"."""
+    (plain,) = ls.margin("paper-designed", "throw.speed", width=0.1)
+    (found,) = ls.margin(scattering(law), "throw.speed", width=0.1)
+    assert (found.proved, found.refuted) == (plain.proved, plain.refuted)
+    assert found.model.left_out == ("scatter",)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_margin_in_the_shell_says_that_the_scatter_is_left_out(capfd, law):
+    ls.dump(scattering(law), "mine.toml")
+    code, out, _ = run(capfd, "margin", "mine.toml", "throw.speed", "--width", "0.1")
+    assert code == 1  # proved of another scene than the one that was asked about
+    assert WITHOUT in out.splitlines()[0]
+    (row,) = (line.split() for line in out.splitlines() if line.startswith(" throw.speed"))
+    proved, refuted = (float(word) for word in row if re.fullmatch(r"[0-9.]+", word))
+    assert proved < 0.733 < refuted  # the margin of the minimal model, in percent
+
+
+def test_a_margin_names_an_effect_of_which_nothing_is_proved():
+    """The reason was "there is no such part or throw", and `certify`, which refuses, was proposed."""
+    world = {"friction": 0.9, "restitution": 0.3, "bounce_threshold": "1 mm"}
+    tree = ls.load("paper-designed").as_dict() | {"world": world, "effects": {"bounce": True}}
+    with pytest.raises(AnswerError, match="bounce"):
+        ls.margin(ls.load(tree))
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("command", ["certify", "margin", "analyse"])
+def test_a_proposed_command_answers_or_is_not_proposed(capfd, law, command):
+    """`certify` proposed `margin`, which refused; `margin` proposed `certify`, which refuses normal scatter."""
+    name = latch(law)
+    words = [command, name, *(("--no-recheck",) if command == "certify" else ())]
+    out = run(capfd, *words)[1]
+    (line,) = [each for each in out.splitlines() if each.startswith("next: ")] or [""]
+    assert ("limitsets certify" in line) <= (law == "bounded")
+    # not every start stays on the arm, so that all margins are 0
+    assert "limitsets margin" not in line
+
+
+def test_noise_that_covers_the_scatter_does_not_break_its_assumption(capfd):
+    """Of the proof that has the scatter as noise the last line counted `spread` among the broken assumptions."""
+    noise = "--noise", "throw.speed=0.4 %", "--noise", "landing.x=1 mm", "--no-recheck"
+    last = run(capfd, "certify", latch(None), *noise)[1].splitlines()[-1]
+    effect = run(capfd, "certify", latch("bounded"), "--no-recheck")[1].splitlines()[-1]
+    assert last.replace("minimal model", "model with spread").replace("plain.toml", "bounded.toml") == effect
+    assert "spread" in run(capfd, "certify", latch(None), "--no-recheck")[1].splitlines()[-1]
+
+
+def test_a_sampled_limit_set_is_said_to_be_without_scatter(capfd):
+    """`analyse` said that no part gets beyond 443 mm; with the scatter most parts do, in some hundred throws."""
+    _, out, _ = run(capfd, "analyse", latch("gaussian"), "-o", "found")
+    assert "limit set 0, of throws without scatter: from 90.7 % of all starts" in out
+    assert "but without scatter no part gets there: the limit set ends at x = 441.826 mm" in out
+    assert "But without scatter no part gets there" in Path("found/report.md").read_text(encoding="utf-8")
+    _, out, _ = run(capfd, "analyse", latch(None), "-o", "found")
+    assert "without scatter" not in out
+
+
+def test_feed_says_what_ends_a_part_and_how_throws_scatter(capfd):
+    """Parts whose throw acts beyond the end were counted as fed or off the arm; the law was not printed."""
+    tree = with_cavity("paper-designed").as_dict()
+    world = {"scatter": {"speed": "0.5 %", "landing": "0.02 in"}, "throw_rate": "2 Hz"}
+    ls.dump(ls.load(tree | {"world": world, "effects": {"spread": "gaussian"}}), "mine.toml")
+    _, out, _ = run(capfd, "feed", "mine.toml", "--trials", "2000", "--no-level", "--no-proof")
+    assert "or comes to lie where its throw acts beyond the end: " in out
+    assert "speed: normal, standard deviation 0.5 %; landing: normal, standard deviation 0.02 in" in out
+
+
+def test_a_deviation_without_its_unit_is_told_of_percent(capfd):
+    """Only units of a speed were allowed, of which nobody gives the scatter."""
+    _, _, err = run(capfd, "feed", "paper-designed", "--scatter", "throw.speed=0.4")
+    assert '"<decimal number> %" or an angular speed' in err
+    _, _, err = run(capfd, "certify", "paper-designed", "--noise", "landing.x=1")
+    assert "%" not in err  # a share of a landing means nothing
+
+
+def test_the_explorer_says_of_which_model_its_proofs_are():
+    """The starts of the last claim stood in place of the model's sentence."""
+    from limitsets.face.explorer.answers import proof_words
+
+    model = "of the minimal model: friction of [world] is not in it"
+    claim = {"claim": "goal", "verdict": "proved", "reason": "", "starts": "every", "share": 1.0, "note": ""}
+    shown = proof_words([claim], [], "rested", model)
+    assert model in shown
+    assert "for every start" in shown

@@ -1,12 +1,16 @@
-"""`limitsets margin`: words, JSON, files, exit codes."""
+"""`margin` and `robustness` at the command line."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 import limitsets as ls
 from tests.cli.command import run
+
+# ----------------------------------------------------------------
+# `limitsets margin`: words, JSON, files, exit codes.
 
 
 def test_a_table_in_units_that_people_use(capfd):
@@ -128,3 +132,169 @@ def test_bad_input_is_exit_2(capfd, words, said):
 def test_the_help_names_it(capfd):
     assert "margin" in run(capfd, "--help")[1]
     assert ls.margin.__doc__.startswith("Bracket")
+
+
+# ----------------------------------------------------------------
+# `limitsets robustness`: words, JSON, files, exit codes.
+# The sharp margin of the surface's height of paper-designed is between 0.057 and 0.058 in, as long orbits show
+# here.
+
+
+QUICK = ("--quantity", "arm.surface_height", "--width", "0.5", "--without", "curve")
+NOISE = ("--scatter", "throw.speed=0.5 %", "--cells", "32")
+
+
+def cell(page, row, column):
+    line = next(line for line in page.splitlines() if line.startswith(f"| {row} |"))
+    return line.strip("| ").split(" | ")[column]
+
+
+def violates(height):
+    """Whether a long orbit comes to rest beyond 20 in on another side than 2."""
+    scene = ls.load("paper-designed").with_values({"arm.surface_height": height})
+    path = ls.orbit(scene.map, 15.0, 2, 1_000_000)
+    return bool(((path.x > 20.0) & (path.side != 2))[2000:].any())
+
+
+def test_the_sharp_margin_of_the_height():
+    assert violates("-0.258 in")
+    assert not violates("-0.257 in")
+    assert not violates("-0.142 in")
+
+
+@pytest.mark.sweep
+def test_report_and_files(capfd):
+    code, out, _ = run(capfd, "robustness", "paper-designed", "-o", "sheet", "--html", *QUICK, *NOISE)
+    assert code == 0
+    assert "this holds, proved" in out
+    assert "no joint: the scene has no [tolerance]" in out
+    assert out.splitlines()[-2] == "report: sheet/report.md"
+    folder = Path("sheet")
+    page = (folder / "report.md").read_text(encoding="utf-8")
+    figures = set(re.findall(r"\]\((\S+\.png)\)", page))
+    assert figures == {
+        f"{kind}.png" for kind in ("part", "margins", "counterexample", "density", "throws", "levels")
+    }
+    assert {path.name for path in folder.iterdir()} == {
+        *figures,
+        "report.md",
+        "report.html",
+        "robustness.json",
+        "certificates",
+    }
+    assert (folder / "report.html").read_text(encoding="utf-8").count('src="data:image/svg') == len(figures)
+    assert all((folder / name).read_bytes().startswith(b"\x89PNG") for name in figures)
+    commands = re.findall(r"^    limitsets recheck (\S+)$", page, re.MULTILINE)
+    assert {path.name for path in (folder / "certificates").iterdir()} == {
+        Path(name).name for name in commands
+    }
+    low, high = (float(cell(page, "arm.surface_height", k).split()[0]) for k in (3, 4))
+    assert low < 0.058
+    assert high > 0.057
+    least, most = (float(part) for part in cell(page, "arm.surface_height", 5).split(" / "))
+    assert least == pytest.approx(100 * low / 0.2, rel=2e-3)
+    assert most == pytest.approx(100 * high / 0.2, rel=2e-3)
+    for head in (
+        "One quantity at a time",
+        "What limits it",
+        "All together",
+        "Noise",
+        "How far to trust this",
+    ):
+        assert f"## {head}" in page
+    assert "`limitsets audit paper-designed`" in page
+    record = json.loads((folder / "robustness.json").read_text())
+    numbers = {name: found["value"] for name, found in record["noise"]["numbers"].items()}
+    assert sum(numbers[f"time on side {k}"] for k in range(3)) == pytest.approx(1.0, abs=1e-9)
+    assert numbers["fed"] == pytest.approx(
+        1.0, abs=1e-6
+    )  # every start is attracted, and the limit set passes 20 in
+    assert cell(page, "throws until they do, mean", 1) == f"{numbers['mean throws']:.1f}"
+    levels = record["noise_levels"]
+    assert levels["factors"] == [0.0, 0.5, 1.0, 1.5, 2.0]
+    wrong = levels["numbers"]["wrong beyond"]
+    assert wrong[4] > wrong[0]  # more noise, more mistakes
+
+
+def test_json_alone_on_stdout_and_a_second_run_asks_nothing(capfd):
+    words = (
+        "robustness",
+        "paper-designed",
+        "-o",
+        "sheet",
+        *QUICK,
+        "--without",
+        "noise",
+        "--without",
+        "audit",
+    )
+    code, out, _ = run(capfd, *words, "--json")
+    assert code == 0
+    record = json.loads(out)
+    assert record == json.loads(Path("sheet/robustness.json").read_text())
+    assert [row["quantity"] for row in record["margins"]] == ["arm.surface_height"]
+    assert record["noise"] is None
+    assert ls.load(record["scene"]) == ls.load("paper-designed")
+    code, out, _ = run(capfd, *words)
+    assert "found by an earlier run: 1 of 1 margins" in out
+
+
+def test_a_goal_that_fails_is_exit_1_and_the_orbit_is_there(capfd):
+    tree = ls.load("paper-initial").as_dict() | {"goal": {"oriented_beyond": {"x": "20 in", "side": 2}}}
+    ls.dump(ls.load(tree), "fails.toml")
+    words = ("--tolerance", "throw.speed=1 %", "--without", "curve", "--without", "audit")
+    code, out, _ = run(capfd, "robustness", "fails.toml", "-o", "sheet", *words)
+    assert code == 1
+    assert "this fails: an orbit shows it" in out
+    assert "The tolerance is not met: the scene as it is fails already." in out
+    page = Path("sheet/report.md").read_text(encoding="utf-8")
+    assert "Already in the scene as it is, an orbit violates the goal: after " in page
+    assert Path("sheet/counterexample.png").exists()
+    assert not Path("sheet/margins.png").exists()
+    assert "times its tolerance" not in page
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("no-such-scene",), "no-such-scene"),
+        (("paper-designed", "-o", "taken/deeper"), "taken"),
+        (("paper-designed", "--quantity", "throw.sped"), "throw.speed"),
+        (("paper-designed", "--tolerance", "part.sides[3]=1 %"), "part.sides[3]"),
+        (("paper-designed", "--tolerance", "gravity.tilt=1 deg"), "gravity.tilt"),
+        (("paper-designed", "--scatter", "part.sides[0]=1 %"), "noise of throw.speed"),
+        (("paper-designed", "--scatter", "throw.speed=1 %", "--law", "flat"), "gaussian or bounded"),
+        (("paper-designed", "--without", "everything"), "margins, joint, curve"),
+        (("no-goal.toml",), "add [goal] with, for instance, oriented_beyond"),
+        (("slips.toml",), "leave the others out of [effects]"),
+    ],
+)
+def test_bad_input_is_exit_2_of_robustness(capfd, words, said):
+    Path("taken").write_text("a file")
+    tree = ls.load("paper-designed").as_dict()
+    slips = tree | {"world": {"friction": 0.6}, "effects": {"slip": True}}
+    ls.dump(ls.load(slips), "slips.toml")
+    del tree["goal"]
+    ls.dump(ls.load(tree), "no-goal.toml")
+    code, out, err = run(capfd, "robustness", *words)
+    assert code == 2
+    assert out == ""
+    assert said in err
+    assert not list(Path().glob("*-robustness"))
+
+
+@pytest.mark.sweep
+def test_an_own_part_in_millimetres(capfd):
+    """A tolerance in inches; the margin of the landing place is 0.105 to 0.107 of the unit of length, here mm."""
+    ls.dump(ls.load("paper-designed"), "part.toml")
+    text = Path("part.toml").read_text().replace(' in"', ' mm"').replace("in/s^2", "mm/s^2")
+    Path("part.toml").write_text(text)
+    words = ["--without", "margins", "--without", "noise", "--without", "audit", "--without", "curve"]
+    code, out, _ = run(
+        capfd, "robustness", "part.toml", "-o", "sheet", *words, "--tolerance", "landing.x=0.001 in"
+    )
+    assert code == 0
+    assert "The tolerance is met, proved" in out
+    (joint,) = json.loads(Path("sheet/robustness.json").read_text())["margins"]
+    assert joint["proved"] * 0.0254 < 0.107
+    assert joint["refuted"] * 0.0254 > 0.105

@@ -1,16 +1,25 @@
-"""Options that every command has that prints a table or draws: --csv, --format."""
+"""What holds for every command: options, missing extras, remedies, the page of the JSON."""
 
 import csv
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from typer.main import get_command
 
 import limitsets as ls
+from limitsets.base.errors import LimitsetsError
 from limitsets.face.cli.app import app
-from tests.cli.command import run
+from tests.cli.command import PROGRESS, documented, run
+from tests.feeding.scenes import with_cavity
+
+# ----------------------------------------------------------------
+# Options that every command has that prints a table or draws: --csv, --format.
+
 
 COMMANDS = get_command(app).commands
 
@@ -106,3 +115,191 @@ def test_a_table_is_replaced_whole(capfd):
     assert run(capfd, "scenes", "--csv", "t.csv")[0] == 0
     assert [row["scene"] for row in rows_of("t.csv")] == ls.scenes()
     assert [path.name for path in Path().iterdir()] == ["t.csv"]
+
+
+# ----------------------------------------------------------------
+# Without an extra, what needs it ends in one line that names it.
+
+
+RUN = """
+import sys
+for name in sys.argv[1].split(","):
+    sys.modules[name] = None
+from limitsets.cli import main
+sys.exit(main(sys.argv[2:]))
+"""
+
+ATLAS = ("atlas", "paper-designed", "--x", "throw.kappa=25:26:2")
+
+
+def without(modules, *words):
+    command = [sys.executable, "-c", RUN, modules, *words]
+    return subprocess.run(
+        command, capture_output=True, text=True, encoding="utf-8", env=os.environ, check=False
+    )
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize(
+    ("extra", "modules", "words"),
+    [
+        ("atlas", "xarray", ATLAS),
+        ("atlas", "zarr", ATLAS),
+        ("atlas", "pandas", (*ATLAS, "--csv", "a.csv")),
+        ("cluster", "distributed", (*ATLAS, "--cluster", "tcp://127.0.0.1:1")),
+        ("explore", "panel", ("explore", "paper-designed")),
+        ("engine", "pymunk", ("tray", "tray.toml", "--drops", "1")),
+    ],
+)
+def test_one_line_names_the_extra(extra, modules, words):
+    if extra == "engine":
+        from tests.trays.scenes import with_tray
+
+        ls.dump(with_tray(), "tray.toml")
+    done = without(modules, *words)
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = [line for line in done.stderr.splitlines() if not PROGRESS.search(line)]
+    assert f"pip install 'limitsets[{extra}]'" in line
+
+
+@pytest.mark.sweep
+def test_without_any_extra_the_rest_works():
+    every = "pymunk,xarray,zarr,pandas,pyarrow,panel,bokeh,distributed,dask,IPython"
+    throw = ("throw", "paper-designed", "--x", "15", "--side", "2")
+    for words in (("scenes",), ("check", "paper-designed"), ("doctor",), throw):
+        done = without(every, *words)
+        assert (done.returncode, done.stderr.count("Traceback")) == (0, 0), done.stderr
+
+
+# ----------------------------------------------------------------
+# What commands say of what they do not use, do not find, or cannot take.
+
+
+SCATTER = {"speed": "0.3 %", "landing": "0.02 in"}
+QUICK = ("--no-proof", "--trials", "20")
+
+
+def noisy(**tables):
+    ls.dump(with_cavity("paper-designed", tables={"world": {"scatter": SCATTER}, **tables}), "noisy.toml")
+    return "noisy.toml"
+
+
+def test_feed_says_in_its_first_line_that_the_scatter_is_not_used(capfd):
+    _, out, _ = run(capfd, "feed", noisy(), *QUICK)
+    assert "[world] scatter is not used" in out.splitlines()[0]
+    assert "--scatter" in out.splitlines()[0]
+    _, _, err = run(capfd, "feed", noisy(), *QUICK, "--json")
+    assert "[world] scatter is not used" in err
+    words = ("--scatter", "throw.speed=0.3 %", "--no-level")
+    _, out, _ = run(capfd, "feed", noisy(), *QUICK, *words)
+    assert "not used" not in out
+    _, out, _ = run(capfd, "feed", noisy(effects={"spread": "gaussian"}), *QUICK, "--no-level")
+    assert "not used" not in out
+
+
+def test_the_levels_of_the_noise_can_be_left_out(capfd):
+    scene = noisy(effects={"spread": "gaussian"})
+    assert "times the noise" in run(capfd, "feed", scene, *QUICK)[1]
+    code, out, _ = run(capfd, "feed", scene, *QUICK, "--no-level")
+    assert code == 0
+    assert "times the noise" not in out
+
+
+def test_the_cavities_of_two_scenes_are_told_in_words():
+    one = with_cavity("paper-designed")
+    two = ls.load(one.as_dict() | {"cavity": one.as_dict()["cavity"] | {"width": "9.4 in"}})
+    with pytest.raises(LimitsetsError) as caught:
+        ls.assemble(one, two, trials=1)
+    assert "Cavity(" not in str(caught.value)
+    for scene in (one, two):
+        assert ", ".join(f"{key} {text}" for key, text in scene.text["cavity"].items()) in str(caught.value)
+    fast = one.with_values({"throw.kappa": "20 in"})
+    with pytest.raises(LimitsetsError, match=r"25\.3778518 in and 20 in"):
+        ls.assemble(one, fast, trials=1)
+
+
+@pytest.mark.parametrize(("name", "file"), [("mine", "mine.proof.zip"), ("mine.zip", "mine.zip")])
+def test_a_certificate_without_an_ending_gets_one(capfd, name, file):
+    _, out, _ = run(capfd, "certify", "paper-designed", "--claim", "invariant", "-o", name)
+    assert f"{file}" in out
+    assert [path.name for path in Path().glob("mine*")] == [file]
+
+
+def test_where_there_is_no_policy_the_next_thing_is_told(capfd):
+    tree = ls.load("paper-initial").as_dict()
+    throws = [{"name": "own", **tree["throw"]}]
+    tree["feedback"] = {"sensor": {"beyond": "20 in"}, "throws": throws}
+    ls.dump(ls.load(tree), "one.toml")
+    words = ("--starts", "2=17:18", "--cells", "64", "--throws", "1")
+    code, out, _ = run(capfd, "feedback", "one.toml", *words)
+    assert code == 1
+    assert "not with 1 throws on these cells" in out
+    assert "next: more --throws or --cells, --sweep LO:HI:N for another place of the sensor" in out
+
+
+def test_analyse_tells_what_is_improbable(capfd):
+    ls.dump(ls.load("paper-designed").with_values({"throw.speed": "160 rpm"}), "fast.toml")
+    _, out, _ = run(capfd, "analyse", "fast.toml", "--cells", "64")
+    assert "throw.speed: careful, '160 rpm'" in out
+    _, out, err = run(capfd, "analyse", "fast.toml", "--cells", "64", "--json")
+    assert "throw.speed: careful, '160 rpm'" in err
+    assert "careful" not in run(capfd, "analyse", "paper-designed", "--cells", "64")[1].replace(
+        "careful: of", ""
+    )
+
+
+# ----------------------------------------------------------------
+# Every key that `--json` prints stands in docs/json.md, and no other: commands whose own tests do not ask for it.
+
+
+VARY = "part.mass.center.along,part.mass.center.above,throw.speed"
+SHORT = ("--quantity", "arm.surface_height", "--seconds", "0", "--without", "noise", "--without", "audit")
+IN_ITS_TEXT = ("effects", "basins", "starts", "goal", "units")
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        ("scenes", ()),
+        ("throw", ("paper-designed", "--x", "8", "--side", "2")),
+        ("plot", ("paper-designed", "part")),
+        ("new", ("new.toml",)),
+        ("audit", ("paper-designed",)),
+        ("margin", ("paper-designed", "throw.speed", "--width", "0.2")),
+        ("design --critical-points", ("paper-initial", "--critical-points", "10,10,20", "--vary", VARY)),
+        ("robustness", ("paper-designed", "-o", "sheet", *SHORT)),
+        ("animate", ("paper-designed", "-o", "run.html")),
+    ],
+)
+def test_the_keys_are_those_of_the_page(capfd, section, words):
+    code, out, _ = run(capfd, section.partition(" ")[0], *words, "--json")
+    record = json.loads(out)
+    assert code == 0
+    assert set(record[0] if isinstance(record, list) else record) == documented(section)
+
+
+def test_keys_of_an_analysis(capfd):
+    tree = ls.load("paper-designed").as_dict()
+    ls.dump(ls.load(tree), "mine.toml")
+    code, out, _ = run(capfd, "analyse", "mine.toml", "--cells", "256", "--json")
+    record = json.loads(out)
+    assert code == 0
+    assert set(record) == documented("analyse")
+    page = Path(__file__).resolve().parents[2] / "docs" / "json.md"
+    text = page.read_text(encoding="utf-8").split("## analyse", 1)[1].split("\n## ", 1)[0]
+    inner = [
+        *(record[key] for key in IN_ITS_TEXT),
+        *record["attractors"],
+        *record["cycles"],
+        *record["spurious"],
+    ]
+    missing = {key for table in inner for key in table if key not in text}
+    assert not missing
+
+
+def test_keys_of_a_proof_and_of_its_recheck(capfd):
+    code, out, _ = run(capfd, "certify", "paper-designed", "--json")
+    assert code == 0
+    assert set(json.loads(out)[0]) == documented("The JSON of `limitsets certify --json`", "certificates.md")
+    code, out, _ = run(capfd, "recheck", "paper-designed.proof.zip", "--json")
+    assert (code, set(json.loads(out))) == (0, documented("recheck"))

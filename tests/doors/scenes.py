@@ -3,8 +3,7 @@
 from typing import Any
 
 import limitsets as ls
-from tests.lead_quad import LEAD_QUAD
-from tests.plates import plate
+from tests.plates import LEAD_QUAD, plate
 
 HEIGHT, SPEED, KAPPA = "arm.surface_height", "throw.speed", "throw.kappa"
 BESIDE = "part.mass.center.along"

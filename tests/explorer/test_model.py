@@ -1,6 +1,8 @@
-"""What follows the sliders, without a page: expected values are the paper's, geometry's, or those of proofs."""
+"""What the explorer computes, and the canvas it is drawn on."""
 
+import base64
 import itertools
+import json
 import math
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError, SceneError
 from limitsets.face.explorer.answers import estimate_words, proof_words
+from limitsets.face.explorer.canvas import Canvas, Layer
 from limitsets.face.explorer.estimates import (
     centre_at,
     estimate,
@@ -21,7 +24,11 @@ from limitsets.face.explorer.estimates import (
 )
 from limitsets.face.explorer.work import MOST_BYTES, MOST_SIDES, answers, scene_from, with_outline
 from limitsets.systems.cells import as_domain
-from tests.lead_triangle import left_by_some
+from tests.plates import left_by_some
+
+# ----------------------------------------------------------------
+# What follows the sliders, without a page: expected values are the paper's, geometry's, or those of proofs.
+
 
 PAPER = ls.load("paper-designed")
 
@@ -189,3 +196,17 @@ def test_the_numbers_of_a_map_are_its_knobs():
     assert map_with(ls.maps.Henon(), {"a": 1.2}) == ls.maps.Henon(1.2, 0.3)
     with pytest.raises(LimitsetsError):
         knobs[0].read("much")
+
+
+# ----------------------------------------------------------------
+# What is sent to the browser to be drawn.
+
+
+def test_points_beyond_the_picture_are_left_out():
+    """The numbers that are sent reach from one end of the picture to the other: beyond, they would come round."""
+    layer = Layer("dots", "points")
+    layer.data = {"x": [-1.0, 3.0, 6.0, 3.0, 5.0], "y": [0.5, 0.25, 0.5, 1.5, 1.0]}
+    canvas = Canvas("map", [layer], 100, x=[1.0, 5.0], y=[0.0, 1.0])
+    (sent,) = json.loads(canvas.drawn)["layers"]
+    places = np.frombuffer(base64.b64decode(sent["packed"]), "<u2").reshape(-1, 2) / 65535
+    assert places == pytest.approx(np.array([[0.5, 0.25], [1.0, 1.0]]), abs=1e-5)

@@ -1,17 +1,26 @@
-"""Time to tip against other ways to integrate it and a closed form; where the part meets the wall, by hand."""
+"""Parts that leave: how they fall, and how they tip over the end of the arm."""
 
 import dataclasses
 import math
 
 import numpy as np
+import pymunk
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import limitsets as ls
-from limitsets.base.errors import AnswerError
+from limitsets.base.errors import AnswerError, SceneError
 from limitsets.cell.feeding import clear_beyond, time_to_tip
-from limitsets.cell.feeding.falling import arm_end_of, farthest_clear
+from limitsets.cell.feeding.falling import arm_end_of, farthest_clear, rate_about_end, tipping_times
+from limitsets.cell.feeding.trials import run_trials
+from limitsets.feeder.engine import Crowd
+from limitsets.feeder.scattering import Scattering
 from tests.feeding.scenes import with_cavity
+
+# ----------------------------------------------------------------
+# Time to tip against other ways to integrate it and a closed form; where the part meets the wall, by hand.
+
 
 G, D, RHO, ANGLE = 193.045, 0.708249, 1.25, math.radians(32.23)
 
@@ -116,3 +125,216 @@ def test_what_feeding_needs_is_asked_for():
         arm_end_of(with_cavity(tables={"goal": {"attracts_all": True}}))
     with pytest.raises(AnswerError, match="lengthen it"):
         arm_end_of(with_cavity(position="28 in"))
+
+
+# ----------------------------------------------------------------
+# A part that comes down beyond the end of the arm goes on turning about the end; thrown at the end it is lost.
+
+
+# Half a square plate: side 2, rho^2 = 4/6 about its middle, a = d = 1.
+SQUARE = {
+    "part": {
+        "vertices": [["0 in", "0 in"], ["2 in", "0 in"], ["2 in", "2 in"], ["0 in", "2 in"]],
+        "mass": {"center": {"side": 0, "along": "1 in", "above": "1 in"}, "radius_of_gyration": "0.816496580927726 in"},
+    },
+    "goal": {"oriented_beyond": {"x": "20 in", "side": 2}},
+}  # fmt: skip
+
+
+def followed(scene, x, side, angle):
+    """A jog by Newton's laws alone: where its side comes down, the rate about the end then, and the time to flush."""
+    a, d, rho, kappa = (
+        float(scene.sides.a[side]),
+        float(scene.sides.d[side]),
+        scene.radius_of_gyration,
+        scene.kappa,
+    )
+    h, end, g = scene.surface_height, scene.cavity.position, scene.gravity
+    w = math.sqrt(g / kappa)
+
+    def corner(t):  # height of the left corner over the arm in free flight
+        turned = w * t
+        return h + d + x * turned - 0.5 * g * t * t - a * math.sin(turned) - d * math.cos(turned) - h
+
+    t = brentq(corner, 0.5 * (x - a) * w / g, 4.0 * x * w / g)
+    turned = w * t
+    centre = np.array([x - (h + d) * turned, h + d + x * turned - 0.5 * g * t * t])
+    velocity = np.array([-(h + d) * w, x * w - g * t])
+    held = centre - np.array(
+        [a * math.cos(turned) - d * math.sin(turned), a * math.sin(turned) + d * math.cos(turned)]
+    )
+
+    def stopped(centre, velocity, rate, at):
+        """Rate after an impulse at a point that stops that point of the part: three equations of momentum."""
+        rx, ry = at - centre
+        # v' = v + J, rho^2 n' = rho^2 n + r x J, v' + n' x r = 0
+        system = np.array(
+            [[1, 0, -ry, 0, 0], [0, 1, rx, 0, 0], [1, 0, 0, -1, 0], [0, 1, 0, 0, -1], [0, 0, rho**2, ry, -rx]]
+        )
+        return np.linalg.solve(system, [0, 0, *velocity, rho**2 * rate])[2]
+
+    rate = stopped(centre, velocity, w, held)
+
+    def pendulum(about, until):
+        """The part about a point until it has turned by `until`, from the pose (centre, rate) given."""
+
+        def motion(_, state):
+            rx, ry = (
+                np.array(
+                    [[math.cos(state[0]), -math.sin(state[0])], [math.sin(state[0]), math.cos(state[0])]]
+                )
+                @ about[0]
+            )
+            return state[1], -g * rx / (rho**2 + rx * rx + ry * ry)
+
+        def arrives(_, state):
+            return state[0] - until
+
+        arrives.terminal, arrives.direction = True, -1
+        path = solve_ivp(motion, (0, 5), (0.0, about[1]), events=arrives, rtol=1e-11, atol=1e-13)
+        return path.t_events[0][0], path.y_events[0][0][1]
+
+    _, rate = pendulum((centre - held, rate), -turned)
+    landed = held[0] + a
+    centre, down = np.array([landed, h + d]), np.array([a, d])
+    velocity = rate * np.array([-down[1], down[0]])
+    about = stopped(centre, velocity, rate, np.array([end, h]))
+    time, _ = pendulum((centre - np.array([end, h]), about), -angle)
+    return landed, -about, time
+
+
+@pytest.mark.parametrize("x", [17.4815656, 18.2, 19.5])
+def test_the_way_over_the_end_is_that_of_newtons_laws(x):
+    scene = with_cavity()
+    landed, rate, time = followed(scene, x, 2, scene.cavity.angle)
+    beyond = landed - 20.0
+    assert beyond > 0.0
+    assert rate_about_end(scene, x, 2, beyond) == pytest.approx(rate, rel=1e-9)
+    given = float(
+        time_to_tip(
+            beyond, scene.sides.d[2], scene.radius_of_gyration, scene.gravity, scene.cavity.angle, rate
+        )
+    )
+    assert given == pytest.approx(time, rel=1e-8)
+    assert tipping_times(scene, 2)(np.array([beyond]))[0] == pytest.approx(time, rel=1e-5)
+
+
+def test_a_hundredth_of_an_inch_beyond_the_end():
+    """The issue's numbers: 0.064 s as it came down, 0.54 s from rest."""
+    moving, resting = (tipping_times(with_cavity(tips=tips), 2) for tips in ("moving", "rest"))
+    assert moving(np.array([0.01]))[0] == pytest.approx(0.064, abs=5e-4)
+    assert resting(np.array([0.01]))[0] == pytest.approx(0.54, abs=5e-3)
+    assert ls.load(with_cavity().as_dict()).cavity.tips == "moving"
+
+
+@pytest.mark.parametrize(("beyond", "kept"), [(0.0, 1.0), (0.5, 26 / 23), (1.0, 1.0)])
+def test_the_momentum_of_a_square_by_hand(beyond, kept):
+    """rho^2 + d^2 = 2/3 + 1 and a = 1: (5/3 + e) / (5/3 + e^2), that is 1, 26/23, 1."""
+    scene = with_cavity(tables=SQUARE)
+    rates = [rate_about_end(scene, 15.0, 2, each) for each in (0.0, beyond)]
+    assert rates[1] / rates[0] == pytest.approx(kept, rel=1e-12)
+
+
+def test_limits_of_the_time():
+    """Without weight the rate stays; at the end itself sinh(lambda t) = lambda angle / rate for a small angle."""
+    assert float(time_to_tip(0.3, 0.7, 1.25, 1e-12, 0.5, 4.0)) == pytest.approx(0.125, rel=1e-9)
+    pull = math.sqrt(193.0 * 0.7 / (1.25**2 + 0.7**2))
+    expected = math.asinh(pull * 0.02 / 0.1) / pull
+    assert float(time_to_tip(0.0, 0.7, 1.25, 193.0, 0.02, 0.1)) == pytest.approx(expected, rel=1e-4)
+    assert float(time_to_tip(0.01, 0.7, 1.25, 193.0, 0.5, 1e-12)) == pytest.approx(
+        float(time_to_tip(0.01, 0.7, 1.25, 193.0, 0.5)), rel=1e-9
+    )
+
+
+@pytest.mark.parametrize(("beyond", "off"), [(0.01, 0.02), (0.3, 0.02), (1.0, 0.1)])
+def test_the_engines_own_contact_takes_as_long(beyond, off):
+    """Nothing of ours: a polygon of pymunk turns about its left corner and meets the corner of a block.
+
+    1 in beyond the end the part turns so fast that it leaves the end for a moment: a hinge would have to pull there.
+    """
+    scene = with_cavity()
+    a, d, rho, g = float(scene.sides.a[2]), float(scene.sides.d[2]), scene.radius_of_gyration, scene.gravity
+    angle, fall = scene.cavity.angle, 7.0
+    space = pymunk.Space()
+    space.gravity, space.iterations, space.collision_slop = (0.0, -g), 100, 1e-6
+    arm = pymunk.Poly(space.static_body, [(-30, -10), (0, -10), (0, 0), (-30, 0)])
+    body = pymunk.Body(1.0, rho**2)
+    part = pymunk.Poly(body, [(-a, -d), (6.75 - a, -d), (4.8641 - a, 3.0665 - d)])
+    arm.friction = part.friction = 50.0
+    lean, corner = 1e-3, np.array([beyond - a, 0.0])
+    centre = corner + np.array(
+        [a * math.cos(lean) - d * math.sin(lean), a * math.sin(lean) + d * math.cos(lean)]
+    )
+    body.position, body.angle, body.angular_velocity = tuple(centre), lean, -fall
+    body.velocity = (fall * (centre - corner)[1], -fall * (centre - corner)[0])
+    space.add(arm, body, part)
+    step, time = 1e-5, -lean / fall
+    while body.angle > -angle:
+        space.step(step)
+        time += step
+    own = rho**2 + d * d
+    rate = fall * (own + a * beyond) / (own + beyond**2)
+    assert time == pytest.approx(float(time_to_tip(beyond, d, rho, g, angle, rate)), rel=off)
+
+
+@pytest.mark.parametrize("contact", ["hinge", "unilateral"])
+def test_the_crowd_throws_it_over_the_end_as_fast(contact):
+    """One throw from 17.7 in, which comes down 0.3 in beyond the end; frames are 0.015 s."""
+    scene = with_cavity(tables={"effects": {"contact": True}})
+    crowd = Crowd([scene], friction=50.0, contact=contact, record=True)
+    crowd.place(0, 17.7, 2)
+    rest = crowd.throw()[0]
+    assert (rest.where, rest.side) == ("cavity", 2)
+    film = crowd.recording()
+    angles = film.poses[:, 0, 2] - film.poses[0, 0, 2]
+    down = film.times[np.flatnonzero((angles[:-1] > 0.0) & (angles[1:] <= 0.0))[0]]
+    flush = film.times[np.flatnonzero(angles < 1e-3 - scene.cavity.angle)[0]]
+    landed = float(ls.orbit(scene.map, 17.7, 2, 1).x[1]) - 20.0
+    assert flush - down == pytest.approx(float(tipping_times(scene, 2)(np.array([landed]))[0]), abs=0.035)
+    assert flush - down < 0.5 * float(tipping_times(with_cavity(tips="rest"), 2)(np.array([landed]))[0])
+
+
+def test_a_part_that_comes_down_moving_is_not_late():
+    assert clear_beyond(with_cavity(rate="4 Hz", tips="rest"), 2)[0][0] > 0.1
+    assert clear_beyond(with_cavity(rate="4 Hz"), 2)[0][0] == 0.0
+    ((least, _),) = clear_beyond(with_cavity(rate="18 Hz"), 2)
+    assert tipping_times(with_cavity(), 2)(np.array([least]))[0] == pytest.approx(1.0 / 18.0, rel=1e-6)
+
+
+def test_no_other_word_says_how_it_tips():
+    with pytest.raises(SceneError, match=r'cavity\.tips.*"moving" or "rest"'):
+        with_cavity(tips="fast")
+
+
+@pytest.mark.parametrize("beyond", [1e-6, 1e-4, 1e-3])
+def test_the_way_over_the_end_is_known_next_to_the_end(beyond):
+    """Between the last start that comes down before the end and the first beyond."""
+    scene = with_cavity()
+    x = brentq(lambda x: float(ls.orbit(scene.map, x, 2, 1).x[1]) - 20.0 - beyond, 17.0, 17.6, xtol=1e-13)
+    given = scene.sides.d[2], scene.radius_of_gyration, scene.gravity, scene.cavity.angle
+    time = float(time_to_tip(beyond, *given, rate_about_end(scene, x, 2, beyond)))
+    assert tipping_times(scene, 2)(np.array([beyond]))[0] == pytest.approx(time, rel=1e-6)
+
+
+def test_what_does_not_reach_over_the_end_is_not_thrown_at_the_edge():
+    """A tall part 1 in wide: its throw acts 1 in right of its middle, from where half an inch of it lies."""
+    part = {
+        "vertices": [["0 in", "0 in"], ["1 in", "0 in"], ["1 in", "8 in"], ["0 in", "8 in"]],
+        "mass": {"plate_density": "1 kg/m^2"},
+    }
+    end = arm_end_of(with_cavity(tables={"part": part}), side=0)
+    assert end.edges[[0, 2]] == pytest.approx(19.5)
+    assert end.at_edge(np.array([19.4, 19.6]), np.zeros(2, dtype=int)).tolist() == [False, True]
+
+
+def test_a_throw_that_acts_beyond_the_end_is_a_fate_of_its_own():
+    """The impulse acts (rho^2 + d (h + d)) / x right of the foot of the centre of mass."""
+    scene = with_cavity()
+    end = arm_end_of(scene)
+    for side, x in enumerate(end.edges.tolist()):
+        d = float(scene.sides.d[side])
+        assert x + (scene.radius_of_gyration**2 + d * (scene.surface_height + d)) / x == pytest.approx(20.0)
+        places = np.array([x - 1e-6, x + 1e-6, 20.0 - 1e-6, 20.0])
+        assert end.at_edge(places, np.full(4, side)).tolist() == [False, True, True, False]
+    trials = run_trials(end, Scattering(), 20_000)
+    assert 0.02 < trials.counts["edge"] / 20_000 < 0.06

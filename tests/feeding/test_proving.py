@@ -1,6 +1,11 @@
-"""Safety and progress: the figures of the theory, and that no orbit contradicts what is proved."""
+"""What is proved of a feeder: safety, progress, shares, and where parts are laid down."""
 
+import io
+import json
+import re
 import time
+import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +16,19 @@ from limitsets.cell.feeding import proving
 from limitsets.cell.feeding.falling import arm_end_of
 from limitsets.cell.feeding.paths import Paths
 from limitsets.cell.feeding.proving import proved_feeding, verdict_of, write_proof
+from limitsets.feeder.scattering import Scattering, Uniform
 from limitsets.proofs.prover.attraction import attraction
 from limitsets.proofs.prover.certifying import spelled_deviations
 from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.systems.graph.images.enclosed import enclosures
+from limitsets.systems.maps import advance
+from tests.cli.command import run
+from tests.feeding.own_throws import shares
 from tests.feeding.scenes import with_cavity
+
+# ----------------------------------------------------------------
+# Safety and progress: the figures of the theory, and that no orbit contradicts what is proved.
 
 
 def ends(scene, x_end, starts, most=3000):
@@ -318,3 +330,184 @@ def test_a_proof_with_effects_has_no_certificate(tmp_path):
     end = arm_end_of(with_cavity(tables={"effects": {"landing": True}}))
     with pytest.raises(AnswerError, match="with effects"):
         write_proof(tmp_path / "fed.proof.zip", proved_feeding(end), end)
+
+
+# ----------------------------------------------------------------
+# Proved brackets of the fates: the shares of trials lie in them; what is refused.
+
+
+NOISE = Scattering(landing=Uniform(0.2))
+
+
+@pytest.fixture(scope="module")
+def found():
+    scene = with_cavity("paper-initial", rate="4 Hz", tips="rest")
+    return ls.feed(scene, NOISE, prove=False, level=False, trials=4000, brackets=500)
+
+
+@pytest.mark.sweep
+def test_the_trials_lie_in_the_brackets(found):
+    assert set(found.brackets.within) == {"any", "right", "wrong", "wall", "edge", "exits"}
+    parts = found.trials.fate.size
+    for name in ("right", "wrong", "wall"):
+        low, high = found.brackets.within[name][:, -1]
+        assert high - low < 0.015
+        share = found.trials.counts[name] / parts
+        error = 4.0 * (share * (1.0 - share) / parts) ** 0.5
+        assert low - error <= share <= high + error
+    low, high = found.brackets.mean
+    error = 4.0 * found.trials.throws.std() / parts**0.5
+    assert low - error <= found.shares.mean_throws <= high + error
+    first, by = found.brackets.quantile(0.95)
+    error = 4.0 * (0.05 * 0.95 / parts) ** 0.5
+    assert found.shares.ended[first - 1] < 0.95 + error
+    assert found.shares.ended[by] >= 0.95 - error
+
+
+@pytest.mark.sweep
+def test_the_json_has_them(found):
+    table = json.loads(json.dumps(found.to_json()))["brackets"]
+    assert table["how"] == "proved"
+    assert set(table["within"]["wall"]) == {"lo", "hi"}
+    assert table["starts"][0][2] == 20.0
+
+
+def test_without_noise_there_are_none():
+    with pytest.raises(AnswerError, match="the noise of the brackets"):
+        ls.feed(with_cavity("paper-initial"), prove=False, trials=10, brackets=50)
+
+
+@pytest.mark.sweep  # brackets of 200 throws
+def test_the_command_shows_them(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ls.dump(with_cavity("paper-initial"), "fed.toml")
+    code, out, _ = run(
+        capfd, "feed", "fed.toml", "--no-proof", "--scatter", "landing.x=0.2 in", "--law", "bounded",
+        "--trials", "50", "--brackets", "200",
+    )  # fmt: skip
+    assert code == 0
+    said = re.search(
+        r"PROVED: on the wanted side, clear of the wall within 200 throws: ([\d.]+) to ([\d.]+)", out
+    )
+    assert said, out
+    low, high = (float(number) for number in said.groups())
+    end = arm_end_of(ls.load("fed.toml"))
+    own = shares(end, 20_000, 3, landing=lambda random, n: random.uniform(-0.2, 0.2, n))["right"]
+    error = 4.0 * (own * (1.0 - own) / 20_000) ** 0.5
+    assert low - error <= own <= high + error
+    assert "PROVED: the least number of throws within which 95 % have ended: " in out
+
+
+# ----------------------------------------------------------------
+# Feeding of parts that are laid down in ranges: proofs, their certificates, forged ones, and random starts.
+
+
+LAID = {0: [(6, 14)], 2: [(9, 19)]}
+
+
+@pytest.fixture(scope="module")
+def fed(tmp_path_factory):
+    """On paper-initial starts on side 1 feed side 1: what is laid down on side 0 far in feeds side 2."""
+    end = arm_end_of(with_cavity(position="20.5 in"), laid=LAID)
+    proof, file = proved_feeding(end), tmp_path_factory.mktemp("fed") / "fed.proof.zip"
+    return end, proof, write_proof(file, proof, end)
+
+
+def forged(path, target, change):
+    with zipfile.ZipFile(path) as file:
+        header, arrays = json.loads(file.read("header.json")), file.read("arrays.npz")
+    change(header["claims"][0]["section"])
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as file:
+        file.writestr("header.json", json.dumps(header))
+        file.writestr("arrays.npz", io.BytesIO(arrays).getvalue())
+    return ls.recheck(target)
+
+
+def test_safety_and_progress_are_of_the_starts_laid_down(fed):
+    end, (safe, progress, _), file = fed
+    assert (safe.verdict, safe.share) == ("proved", 1.0)
+    assert progress.almost_every == "proved"
+    # the orbit that is never fed has a place where parts are laid down
+    inside = [(s.side, s.lo) for s in progress.never_fed if any(
+        side == s.side and lo < s.lo < s.hi < hi for side, lo, hi in end.laid)]  # fmt: skip
+    assert (progress.verdict, bool(inside)) == ("refuted", True)
+    report = ls.recheck(file)
+    assert (report.verdict, report.fed) == ("proved", {"safety": 1.0, "almost": 1.0})
+    assert "6.0 <= x <= 14.0 on side 0, or 9.0 <= x <= 19.0 on side 2" in report.statement[0]
+
+
+def test_an_orbit_elsewhere_refutes_nothing():
+    end = arm_end_of(with_cavity(position="20.5 in"), laid={0: [(6, 14)]})
+    _, progress, _ = proved_feeding(end)
+    assert not progress.never_fed
+    assert progress.almost_every == "proved" or progress.verdict == "proved"
+
+
+@pytest.mark.parametrize(
+    "ranges",
+    [{"0": [[1.8, 14.0]]}, {"0": [[6.0, 20.6]]}, {"0": [[6.0, 40.0]]}, {"0": [[14.0, 6.0]]}, {}],
+    ids=str,
+)
+def test_forged_ranges_are_denied(fed, tmp_path, ranges):
+    said = json.loads(json.dumps(ranges), parse_float=lambda x: float(x).hex())
+    report = forged(fed[2], tmp_path / "f.zip", lambda section: section.update(laid=said))
+    assert report.verdict in ("failed", "bad file"), report
+
+
+def test_removed_ranges_and_starts_elsewhere_are_denied(tmp_path):
+    """On paper-initial at 20 in 15 % of the starts feed side 2 only: laid down on side 1, parts feed side 1."""
+    whole = proved_feeding(arm_end_of(with_cavity("paper-initial")))
+    assert whole.safe.verdict == "refuted"
+    (side, pairs), *_ = [(side, pairs) for side, pairs in whole.safe.only_wanted.items() if pairs]
+    lo, hi = max(pairs, key=lambda pair: pair[1] - pair[0])
+    inner = (0.75 * lo + 0.25 * hi, min(0.25 * lo + 0.75 * hi, 20.0))
+    end = arm_end_of(with_cavity("paper-initial"), laid={side: [inner]})
+    proof = proved_feeding(end)
+    assert proof.safe.verdict == "proved"
+    file = write_proof(tmp_path / "a.proof.zip", proof, end)
+    assert ls.recheck(file).claims[0][1] in ("proved", "proved-on-cells", "refuted")
+    assert forged(file, tmp_path / "f.zip", lambda section: section.pop("laid")).verdict == "failed"
+    elsewhere = {"1": [[(12.0).hex(), (19.0).hex()]]}
+    assert (
+        forged(file, tmp_path / "f.zip", lambda section: section.update(laid=elsewhere)).verdict == "failed"
+    )
+
+
+def test_random_starts_lie_where_parts_are_laid_down():
+    scene = with_cavity()
+    end = arm_end_of(scene, laid=LAID)
+    x, side = end.drawn(np.random.default_rng(0), 30_000)
+    for on, lo, hi in end.laid:
+        mine = x[side == on]
+        assert mine.size / x.size == pytest.approx((hi - lo) / 18.0, abs=0.01)
+        assert lo <= mine.min() < lo + 0.01 < hi - 0.01 < mine.max() <= hi
+        assert mine.mean() == pytest.approx(0.5 * (lo + hi), abs=0.1)
+    found = ls.feed(scene, laid=LAID, trials=4000, level=False)
+    record = found.to_json()
+    assert (record["laid"], record["starts_from"]) == ({"0": [[6.0, 14.0]], "2": [[9.0, 19.0]]}, None)
+    # mean number of throws of these starts, by orbits of their own
+    throws, places, sides = np.zeros(x.size), x.copy(), side.copy()
+    for number in range(1, 400):
+        going = throws == 0
+        places[going], sides[going], *_ = advance(scene.map, places[going], sides[going], 1)
+        throws[going & (places >= 20.0)] = number
+    assert found.shares.mean_throws == pytest.approx(throws.mean(), rel=0.05)
+    assert found.trials.throws.mean() == pytest.approx(throws.mean(), rel=0.1)
+
+
+def test_a_share_of_all_but_a_sliver_is_not_the_whole(fed):
+    """A range that reaches into an unproved cell by the last digit: the quotient of the lengths rounds to 1."""
+    end, proof, _ = fed
+    grid = proof.attraction.cover.grid
+    (edges,) = grid.edges[0]
+    j = int(np.searchsorted(edges, 20.0))
+    k, least = next(  # the first range whose length in proved cells is its whole length in floats
+        (k, least)
+        for k in range(int(np.searchsorted(edges, 6.5)), j - 100)
+        if np.diff(edges[k : j + 1]).sum() == edges[j] - (least := float(np.nextafter(edges[k], 0.0)))
+    )
+    some = np.ones(grid.n_cells, dtype=bool)
+    some[k - 1] = False  # cells of side 0 are numbered from 0
+    near = np.ones(grid.sides, dtype=bool)
+    share = Paths.of(proof.attraction, replace(end, laid=((0, least, float(edges[j])),))).share(some, near)
+    assert 1.0 - 1e-6 < share < 1.0

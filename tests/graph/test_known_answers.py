@@ -1,12 +1,33 @@
-"""Graphs with answers known from the field or on paper."""
+"""Components, order and basins: known answers, oracles, long chains, the networkx backend."""
+
+import subprocess
+import sys
+from dataclasses import replace
 
 import networkx as nx
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import sparse
+from scipy.sparse import csgraph
 
 import limitsets as ls
-from limitsets.systems.cells import CellSet
+from limitsets.base.errors import AnswerError
+from limitsets.systems.cells import CellSet, Grid
+from limitsets.systems.graph import components as surveys
+from limitsets.systems.graph import components as walk
+from limitsets.systems.graph import segment_tree
+from limitsets.systems.graph.components import descend, reach, strong_components
+from limitsets.systems.graph.graph import TransitionGraph
+from limitsets.systems.graph.ranges import RUN, START, build, count_edges, expand
+from limitsets.systems.maps import UNDECIDED
+from tests.graph.long_chains import check_cycle, check_path
 from tests.maps_of_tests import Linear2, Product, ThreeState, TwoState
+
+# ----------------------------------------------------------------
+# Graphs with answers known from the field or on paper.
+
 
 # Leslie's map on dyadic cells, corners + one cell: cells, edges, recurrent components (cells) from the top of the
 # order to the attractor. Published example of CMGDB; its counts were reproduced with CMGDB 1.5.2.
@@ -155,3 +176,359 @@ def test_images_of_cells_hold_the_images_of_their_points(method):
         for k in np.flatnonzero(got.code >= 0):
             (target,) = graph.grid.index([got.x[k]], int(got.side[k]))
             assert target in graph.successors(int(cells[k]))
+
+
+# ----------------------------------------------------------------
+# Every algorithm on ranges against scipy and networkx on the graph written out edge by edge.
+
+
+@st.composite
+def graphs(draw):
+    """Random boxes: one to three dimensions, one to three sides, several boxes, empty images, ways out."""
+    dimension = draw(st.integers(1, 3))
+    sides = draw(st.integers(1, 3))
+    sizes = [
+        tuple(draw(st.integers(1, 4 if dimension > 1 else 12)) for _ in range(dimension))
+        for _ in range(sides)
+    ]
+    of_one = ls.grid([(0, 1)] * dimension, cells=1).domain
+    domain = replace(of_one, lo=of_one.lo.repeat(sides, 0), hi=of_one.hi.repeat(sides, 0))
+    edges = tuple(tuple(np.linspace(0, 1, n + 1) for n in size) for size in sizes)
+    grid = Grid(domain, edges)
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    first, side, lo, hi = [0], [], [], []
+    for _ in range(grid.n_cells):
+        for _ in range(rng.integers(0, 3)):
+            s = int(rng.integers(sides))
+            a, b = (rng.integers(0, sizes[s]) for _ in range(2))
+            side.append(s)
+            lo.append(np.minimum(a, b))
+            hi.append(np.minimum(np.maximum(a, b), np.minimum(a, b) + 2))
+        first.append(len(side))
+    exits = rng.choice([0, 0, 0, 1], grid.n_cells).astype(np.uint8)
+    shape = (len(side), dimension)
+    return TransitionGraph(
+        ls.maps.Logistic(1.0),
+        grid,
+        build(
+            grid,
+            np.array(first),
+            np.array(side, dtype=np.int32),
+            np.array(lo, dtype=np.int32).reshape(shape),
+            np.array(hi, dtype=np.int32).reshape(shape),
+            exits,
+        ),
+        "made up",
+    )
+
+
+def matrix(graph):
+    pointer, targets = expand(graph.ranges)
+    return sparse.csr_matrix((np.ones(targets.size), targets, pointer), shape=(graph.n_cells, graph.n_cells))
+
+
+@given(graphs())
+@settings(max_examples=150)
+def test_edges_are_those_of_the_boxes(graph):
+    pointer, targets = expand(graph.ranges)
+    assert count_edges(graph.ranges) == targets.size
+    for cell in range(graph.n_cells):
+        inside = targets[pointer[cell] : pointer[cell + 1]]
+        reached = graph.successors(cell)
+        assert np.array_equal(inside, reached[reached < graph.n_cells])
+    assert graph.to_networkx().number_of_edges() == graph.number_of_edges()
+    assert graph.to_networkx().number_of_nodes() == graph.number_of_nodes()
+
+
+@given(graphs())
+@settings(max_examples=150)
+def test_components_agree_with_scipy_and_come_in_topological_order(graph):
+    parts = strong_components(graph.ranges)
+    count, oracle = csgraph.connected_components(matrix(graph), connection="strong")
+    assert parts.count == count
+    assert len({*zip(parts.label.tolist(), oracle.tolist(), strict=True)}) == count  # a renaming, one to one
+    pointer, targets = expand(graph.ranges)
+    sources = np.repeat(np.arange(graph.n_cells), np.diff(pointer))
+    assert (parts.label[targets] <= parts.label[sources]).all()
+    assert np.array_equal(np.sort(parts.order), np.arange(graph.n_cells))
+    assert (np.diff(parts.label[parts.order]) >= 0).all()
+    loops = np.zeros(count, dtype=bool)
+    loops[parts.label[sources[sources == targets]]] = True
+    assert np.array_equal(parts.recurrent, loops | (parts.size > 1))
+
+
+@given(graphs())
+@settings(max_examples=100)
+def test_reachability_agrees_with_networkx(graph):
+    plain = graph.to_networkx()
+    parts = strong_components(graph.ranges)
+    target = graph.n_cells // 2
+    marks = np.zeros(graph.n_cells, dtype=np.uint8)
+    marks[target] = 1
+    found = set(np.flatnonzero(reach(graph.ranges, parts, marks)).tolist())
+    assert found == nx.ancestors(plain, target) | {target}
+    seen = set(np.flatnonzero(descend(graph.ranges, np.array([target]))).tolist())
+    sinks = set(range(graph.n_cells, len(graph)))
+    assert seen | {target} == (nx.descendants(plain, target) | {target}) - sinks
+
+
+@given(graphs())
+@settings(max_examples=100)
+def test_destinations_agree_with_networkx(graph):
+    plain = graph.to_networkx()
+    ends = [set(part) for part in nx.attracting_components(plain)]
+    found = graph.condensation()
+    recurrent = graph.recurrent_components()
+    attractors = [
+        set(cells.tolist()) for cells, good in zip(recurrent, found.attracting, strict=True) if good
+    ]
+    left = {
+        int(c) for cells, good in zip(recurrent, found.attracting, strict=True) if not good for c in cells
+    }
+    assert sorted(map(sorted, attractors)) == sorted(
+        sorted(part)
+        for part in ends
+        if min(part) < graph.n_cells and (len(part) > 1 or plain.has_edge(*2 * tuple(part)))
+    )
+    for cell in range(graph.n_cells):
+        reachable = nx.descendants(plain, cell) | {cell}
+        numbers = [k for k, part in enumerate(attractors) if part & reachable]
+        codes = [code for e, code in enumerate(graph.exits.values()) if graph.n_cells + e in reachable]
+        options = numbers + codes
+        if len(options) > 1 or reachable & left:  # a set that is not closed may hold an orbit
+            assert found.destination[cell] == UNDECIDED
+        elif len(options) == 1:
+            assert found.destination[cell] == options[0]
+
+
+@pytest.mark.parametrize("count", [3, 60, 130])
+def test_more_components_than_one_sweep_holds(count):
+    """A chain of `count` fixed cells with a transient cell between neighbours: the order is a chain."""
+    n = 2 * count - 1
+    grid = ls.grid([(0.0, 1.0)], cells=n)
+    rows = np.arange(n)
+    # An even cell leads to itself and the odd one below it, an odd cell to the even one below it.
+    lo, hi = np.where(rows % 2 == 0, np.maximum(rows - 1, 0), rows - 1)[:, None], rows[:, None].copy()
+    hi[rows % 2 == 1] -= 1
+    ranges = build(
+        grid,
+        np.arange(n + 1),
+        np.zeros(n, np.int32),
+        lo.astype(np.int32),
+        hi.astype(np.int32),
+        np.zeros(n, np.uint8),
+    )
+    graph = TransitionGraph(ls.maps.Logistic(1.0), grid, ranges, "made up")
+    morse = ls.morse_graph(graph)
+    assert len(morse) == count
+    assert nx.is_directed_acyclic_graph(morse)
+    assert nx.dag_longest_path_length(morse) == count - 1
+    assert morse.number_of_edges() == count - 1
+    assert (graph.condensation().destination[:2] == 0).all()
+    assert (
+        graph.condensation().destination[2:] == UNDECIDED
+    ).all()  # from there on an unstable cell can be reached
+
+
+# ----------------------------------------------------------------
+# The tree algorithms for wide images against the walk over edges, and what they are for: width costs nothing.
+
+
+@st.composite
+def range_graphs(draw):
+    """One to three boxes per cell, or none, of any width; some cells leave."""
+    n = draw(st.integers(1, 70))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    longest = draw(st.sampled_from([1, 3, 70]))
+    first, lo, hi = [0], [], []
+    for _ in range(n):
+        for _ in range(rng.integers(0, 4)):
+            a = int(rng.integers(n))
+            lo.append(a)
+            hi.append(min(a + int(rng.integers(longest)), n - 1))
+        first.append(len(lo))
+    grid = ls.grid([(0.0, 1.0)], cells=n)
+    shape = (len(lo), 1)
+    exits = rng.choice([0, 0, 0, 1], n).astype(np.uint8)
+    ends = (np.array(bound, dtype=np.int32).reshape(shape) for bound in (lo, hi))
+    return build(grid, np.array(first), np.zeros(len(lo), np.int32), *ends, exits)
+
+
+@given(range_graphs())
+@settings(max_examples=300)
+def test_components_are_those_of_the_walk(r):
+    plain = walk.strong_components(r)
+    label, order, loops, count = segment_tree.strong(r)
+    assert count == plain.count
+    assert len({*zip(label.tolist(), plain.label.tolist(), strict=True)}) == count
+    assert np.array_equal(np.sort(order), np.arange(label.size))
+    assert (np.diff(label[order]) >= 0).all()
+    for cell in range(label.size):
+        for box in range(r.first[cell], r.first[cell + 1]):
+            targets = r.box[box, START] + np.arange(r.box[box, RUN])
+            assert (label[targets] <= label[cell]).all()
+            assert not (cell in targets and not loops[cell])
+    recurrent = np.bincount(label, minlength=count) > 1
+    recurrent[label[loops]] = True
+    assert np.array_equal(recurrent[label], plain.recurrent[plain.label])
+
+
+@given(range_graphs(), st.integers(0, 2**32))
+@settings(max_examples=200)
+def test_sweeps_are_those_of_the_walk(r, seed):
+    plain = walk.strong_components(r)
+    n = plain.label.size
+    marks = (1 << np.random.default_rng(seed).integers(0, 9, n)).astype(np.uint64) & np.uint64(255)
+    assert np.array_equal(segment_tree.reach(r, plain.label, plain.order, marks), walk.reach(r, plain, marks))
+    settled = plain.recurrent & (np.arange(plain.count) % 2 == 0)
+    rank = segment_tree.ranks(r, plain.label, plain.order, settled)
+    assert np.array_equal(rank, walk.ranks(r, plain, settled))
+    assert (rank[settled[plain.label]] == 0).all()
+    for cell in np.flatnonzero(~settled[plain.label]):
+        for box in range(r.first[cell], r.first[cell + 1]):
+            targets = r.box[box, START] + np.arange(r.box[box, RUN])
+            same = plain.label[targets] == plain.label[cell]
+            assert (rank[targets[same]] == rank[cell]).all()
+            assert (rank[targets[~same]] < rank[cell]).all()
+    start = np.array([seed % n])
+    assert np.array_equal(segment_tree.descend(r, start), walk.descend(r, start))
+    for component in range(plain.count):
+        cells = np.flatnonzero(plain.label == component).astype(np.int32)
+        assert segment_tree.leaves(r, plain.label, cells) == surveys._leaves(r, plain.label, cells)
+
+
+def test_the_tree_is_chosen_for_wide_images_only():
+    n = 2000
+    for width, chosen in ((3, False), (500, True)):
+        lo = np.maximum(np.arange(n) - width // 2, 0)[:, None].astype(np.int32)
+        hi = np.minimum(lo + width, n - 1).astype(np.int32)
+        r = build(
+            ls.grid([(0, 1)], cells=n), np.arange(n + 1), np.zeros(n, np.int32), lo, hi, np.zeros(n, np.uint8)
+        )
+        assert segment_tree.is_wide(r) is chosen
+        assert walk.strong_components(r).count == 1
+
+
+@pytest.mark.parametrize("width", [10_000])
+def test_wide_images_of_many_cells(width):
+    """2e5 cells that each lead to the next 10 000 below: a chain of single cells, 2e9 implied edges."""
+    n = 200_000
+    at = np.arange(n)
+    lo, hi = np.maximum(at - width, 0), np.maximum(at - 1, 0)
+    r = build(
+        ls.grid([(0, 1)], cells=n),
+        np.arange(n + 1),
+        np.zeros(n, np.int32),
+        lo[:, None].astype(np.int32),
+        hi[:, None].astype(np.int32),
+        np.zeros(n, np.uint8),
+    )
+    parts = walk.strong_components(r)
+    assert parts.count == n
+    assert parts.recurrent.sum() == 1  # cell 0, which leads to itself
+    rank = walk.ranks(r, parts, parts.recurrent)
+    assert np.array_equal(rank, at)  # the longest path steps down one cell at a time
+
+
+# ----------------------------------------------------------------
+# A million components in a row, and one of a million cells: no search may recurse.  1e7 in tests/bench.
+
+
+@pytest.mark.parametrize("check", [check_path, check_cycle])
+def test_a_million_deep(check):
+    check(2**20)
+
+
+# ----------------------------------------------------------------
+# networkx's own functions on the graph give what they give on the graph written out.
+
+
+@pytest.fixture(scope="module")
+def graph():
+    scene = ls.load("paper-designed")
+    return ls.transitions(scene.map, ls.grid(scene.domain, cells=150))
+
+
+@pytest.fixture(scope="module")
+def plain(graph):
+    return graph.to_networkx()
+
+
+def same(one, two):
+    return sorted(map(sorted, one)) == sorted(map(sorted, two))
+
+
+def test_components(graph, plain):
+    assert same(nx.strongly_connected_components(graph), nx.strongly_connected_components(plain))
+    assert same(nx.attracting_components(graph), nx.attracting_components(plain))
+    assert nx.number_strongly_connected_components(graph) == nx.number_strongly_connected_components(plain)
+    assert nx.number_attracting_components(graph) == nx.number_attracting_components(plain)
+    assert nx.is_strongly_connected(graph) is nx.is_strongly_connected(plain) is False
+    assert nx.is_attracting_component(graph) is nx.is_attracting_component(plain) is False
+
+
+def test_sinks_are_attracting_components_to_networkx(graph):
+    sinks = [{graph.n_cells + e} for e in range(4)]
+    found = list(nx.attracting_components(graph))
+    assert all(sink in found for sink in sinks)
+    assert all(graph.successors(min(sink)).tolist() == sorted(sink) for sink in sinks)
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_condensation(graph, plain, given):
+    components = list(nx.strongly_connected_components(plain)) if given else None
+    ours = nx.condensation(graph, scc=components)
+    oracle = nx.condensation(plain, scc=components)
+    assert same(
+        nx.get_node_attributes(ours, "members").values(), nx.get_node_attributes(oracle, "members").values()
+    )
+    assert all(node in ours.nodes[ours.graph["mapping"][node]]["members"] for node in plain)
+
+    def edges(dense):
+        members = nx.get_node_attributes(dense, "members")
+        return {(min(members[a]), min(members[b])) for a, b in dense.edges}
+
+    assert edges(ours) == edges(oracle)
+
+
+def test_reachability_from_cells_and_sinks(graph, plain):
+    for node in [0, 17, 200, 449, graph.n_cells, graph.n_cells + 1, graph.n_cells + 2, graph.n_cells + 3]:
+        assert nx.descendants(graph, node) == nx.descendants(plain, node)
+        assert nx.ancestors(graph, node) == nx.ancestors(plain, node)
+
+
+def test_a_node_that_is_none_is_networkx_own_error(graph):
+    with pytest.raises(nx.NetworkXError, match="not in the digraph"):
+        nx.descendants(graph, 10**9)
+    with pytest.raises(AnswerError, match="integer from 0"):
+        graph.successors(-1)
+
+
+def test_the_rest_of_networkx_by_conversion(graph, plain):
+    assert nx.number_weakly_connected_components(
+        graph.to_networkx()
+    ) == nx.number_weakly_connected_components(plain)
+    before = nx.config.fallback_to_nx
+    try:
+        nx.config.fallback_to_nx = True
+        assert nx.number_weakly_connected_components(graph) == nx.number_weakly_connected_components(plain)
+    finally:
+        nx.config.fallback_to_nx = before
+
+
+def test_every_node_but_none_has_successors(graph):
+    assert all(graph.successors(node).size for node in graph)
+    assert len(graph) == graph.number_of_nodes() == graph.n_cells + 4
+    assert graph.is_directed()
+    assert not graph.is_multigraph()
+
+
+def test_components_gives_labels_without_making_sets(graph):
+    label = graph.components().label
+    assert isinstance(label, np.ndarray)
+    assert label.dtype == np.int32
+
+
+def test_importing_networkx_does_not_import_us():
+    code = "import networkx, sys; sys.exit(any(name.split('.')[0] == 'limitsets' for name in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

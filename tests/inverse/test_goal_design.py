@@ -1,22 +1,37 @@
-"""Design for the scene's own goal: X and side stay, bounds come by themselves, and what ruled designs out is said."""
+"""Designs for a goal, and designs that hold a margin."""
 
+import json
+import math
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpmath import mp
 
 import limitsets as ls
-from limitsets.base.errors import AnswerError
+from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.feeder.scene.scene import unit_of
 from limitsets.parameters.design import robust_design
+from limitsets.parameters.design.design_result import unbeaten
 from limitsets.parameters.design.for_goal import design_for_goal
-from limitsets.parameters.design.for_margin import orders_of, tolerance_of
-from limitsets.parameters.design.search import bounds_of
+from limitsets.parameters.design.for_margin import orders_of, polished, tolerance_of
+from limitsets.parameters.design.search import (
+    DesignSearch,
+    bounds_of,
+    counterweight_for,
+    counterweight_of,
+    validity_slack,
+)
 from limitsets.parameters.margins.deviations import Tolerance
+from limitsets.parameters.margins.estimate import estimated, failing, invariant_intervals
 from limitsets.systems.maps import advance
-from tests.lead_quad import LEAD_QUAD
-from tests.lead_triangle import LEAD_TRIANGLE, left_by_some
+from tests.plates import LEAD_QUAD, LEAD_TRIANGLE, left_by_some
+from tests.studies.test_studies import load_study
+from tests.thrower import reference
+
+# ----------------------------------------------------------------
+# Design for the scene's own goal: X and side stay, bounds come by themselves, and what ruled designs out is said.
 
 
 def test_a_goal_that_fails_is_met_at_its_own_x():
@@ -270,3 +285,285 @@ def test_arm_and_throw_are_tried_before_another_part():
     assert found.verdict == "proved"
     assert set(found.varied) == {"throw.kappa", "arm.surface_height"}
     assert found.scene.text["part"] == found.before.text["part"]
+
+
+# ----------------------------------------------------------------
+# Robust design: the search's numbers against the table of limit sets, orbits, closed forms, and plane geometry.
+
+
+SPEED = {"throw.speed": "1 %"}
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A search of few designs, not proved."""
+    return robust_design("paper-designed", evaluations=60, orders=False, prove=0.0, seed=3)
+
+
+# Ends of the limit sets, from the decimal scenes at 40 digits.
+@pytest.mark.parametrize(
+    ("name", "hi"),
+    [
+        ("paper-designed", (19.75268801485, 17.439819281769, 23.383151921158)),
+        ("paper-initial-small-angle", (20.421069168761, 20.390334647524, 20.393068935673)),
+        ("paper-designed-small-angle", (12.88421238353, 10.343418249967, 20.640934683962)),
+    ],
+)
+def test_what_keeps_the_part_ends_where_the_limit_set_does(name, hi):
+    """Of scenes whose limit sets have no gap."""
+    found = invariant_intervals(ls.load(name).map, 12.0, 2)
+    assert found.hi == pytest.approx(hi, abs=1e-6)
+
+
+def test_landings_off_by_e_are_never_thrown_out_of_what_keeps_the_part():
+    scene, e, rng = ls.load("paper-designed"), 0.03, np.random.default_rng(5)
+    found = invariant_intervals(scene.map, 12.0, 2, landing=e)
+    x, side = rng.uniform(9.5, 20.0, 4000), np.full(4000, 2)
+    highest = np.full(3, -np.inf)
+    for _ in range(400):
+        x, side, code, _ = advance(scene.map, x, side, 1)
+        assert (code >= 0).all()
+        x = x + e * rng.choice((-1.0, 1.0), x.size)
+        assert (found.lo[side] - 1e-9 <= x).all()
+        assert (x <= found.hi[side] + 1e-9).all()
+        np.maximum.at(highest, side, x)
+    # and they come near its ends
+    assert (found.hi - highest < 3 * e).all()
+
+
+def test_the_margin_of_the_speed_is_that_of_the_table():
+    """At X = 20 in: 0.733 %, where the threshold of a slower throw passes 20."""
+    scene = ls.load("paper-designed")
+    box = Tolerance.of(scene, SPEED)
+    for factor, beyond in ((0.732, False), (0.734, True)):
+        corner = box.scene_at(scene, factor, (-1,))
+        assert (invariant_intervals(corner.map, 12.0, 2).threshold(2) > 20.0) == beyond
+
+
+def test_the_best_margin_of_the_speed_is_where_both_ends_meet():
+    scene = ls.load("paper-designed")
+    box = Tolerance.of(scene, SPEED)
+    found = estimated(scene, box, 2, steps=16)
+    ends = []
+    for sign in (-1, 1):
+        kept = invariant_intervals(box.scene_at(scene, found.margin, (sign,)).map, 12.0, 2)
+        ends.append((kept.threshold(2), float(kept.hi[2])))
+    assert max(end[0] for end in ends) <= found.x <= min(end[1] for end in ends)
+    ends = []
+    for sign in (-1, 1):
+        kept = invariant_intervals(box.scene_at(scene, 1.03 * found.margin, (sign,)).map, 12.0, 2)
+        ends.append((kept.threshold(2), float(kept.hi[2])))
+    assert max(end[0] for end in ends) > min(end[1] for end in ends)
+
+
+@pytest.mark.parametrize("name", ["initial", "designed"])
+def test_what_a_design_must_keep_is_what_the_model_assumes(name):
+    """At 50 digits by the formulas of docs/model.md: the angle, the throw's impulse, the landing's impulse."""
+    scene, facts = ls.load(f"paper-{name}"), reference.paper(name)
+    found, spare = invariant_intervals(scene.map, 12.0, 2), []
+    for side in range(3):
+        a, d, h = facts.a[side], facts.d[side], facts.surface_height
+        for x in (float(found.lo[side]), float(found.hi[side])):
+            thrown = reference.throw(facts, side, x)
+            right = a * mp.cos(thrown.phi) - d * mp.sin(thrown.phi)
+            foot = (facts.radius_of_gyration**2 + d * (h + d)) / x
+            inside = min(facts.length[side] - a - foot, a + foot) / facts.length[side]
+            pressed = (thrown.omega * right - (x - facts.kappa * thrown.phi)) / x
+            spare += [1 - thrown.phi / scene.sides.corner[side], inside, pressed]
+    assert validity_slack(scene, found) == pytest.approx(float(min(spare)), rel=1e-9)
+
+
+@pytest.mark.parametrize(("name", "rho"), [("paper-initial", 1.14), ("paper-designed", 1.01)])
+def test_a_lead_weight_of_65_percent_has_the_radius_of_gyration_of_the_table(name, rho):
+    scene = ls.load(name)
+    found = counterweight_for(scene.vertices, scene.centre, rho)
+    assert found.share == pytest.approx(0.65, abs=0.01)
+
+
+def test_plate_and_lead_weight_are_the_part_again():
+    scene = ls.load("paper-designed")
+    found = counterweight_of(scene)
+    corners = scene.vertices
+    x, y = corners.T
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    area = 0.5 * cross.sum()
+    g = np.array([((x + np.roll(x, -1)) * cross).sum(), ((y + np.roll(y, -1)) * cross).sum()]) / (6 * area)
+    # a triangle: its second moment about the centroid is that of three equal masses on the middles of its sides
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    own = (((middles - g) ** 2).sum(axis=1)).mean()
+    p, f = np.array([found.x, found.y]), found.share
+    centre = (1 - f) * g + f * p
+    assert centre == pytest.approx(scene.centre, abs=1e-12)
+    rho2 = (1 - f) * (own + ((g - centre) ** 2).sum()) + f * ((p - centre) ** 2).sum()
+    assert math.sqrt(rho2) == pytest.approx(scene.radius_of_gyration, abs=1e-12)
+
+
+def test_what_is_unbeaten_is_beaten_by_none():
+    rng = np.random.default_rng(0)
+    margin, throws = rng.random(200).round(2), rng.integers(5, 60, 200).astype(float)
+    kept = unbeaten(margin, throws)
+
+    def beaten(k):
+        better = (margin >= margin[k]) & (throws <= throws[k])
+        return (better & ((margin > margin[k]) | (throws < throws[k]))).any()
+
+    assert {(margin[k], throws[k]) for k in kept} == {
+        (margin[k], throws[k]) for k in range(200) if not beaten(k)
+    }
+
+
+def test_no_part_rests_in_a_box_larger_than_plane_geometry_allows():
+    """The study's bound, by formulas of its own, against the package's refusal of parts that tip over."""
+    study, scene = load_study("07_robust_design"), ls.load("paper-designed")
+    box = Tolerance.of(
+        scene,
+        {f"part.sides[{k}]": "1 %" for k in range(3)}
+        | {f"part.mass.center.{word}": "0.01 in" for word in ("along", "above")},
+    )
+    largest = study.largest_at_rest((5.75, 3.6, 6.75), 4.2255778, 0.7082490)
+    signs = list(np.ndindex(2, 2, 2, 2, 2))
+    rests = [
+        all(box.scene_at(scene, share * largest, [2 * s - 1 for s in corner]) is not None for corner in signs)
+        for share in (0.999, 1.001)
+    ]
+    assert rests == [True, False]
+
+
+@pytest.mark.sweep
+def test_a_small_search_finds_scenes_that_hold_throughout_their_box(small):
+    """Thrown: scenes drawn from 0.9 of the box, landings off at random; nothing rests wrongly, and all get there."""
+    rng, scene = np.random.default_rng(1), small.scene
+    assert small.sampled.margin > 0
+    box = Tolerance.of(scene, small.tolerance)
+    factor = 0.9 * small.sampled.margin
+    for _ in range(12):
+        corner = box.scene_at(scene, factor, rng.choice((-1.0, 1.0), len(box.deviations)))
+        x = np.full(200, small.x - 1e-3)
+        side = np.full(200, small.side)
+        arrived = np.zeros(200, dtype=bool)
+        for throw in range(3000):
+            x, side, code, _ = advance(corner.map, x, side, 1)
+            assert (code >= 0).all()
+            x = x + factor * box.scatter * rng.uniform(-1, 1, x.size)
+            if throw > 500:
+                assert not ((x > small.x) & (side != small.side)).any()
+                arrived |= (x >= small.x) & (side == small.side)
+        assert arrived.all()
+
+
+@pytest.mark.sweep
+def test_the_margin_of_the_design_is_that_of_its_worst_corner(small):
+    """By `failing`, which tries corner after corner at one factor: none at the margin, one a little beyond."""
+    box = Tolerance.of(small.scene, small.tolerance)
+    fails = [
+        failing(small.scene, box, 2, small.sampled, share * small.sampled.margin) for share in (1.0, 1.001)
+    ]
+    assert fails[0] == []
+    assert fails[1]
+
+
+@pytest.mark.sweep
+def test_what_stands_on_the_front_holds_on_all_corners(small):
+    box = Tolerance.of(small.scene, small.tolerance)
+    for option in small.front[:3]:
+        scene, found = small.before.with_values(option.candidate.values), option.candidate.estimate
+        assert failing(scene, box, 2, found, found.margin) == []
+
+
+def test_polishing_never_ends_below_its_start():
+    """The scene itself as the start, its margin from a search for the worst corner that knows nothing of polishing."""
+    scene = ls.load("paper-designed")
+    box = Tolerance.of(scene, SPEED)
+    search = DesignSearch(scene, box, 2, {"throw.kappa": (20.0, 30.0)})
+    start = math.log(scene.kappa / 20.0) / math.log(1.5)
+    before = estimated(scene, box, 2, steps=20).margin
+    made, found = polished(search, [[start]], lambda each: each, 12, lambda *_: None)
+    assert found.margin > 1.01 * before
+    assert failing(made, box, 2, found, found.margin) == []
+    assert 20.0 <= made.kappa <= 30.0
+
+
+@pytest.mark.sweep
+def test_a_small_search_says_how_it_was_found(small):
+    record = small.to_json()
+    json.dumps(record, allow_nan=False)
+    assert record["margins"] == []
+    assert record["values"].keys() >= {"part.sides[0]", "throw.kappa", "part.mass.center.along"}
+    assert small.lead.inside >= 0.0
+    # nothing on the front is worse than the design in both
+    assert all(
+        option.candidate.estimate.margin >= small.sampled.margin or option.feeding.mean <= small.feeding.mean
+        for option in small.front
+    )
+    assert small.front[0].candidate.estimate.margin >= small.sampled.margin
+    assert small.scene.goal == ls.load(small.scene.as_dict()).goal
+    assert [option.candidate.estimate.margin for option in small.front] == sorted(
+        (option.candidate.estimate.margin for option in small.front), reverse=True
+    )
+
+
+def test_the_same_seed_gives_the_same_designs():
+    scene = ls.load("paper-designed")
+    found = []
+    for _ in range(2):
+        search = DesignSearch(scene, Tolerance.of(scene, SPEED), 2, bounds_of(scene))
+        drawn, _ = search.drawn(np.random.default_rng(8), 5)
+        found.append(search.improved(drawn, 1, 3, lambda *_: None)[0])
+    assert (found[0] == found[1]).all()
+
+
+@pytest.mark.sweep
+def test_the_figure_of_the_front(small, tmp_path):
+    path = tmp_path / "front.png"
+    ls.plot.robust_design(small, wanted=18.4, bound=14.7).savefig(path)
+    assert path.stat().st_size > 10_000
+
+
+@pytest.mark.sweep
+def test_a_quantity_that_is_no_length_keeps_its_unit():
+    """The speed is written in deg/s, as in the scene: kappa w^2 is the gravity of the scene."""
+    bounds = {"throw.speed": (2.6, 3.2), "part.mass.center.along": (4.0, 4.4)}
+    found = robust_design(  # of a single design to look at, too, something is found
+        "paper-designed", vary=bounds, tolerance=SPEED, evaluations=1, orders=False, prove=0.0
+    )
+    speed, unit = found.scene.as_dict()["throw"]["speed"].split()
+    assert unit == "deg/s"
+    assert 2.6 <= math.radians(float(speed)) <= 3.2
+    assert found.scene.kappa * math.radians(float(speed)) ** 2 == pytest.approx(193.045, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"side": 3}, "0 to 2"),
+        ({"evaluations": 0}, "1 or more"),
+        ({"vary": {"arm.length": (None, 20.0)}}, "a lower and a higher one"),
+        ({"vary": {"part.mass.center.along": (0.1, 0.2)}}, "none that feeds"),
+    ],
+)
+def test_what_cannot_be_designed_is_refused(options, words):
+    with pytest.raises(LimitsetsError, match=words):
+        robust_design("paper-designed", **({"evaluations": 5, "orders": False, "prove": 0.0} | options))
+
+
+def test_the_usual_bounds_are_in_the_scenes_unit():
+    inches, cm = ls.load("paper-designed"), None
+    tree = inches.as_dict()
+    tree["arm"]["length"] = f"{28 * 2.54} cm"
+    cm = ls.load(tree)
+    for name, (lo, hi) in bounds_of(inches).items():
+        assert bounds_of(cm)[name] == pytest.approx((2.54 * lo, 2.54 * hi), rel=1e-12)
+
+
+def test_what_belongs_to_x_moves_with_it():
+    """The cavity stayed where it was, so that nothing was fed by the design."""
+    given = ls.load("paper-designed").as_dict()
+    given["cavity"] = {"position": "20 in", "width": "9 in", "depth": "5 in", "angle": "30 deg"}
+    given["feedback"] = {"sensor": {"beyond": "20 in"}, "throws": [{"name": "slow", "speed": "150 deg/s"}]}
+    given["throw"] = {"speed": "158.02 deg/s"}
+    given["gravity"] = {"acceleration": "193.045 in/s^2"}
+    found = robust_design(ls.load(given), vary=["throw.speed"], evaluations=4, orders=False, prove=0.0)
+    text = found.scene.as_dict()
+    place = text["goal"]["oriented_beyond"]["x"]
+    assert float(place.split()[0]) == found.x != 20.0
+    assert text["cavity"]["position"] == text["feedback"]["sensor"]["beyond"] == place

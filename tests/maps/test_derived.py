@@ -1,6 +1,7 @@
-"""Boxes and slopes of users' maps, derived from their plain kernels: against exact arithmetic, and what is refused."""
+"""What is derived from one plain function; maps of the same name; their sides."""
 
 import math
+import pickle
 from typing import NamedTuple
 
 import flint
@@ -9,10 +10,15 @@ import pytest
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.base.errors import MapError
+from limitsets.base.errors import AnswerError, MapError
+from limitsets.systems.cells import Domain
 from limitsets.systems.graph.images.enclosed import BoxImages, enclosures
+from limitsets.systems.maps.critical import margins
 from limitsets.systems.maps.derived import MAYBE, NEVER, SURE, branch_boxes
 from tests.maps_of_tests import Tent
+
+# ----------------------------------------------------------------
+# Boxes and slopes of users' maps, derived from their plain kernels: against exact arithmetic, and what is refused.
 
 
 class Wave(NamedTuple):
@@ -255,3 +261,116 @@ def test_a_line_names_the_function_and_the_way_out(kernel, smooth):
     # Everything but boxes and slopes still runs.
     graph = ls.transitions(cls(0.5), ls.grid([(0.1, 0.9)], cells=8))
     assert maps.has_slope(graph.map) == smooth
+
+
+# ----------------------------------------------------------------
+# A class registered again under its name, as by a cell of a notebook that runs twice, is a map of its own.
+
+
+def slow(params, x, side):
+    return 0.5 * x + 0.1 * params.a, side, 0
+
+
+def fast(params, x, side):
+    return 0.5 * x + 0.4 * params.a, side, 0
+
+
+def registered_same_name(image):
+    class Again(NamedTuple):
+        a: float
+
+    return ls.register(Again, image=image)
+
+
+def test_each_of_two_classes_of_one_name_is_followed_by_its_own_formula():
+    """The fixed point of x / 2 + c is 2 c; either class may come first."""
+    old, new = registered_same_name(slow), registered_same_name(fast)
+    for cls, c in ((old, 0.1), (new, 0.4), (old, 0.1)):
+        assert ls.orbit(cls(1.0), 0.3, 0, 1).x[-1] == 0.15 + c
+        graph = ls.transitions(cls(1.0), ls.grid([(0.0, 1.0)], cells=256))
+        ((lo, hi),) = ls.attractors(graph)[0].extents[0]
+        assert lo <= 2.0 * c <= hi
+    assert ls.maps.kind_of(old(1.0)).name == ls.maps.kind_of(new(1.0)).name == "Again"
+    assert repr(new(1.0)) != repr(old(1.0))
+    assert (
+        new.__name__.isidentifier()
+    )  # the cache on disk makes the class again, under this name, in the next process
+
+
+class Henon(NamedTuple):
+    """A map of one's own under the name and the fields of a textbook map."""
+
+    a: float
+    b: float
+
+
+def turned(params, x, side):
+    return (params.a * x[0] - params.b * x[1], params.b * x[0] + params.a * x[1]), side, 0
+
+
+ls.register(Henon, image=turned, dimension=2)
+
+
+@pytest.mark.parametrize("mine_first", [False, True])
+def test_a_map_may_have_the_name_of_a_textbook_map(mine_first):
+    mine, book = Henon(0.6, 0.3), ls.maps.Henon(0.6, 0.3)
+    for params in (mine, book) if mine_first else (book, mine):
+        after = ls.orbit(params, (0.5, 0.25), 0, 1).x[-1]
+        known = (0.225, 0.3) if params is mine else (1.0 - 0.6 * 0.25 + 0.25, 0.15)
+        assert math.dist(after, known) < 1e-15
+    assert type(pickle.loads(pickle.dumps(mine))) is Henon
+
+
+# ----------------------------------------------------------------
+# Sides that a map or a grid has not: kernels would read beyond their arrays.
+
+
+@pytest.mark.parametrize("side", [-1, 3, 7, 2**31])
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda params, side: maps.images(params, [8.0], side),
+        lambda params, side: maps.images_on(params, [8.0], side, 0),
+        lambda params, side: maps.along(params, [8.0, 8.0], [0, side], [0]),
+        lambda params, side: maps.advance(params, [8.0, 8.0], [0, side], 3),
+        lambda params, side: ls.orbit(params, 8.0, side, 3),
+        lambda params, side: maps.lyapunov(params, 8.0, side, 3),
+        lambda params, side: margins(params, [8.0], side),
+    ],
+    ids=["images", "images_on", "along", "advance", "orbit", "lyapunov", "margins"],
+)
+def test_a_side_the_part_has_not(ask, side):
+    with pytest.raises(MapError, match="0 to 2"):
+        ask(ls.load("paper-designed").map, side)
+
+
+@pytest.mark.parametrize("method", ["end-points", "corners"])
+def test_a_grid_of_fewer_sides_than_the_map(method):
+    with pytest.raises(AnswerError, match="the side of an image is 1"):
+        ls.transitions(ls.load("paper-designed").map, ls.grid([(2.0, 28.0)], cells=16), method)
+
+
+def test_a_grid_of_more_sides_than_the_map():
+    scene = ls.load("paper-designed")
+    four = Domain(np.full((4, 1), 5.0), np.full((4, 1), 28.0))
+    with pytest.raises(MapError, match="the side is 3"):
+        ls.transitions(scene.map, ls.grid(four, cells=16))
+    with pytest.raises(MapError, match="the side is 3"):
+        ls.critical_points(scene.map, four)
+
+
+class Elsewhere(NamedTuple):
+    to: float
+
+
+def _elsewhere(params, x, side):
+    return 0.5 * x, int(params.to), 0
+
+
+maps.register(Elsewhere, image=_elsewhere)
+
+
+@pytest.mark.parametrize("to", [-1.0, 1.0, 30_000.0])
+def test_a_map_that_leads_to_a_side_that_is_none(to):
+    with pytest.raises(AnswerError, match="the side of an image"):
+        ls.transitions(Elsewhere(to), ls.grid([(0.0, 1.0)], cells=8))

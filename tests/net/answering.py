@@ -18,7 +18,7 @@ from limitsets.base.files import as_json
 from limitsets.systems.maps import advance
 from tests.doors.asking import command
 from tests.doors.scenes import scenes
-from tests.lead_quad import LEAD_QUAD
+from tests.plates import LEAD_QUAD
 from tests.trays.scenes import with_tray
 
 # What differs from run to run, or with the code alone.

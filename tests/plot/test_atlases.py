@@ -1,10 +1,11 @@
-"""Maps and surfaces of an atlas: pixels, colours, words and marks against the numbers."""
+"""Figures of atlases and bifurcations."""
 
 import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 import limitsets as ls
@@ -12,6 +13,11 @@ from limitsets import maps
 from limitsets.base.errors import AnswerError
 from limitsets.face.plot.atlas_maps import COLLAPSE_HATCH, DOUBT_HATCH, LEAVE_HATCH, UNREACHED, look_of
 from limitsets.parameters.atlas.classes import UNDECIDED, legend
+from tests.maps_of_tests import TwoState
+
+# ----------------------------------------------------------------
+# Maps and surfaces of an atlas: pixels, colours, words and marks against the numbers.
+
 
 X, Y = "throw.speed=130:180:24", "arm.surface_height=-1:0.2:16"
 
@@ -276,3 +282,53 @@ def test_a_surface_of_a_map_with_one_side_needs_no_side():
         line for line in ls.plot.atlas_surface(found, "reach").axes[0].lines if len(line.get_ydata()) == 3
     ]
     assert line.get_ydata() == pytest.approx([0.5, 1 - 1 / 2.4, 1 - 1 / 2.8])
+
+
+# ----------------------------------------------------------------
+# Bifurcation diagrams, by their content.
+
+
+@pytest.fixture(scope="module")
+def thrown():
+    return ls.continuation("paper-initial", {"throw.speed": ("136 deg/s", "137 deg/s")}, steps=2)
+
+
+def drawn(axes, gid):
+    return [each for each in [*axes.lines, *axes.collections] if each.get_gid() == gid]
+
+
+def test_every_side_shows_its_bands_its_critical_points_and_the_event(thrown):
+    figure = ls.plot.bifurcation(thrown)
+    FigureCanvasAgg(figure).draw()
+    assert [axes.get_ylabel() for axes in figure.axes] == [f"x on side {side} [in]" for side in range(3)]
+    assert figure.axes[-1].get_xlabel() == "throw.speed [deg/s]"
+    assert figure.axes[0].get_xlim() == pytest.approx((136.0, 137.0))
+    for side, axes in enumerate(figure.axes):
+        (areas,) = drawn(axes, "bands")
+        first, last = areas.get_paths()[0].vertices, areas.get_paths()[-1].vertices
+        lo, hi = thrown.attractors[0][0].extents[side][0]
+        assert first[0] == pytest.approx((136.0, lo))
+        assert first[3] == pytest.approx((136.0, hi))
+        assert last[:, 0].max() == pytest.approx(137.0)
+        (line,) = drawn(axes, "critical point")
+        assert line.get_xdata()[[0, -1]] == pytest.approx([136.0, 137.0])
+        assert line.get_ydata()[0] == pytest.approx(thrown.critical[0][side][0])
+    (event,) = thrown.events
+    (mark,) = drawn(figure.axes[1], "border collision")
+    assert mark.get_xdata()[0] == pytest.approx(math.degrees(event.values[0]["throw.speed"]))
+    assert mark.get_ydata()[0] == pytest.approx(event.collision.x)
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["attractor 0", "critical point", "event: border collision"]
+
+
+def test_against_t_or_another_quantity(thrown):
+    figure = ls.plot.bifurcation(thrown, "t")
+    assert figure.axes[-1].get_xlabel() == "t"
+    assert figure.axes[0].get_xlim() == (0.0, 1.0)
+    with pytest.raises(AnswerError, match=r"arm\.length"):
+        ls.plot.bifurcation(thrown, "arm.length")
+    plane = ls.continuation(
+        TwoState(1.0), {"r": (0.8, 0.9)}, steps=1, cells=16, domain=[(-2.0, 2.0), (-2.0, 2.0)]
+    )
+    with pytest.raises(AnswerError, match="one-dimensional"):
+        ls.plot.bifurcation(plane)

@@ -1,9 +1,7 @@
-"""Two throws with the same parameters: what is proved, attacked by plain orbits of single scenes of the box.
-
-No orbit may reach a place that is proved to be out of reach; and the orbits at the corners nearly do.
-"""
+"""Basins by two throws and by one."""
 
 import math
+import sys
 from dataclasses import replace
 from fractions import Fraction
 from itertools import product
@@ -12,14 +10,23 @@ import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets.feeder.scattering import Scattering, Uniform, thrown
 from limitsets.feeder.thrower import impact_angles
 from limitsets.proofs.prover import two_throws
 from limitsets.proofs.prover.attraction import attraction
 from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.proofs.prover.two_throws import FLIP, JOG, TwoThrows, kinds_of_two_throws, stays_below
-from limitsets.systems.maps import images
+from limitsets.systems.maps import advance, images
+from tests.one_throw import mean_after
 from tests.proofs.test_by_angle import DESIGNED, boxed, written
+from tests.proofs.test_probabilities import certificate, mesh
+from tests.proofs.test_recheck import checker
+
+# ----------------------------------------------------------------
+# Two throws with the same parameters: what is proved, attacked by plain orbits of single scenes of the box.
+# No orbit may reach a place that is proved to be out of reach; and the orbits at the corners nearly do.
+
 
 SMALL = {
     "throw.kappa": Fraction(1, 100),
@@ -260,3 +267,121 @@ def test_a_box_whose_terms_are_nan_stays_open():
         assert not boxes.settled(kind, wrong)
     # an angle of 0: nothing is known of (a sin p - d (1 - cos p)) / p by the formula
     assert not boxes.settled(kind, np.array([[0.9, 1.0], [0.0, 0.0]]))
+
+
+# ----------------------------------------------------------------
+# One step of the checker's noisy chain against midpoints, at any place; its bound of a mean against small chains.
+
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+
+X = 20.0
+# places that end within cells of side 1, three next to each other: no more is known of these cells than where their
+# throws may land
+WALLS = [(15.03, 15.08), (15.22, 15.26), (15.4, 15.45)]
+EVEN = [np.linspace(1, 28, 150)] * 3
+
+
+def of_checker(name):
+    return sys.modules[f"{checker.__name__}.{name}"]
+
+
+def chain_of(speed, landing, strata, tmp_path):
+    """The checker's chain of paper-initial on cells of 0.18 in, and its nodes by side."""
+    laws = {"landing.x": f"{landing} in"} | ({"throw.speed": f"{speed:%}"} if speed else {})
+    forged = certificate(
+        "initial",
+        laws,
+        [[2, "15 in", "16 in"]],
+        {"right": [[2, f"{X} in", None]], "wall": [[1, *(f"{end} in" for end in wall)] for wall in WALLS]},
+        mesh("initial", EVEN, {2: [X]}),
+        {"right": np.array([[0.0, 1.0]])},
+        strata=strata,
+    )
+    path = forged.write(tmp_path / "x.proof.zip")
+    claim = of_checker("brackets").read_chances(*checker.report.open_and_look(path))
+    whole = of_checker("brackets").mesh_of(claim.edges)
+    kinds, absorbed = of_checker("brackets").kinds_of(claim, whole)
+    chain = of_checker("links").chain_of(claim.noisy, whole, kinds, absorbed, lambda more: None)
+    return chain, [slice(*whole.first[k : k + 2]) for k in range(3)]
+
+
+# speed, landing, strata, midpoints of each law
+LAWS = [
+    (0.0, 0.05, 1, 1000),
+    pytest.param(0.01, 0.2, 8, 100, marks=pytest.mark.sweep),
+    pytest.param(0.05, 0.1, 8, 100, marks=pytest.mark.sweep),
+    pytest.param(0.3, 0.1, 8, 100, marks=pytest.mark.sweep),
+]
+
+
+@pytest.mark.usefixtures("precision")
+@pytest.mark.parametrize(("speed", "landing", "strata", "count"), LAWS)
+def test_one_throw_is_bounded_at_every_place(speed, landing, strata, count, tmp_path):
+    scene = ls.load("paper-initial")
+    scatter = Scattering(speed=Uniform(speed) if speed else None, landing=Uniform(landing))
+    chain, rows = chain_of(speed, landing, strata, tmp_path)
+    place = chain.mesh.place
+    assert not np.isfinite(chain.hard.much).all()
+    random = np.random.default_rng(5)
+    side = random.integers(0, 3, 3000)
+    x = random.uniform(scene.sides.a[side] + 1e-3, np.where(side == 2, X, 24.0))
+    x[:60] = scene.sides.a[side[:60]] + 10.0 ** random.uniform(-9.0, -3.0, 60)  # cells at the joint
+    x[60:160], side[60:160] = random.uniform(14.9, 15.6, 100), 1
+    some = ~(
+        (side == 1) & np.any([(a <= x) & (x <= b) for a, b in WALLS], axis=0)
+    )  # throws are made from there
+    for share in np.linspace(-1.0, 1.0, 41):  # a mean of throws that end on the arm
+        some &= advance(thrown(scene.map)(1.0 / (1.0 + share * speed) ** 2), x, side, 1)[2] >= 0
+    x, side = x[some], side[some]
+    for waves in (
+        np.sin(3.0 * place),
+        np.cos(1.0 * place),
+        1.0 * (place > 17.3),
+        (place - 15.0) ** 2 / 200.0,
+    ):
+        values = np.where(np.abs(place) < 100.0, waves, 0.0)
+        found = mean_after(scene, scatter, [(place[row], values[row]) for row in rows], x, side, count)
+        none = np.full(len(place), -np.inf)
+        above, below = chain.above(values, none), -chain.above(-values, none)
+        high, low = (
+            np.select([side == k for k in range(3)], [np.interp(x, place[row], bound[row]) for row in rows])
+            for bound in (above, below)
+        )
+        # midpoints of a function that jumps by 2 at most, where the branch changes or at 17.3: by half a weight each
+        slack = 2.0 / count
+        assert (found <= high + slack).all()
+        assert (found >= low - slack).all()
+
+
+class Chain:
+    """A chain of one state that throws stay in with a probability: V at the state, and at the place that absorbs."""
+
+    def __init__(self, stays):
+        self.stays, self.absorbed = stays, {"right": np.array([1])}
+        self.live = np.array([0])
+        self.hard = type("Hard", (), {"at": np.array([], dtype=np.int64)})()
+
+    def fixed(self, value):
+        return np.array([-np.inf, value["right"]])
+
+    def first(self, fixed):
+        return np.maximum(fixed, 0.0)
+
+    def above(self, values, fixed, more=0.0):
+        return np.array([more + self.stays * values[0] + (1.0 - self.stays) * values[1], fixed[1]])
+
+
+@pytest.mark.usefixtures("precision")
+@pytest.mark.parametrize("stays", [0.1, 0.4, 0.9])
+def test_a_mean_below_the_geometric_one_is_not_proved(stays):
+    brackets, chain = of_checker("brackets"), Chain(stays)
+    chain.live = np.array([], dtype=np.int64)
+    chain.hard.at = np.array([0])
+    row = of_checker("averages").Rows(1, np.array([0]), np.array([0]), np.array([1.0]), 0.0)
+    mean = 1.0 / (1.0 - stays)  # of a geometric law
+    for share in (0.7, 0.9, 0.999999):
+        assert "at most" in brackets.check_mean(chain, row, (0.0, share * mean))
+    assert brackets.check_mean(chain, row, (0.999 * mean, 1.001 * mean)) == ""
+    assert "at least" in brackets.check_mean(chain, row, (1.001 * mean, np.inf))

@@ -1,22 +1,36 @@
-"""The report: its words against the answers, and its files replaced whole."""
+"""The report: pages, figures, files, with own figures in it."""
 
+import base64
 import json
+import math
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from jinja2 import UndefinedError
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError, LimitsetsError
-from limitsets.face.report.pages import bands, page, starts_words, verdict_of, void_of, words
-from limitsets.face.report.writing import audit_page, write
+from limitsets.base.files import as_json, as_table, replaced
+from limitsets.face.report.pages import as_html, bands, page, starts_words, verdict_of, void_of, words
+from limitsets.face.report.writing import FIGURES, audit_page, write
 from limitsets.face.report.writing import write as write_report
 from limitsets.feeder.goals import OrientedBeyond
+from limitsets.feeder.scattering import Gaussian, Scattering
 from limitsets.parameters.analysis import GoalOutcome
-from tests.lead_triangle import left_by_some
+from tests.assembly.pairs import both_own
+from tests.browsers import browser
+from tests.cli.command import run
+from tests.feeding.scenes import with_cavity
+from tests.plates import left_by_some
+
+# ----------------------------------------------------------------
+# The report: its words against the answers, and its files replaced whole.
+
 
 SCENES = Path(__file__).parents[1] / "analysis"
 SOURCES = ["paper-designed", "paper-initial", SCENES / "four-sides.toml", SCENES / "five-sides.toml"]
@@ -314,3 +328,227 @@ def test_a_proved_share_is_rounded_down():
     """Not the doctest's: pytest takes 96.5 for 96.4 there."""
     assert starts_words("cells", 0.96459) == "for 96.4 % of all starts"
     assert starts_words("cells", 0.99999) == "for 99.9 % of all starts"
+
+
+# ----------------------------------------------------------------
+# The report as one file: it stands alone, says what the Markdown says, and is readable on a phone.
+
+
+VOID = {"meta", "img", "br", "hr", "link", "input"}
+
+
+class Reader(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.open, self.text, self.images, self.links = [], [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        names = dict(attributes)
+        self.images += [(names["alt"], names["src"])] if tag == "img" else []
+        self.links += [value for name, value in attributes if name in ("href", "src")]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("report")
+    write(ls.analyse("paper-designed", cells=512), place, html=True)
+    return place
+
+
+def test_it_stands_alone_and_has_all_figures(folder):
+    reader = Reader()
+    reader.feed((folder / "report.html").read_text(encoding="utf-8"))
+    assert reader.open == []
+    assert all(link.startswith("data:") for link in reader.links)
+    assert len(reader.images) == len(FIGURES)
+    for caption, source in reader.images:
+        assert caption
+        assert b"<svg" in base64.b64decode(source.partition(",")[2])
+
+
+def test_it_says_what_the_markdown_says(folder):
+    reader = Reader()
+    reader.feed((folder / "report.html").read_text(encoding="utf-8"))
+    page = re.sub(r"!\[.*?\]\(.*?\)", "", (folder / "report.md").read_text(encoding="utf-8"))
+
+    def words(text):
+        return re.findall(r"[\w.]+", text)
+
+    title = page.splitlines()[0].lstrip("# ")
+    assert words(" ".join(reader.text)) == words(title) + words(page)
+
+
+def test_text_of_a_scene_is_never_markup():
+    page = as_html("# a <b> & c\n\n<script>alert(1)</script>\n\n[x](javascript:alert(1))\n", {})
+    assert "<script>" not in page
+    assert 'href="javascript' not in page
+    assert "<title>a &lt;b&gt; &amp; c</title>" in page
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("width", [1200, 390])
+def test_no_page_is_wider_than_the_screen(width, folder):
+    said = []
+    with browser() as started:
+        page = started.new_page(viewport={"width": width, "height": 800})
+        page.on("console", lambda message: said.append(message.text))
+        page.on(
+            "request", lambda request: said.append(request.url) if request.url.startswith("http") else None
+        )
+        page.goto((folder / "report.html").as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.evaluate("[...document.images].every(each => each.naturalWidth > 0)")
+    assert said == []
+
+
+# ----------------------------------------------------------------
+# Files that are replaced whole, or not at all, and answers as JSON.
+
+
+@dataclass
+class Place:
+    x: float
+    side: int
+
+
+class Told:
+    def to_json(self):
+        return as_table(place=Place(math.nan, np.int64(2)))
+
+
+def test_an_answer_as_json():
+    answer = {
+        1: (Told(), Place(np.float64(0.1), 0)),
+        "sizes": np.array([[1.5, -np.inf], [np.nan, 2.0]]),
+        "none": None,
+        "words": iter(["a", "é"]),
+        "sure": np.True_,
+    }
+    text = as_json(answer)
+    assert json.loads(text) == {
+        "1": [{"place": {"x": None, "side": 2}}, {"x": 0.1, "side": 0}],
+        "sizes": [[1.5, None], [None, 2.0]],
+        "none": None,
+        "words": ["a", "é"],
+        "sure": True,
+    }
+    assert text == json.dumps(json.loads(text), indent=2) + "\n"
+    with pytest.raises(TypeError):
+        as_json(object())
+
+
+def test_all_at_once(tmp_path):
+    (tmp_path / "one").write_text("old")
+    with replaced(tmp_path) as draft:
+        (draft / "one").write_text("new")
+        (draft / "two").write_text("new")
+        assert (tmp_path / "one").read_text() == "old"
+        assert not (tmp_path / "two").exists()
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"one": "new", "two": "new"}
+
+
+@pytest.mark.parametrize("fault", [ValueError, KeyboardInterrupt, SystemExit])
+def test_a_fault_leaves_the_old_ones(tmp_path, fault):
+    (tmp_path / "one").write_text("old")
+    with pytest.raises(fault), replaced(tmp_path) as draft:  # noqa: PT012 - leaving the block is what is tested
+        (draft / "one").write_text("half")
+        raise fault
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("one", "old")]
+
+
+def test_a_fault_between_two_renames_leaves_whole_files(tmp_path, monkeypatch):
+    for name in ("one", "two"):
+        (tmp_path / name).write_text("old")
+    rename, calls = Path.replace, []
+
+    def fails_second(self, target):
+        calls.append(target)
+        if len(calls) == 2:
+            raise OSError(28, "No space left on device")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "replace", fails_second)
+    with pytest.raises(OSError, match="No space"), replaced(tmp_path) as draft:  # noqa: PT012 - leaving the block is what is tested
+        (draft / "one").write_text("new")
+        (draft / "two").write_text("new")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"one": "new", "two": "old"}
+
+
+def test_only_regular_files_are_replaced(tmp_path):
+    (tmp_path / "two").mkdir()
+    (tmp_path / "one").write_text("old")
+    with pytest.raises(FileExistsError), replaced(tmp_path) as draft:  # noqa: PT012 - leaving the block is what is tested
+        (draft / "one").write_text("new")
+        (draft / "two").write_text("new")
+    assert (tmp_path / "one").read_text() == "old"
+    assert {path.name for path in tmp_path.iterdir()} == {"one", "two"}
+
+
+# ----------------------------------------------------------------
+# What the paper's experimenters counted stands in no answer about a user's own scenes, through any door.
+
+
+THEIRS = re.compile(r"\bpaper\b|\b(19|17|11) of( the)? 20\b", re.IGNORECASE)
+NOISE = Scattering(speed=Gaussian(0.005))
+
+
+def said_by(figure):
+    """Every text of a figure, legends and notes too."""
+    from matplotlib.text import Text
+
+    return " ".join(each.get_text() for each in figure.findobj(Text))
+
+
+def clean(words, *names):
+    for name in names:
+        words = words.replace(name, "own")
+    assert not THEIRS.search(words), THEIRS.search(words)
+    return words
+
+
+def test_feeding(capfd, tmp_path):
+    tree = {**with_cavity().as_dict(), "name": "own"}
+    scene = ls.load(tree)
+    found = ls.feed(scene, NOISE, trials=40, prove=False)
+    words = [as_json(found), said_by(ls.plot.feeding(found)), *(str(table) for table in found.tables())]
+    clean(" ".join(words))
+    assert "assumed" in said_by(ls.plot.feeding(found))
+    ls.dump(scene, tmp_path / "own.toml")
+    flags = ("--trials", "40", "--no-proof", "--scatter", "throw.speed=0.5 %")
+    _, out, err = run(capfd, "feed", str(tmp_path / "own.toml"), *flags, "-o", str(tmp_path / "out"))
+    clean(out + err + (tmp_path / "out" / "feeding.json").read_text(), str(tmp_path))
+    assert "assumed: " in out
+
+
+@pytest.mark.parametrize("contact", [False, True])
+def test_assembly(capfd, tmp_path, contact):
+    if contact:
+        pytest.importorskip("pymunk")
+    one, two = both_own(contact=contact)
+    found = ls.assemble(one, two, NOISE, trials=3)
+    assert (
+        json.loads(as_json(found))["carried"] is contact
+    )  # the cavity is part of the arm unless asked otherwise
+    clean(" ".join([as_json(found), said_by(ls.plot.assembly(found)), str(found.table())]))
+    for name, each in (("one", one), ("two", two)):
+        ls.dump(each, tmp_path / f"{name}.toml")
+    files = (str(tmp_path / "one.toml"), str(tmp_path / "two.toml"))
+    code, out, err = run(capfd, "assemble", *files, "--trials", "3", "-o", str(tmp_path / "out"))
+    assert code == 0
+    clean(out + err + (tmp_path / "out" / "assembly.json").read_text(), str(tmp_path))
+    if contact:
+        assert "the cavity is thrown too" in out
+        _, out, _ = run(capfd, "assemble", *files, "--trials", "1", "--standing")
+        assert "the cavity stands" in out

@@ -20,8 +20,7 @@ from limitsets.parameters.margins.deviations import deviation_scale, deviation_s
 from limitsets.proofs.prover import Proof
 from limitsets.proofs.prover.goals import reaches
 from limitsets.proofs.prover.query import Query
-from tests.lead_triangle import left_by_some
-from tests.plates import plate
+from tests.plates import left_by_some, plate
 from tests.thrower import reference
 
 X = 20

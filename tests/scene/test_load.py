@@ -1,4 +1,10 @@
+"""Scenes: reading them, the documented ones, garbage, chamfers."""
+
+from __future__ import annotations
+
+import copy
 import math
+import re
 import subprocess
 import sys
 import tomllib
@@ -8,10 +14,28 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+import limitsets as ls
+from limitsets.base.errors import GridError, MapError, SceneError, TipsError
 from limitsets.feeder.goals import AttractsAll, FlipOrder, OrientedBeyond, Reaches, StaysOnArm
-from limitsets.feeder.scene import Deviation, Effects, Scatter, Scene, World, dump, load, scenes
+from limitsets.feeder.scene import (
+    Deviation,
+    Effects,
+    Scatter,
+    Scene,
+    World,
+    dump,
+    load,
+    load_to_analyse,
+    scenes,
+)
+from limitsets.feeder.scene.quantities import NAMES
+from limitsets.feeder.scene.schema import scene_table
 from limitsets.feeder.scene.surroundings import BeyondSensor, ChosenThrow, Feedback
+from limitsets.feeder.thrower import trace
+from limitsets.feeder.thrower.effects import EFFECTS
 
 # kappa, speed for information [deg/s], arm's length, height, flight, flip (docs/model.md, the four paper scenes)
 PAPER = {
@@ -253,3 +277,282 @@ def test_reading_a_scene_loads_little() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == ["[]", "['pydantic']"]
+
+
+# ----------------------------------------------------------------
+# docs/scene.md: its example loads, and its table has the keys that there are.
+
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
+
+
+TABLES = (
+    "part",
+    "part.mass",
+    "arm",
+    "throw",
+    "gravity",
+    "model",
+    "goal",
+    "cavity",
+    "tray",
+    "world",
+    "effects",
+    "feedback",
+)
+
+
+def keys(model, path=""):
+    """Every key of the schema by its whole name; what is written in one line counts as one key."""
+    for name, field in model.model_fields.items():
+        kinds = (field.annotation, *getattr(field.annotation, "__args__", ()))
+        if f"{path}{name}" in TABLES:
+            (inner,) = (kind for kind in kinds if hasattr(kind, "model_fields"))
+            yield from keys(inner, f"{path}{name}.")
+        else:
+            yield f"{path}{name}"
+
+
+def test_the_example_loads_and_has_a_margin_of_its_own():
+    (text,) = re.findall(r"```toml\n(.*?)```", PAGE, re.S)
+    scene = ls.load(tomllib.loads(text))
+    assert (scene.unit, scene.sides.a.size) == ("mm", 4)
+    path = ls.orbit(scene.map, 300.0, 0, 1000)
+    assert len(path.x) > 1000  # none of these throws leaves the arm
+
+
+def documented():
+    """The keys in the first column of the table: a word that begins with a point is in the table of the first one."""
+    for line in PAGE.splitlines():
+        names = re.findall(r"`([^`]+)`", line.split("|")[1]) if line.startswith("| `") else []
+        for name in names:
+            yield names[0].rpartition(".")[0] + name if name.startswith(".") else name.partition('."')[0]
+
+
+def test_the_table_has_the_keys_that_there_are():
+    assert sorted(documented()) == sorted(keys(scene_table(with_effects=True)))
+
+
+def test_the_model_s_table_has_every_effect_and_the_facts_that_it_needs():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "model.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|", page.split("## Effects", 1)[1], re.M)
+    told = {name: tuple(re.findall(r"`(\w+)`", facts)) for name, facts in rows}
+    assert told == {name: effect.needs for name, effect in EFFECTS.items()}
+
+
+def test_every_quantity_is_named():
+    for name in NAMES:
+        last = name.rpartition(".")[2]
+        assert f"`{name}`" in PAGE or (f"`.{last}`" in PAGE and name.startswith("part."))
+
+
+# ----------------------------------------------------------------
+# Whatever is read is a scene or one SceneError.
+
+
+DESIGNED = load("paper-designed").as_dict()
+UNITS = st.sampled_from(["in", "cm", "m", "deg", "rad", "deg/s", "%", "kg", "1/s", ""])
+ODD = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=8)
+    | st.binary(max_size=4)
+    | st.builds("{} {}".format, st.floats() | st.integers(-40, 40), UNITS),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=6) | st.integers(), inner, max_size=3)
+    ),
+    max_leaves=4,
+)
+
+
+def places(node: Any) -> list[tuple[Any, Any]]:
+    """List every place of a structure that holds something, as its holder and its key."""
+    items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    return [place for key, value in items for place in [(node, key), *places(value)]]
+
+
+@settings(max_examples=150)
+@given(st.data())
+def test_spoilt_structures(data: st.DataObject) -> None:
+    table = copy.deepcopy(DESIGNED)
+    for _ in range(data.draw(st.integers(1, 3))):
+        found = places(table)
+        holder, key = found[data.draw(st.integers(0, len(found) - 1))]
+        if data.draw(st.booleans()):
+            holder[key] = data.draw(ODD)
+        else:
+            del holder[key]
+        if not table:
+            break
+    try:
+        scene = load(table)
+    except SceneError:
+        return
+    assert load(dump(scene)) == scene
+
+
+@given(st.dictionaries(st.text(max_size=6), ODD, max_size=4))
+def test_random_structures(table: dict[str, Any]) -> None:
+    try:
+        load(table)
+    except SceneError:
+        return
+    raise AssertionError(table)
+
+
+TEXT = dump(load("paper-designed"))
+
+
+@settings(max_examples=150)
+@given(st.integers(0, len(TEXT)), st.integers(0, 12), st.text(max_size=12))
+def test_spoilt_text(place: int, length: int, other: str) -> None:
+    try:
+        scene = load(TEXT[:place] + other + TEXT[place + length :] + "\n")
+    except SceneError:
+        return
+    assert load(dump(scene)) == scene
+
+
+LENGTHS = st.builds("{:.6f} {}".format, st.floats(4.0, 4.6), st.just("in")) | st.builds(
+    "{:.4e} {}".format, st.floats(10.2, 11.6), st.just("cm")
+)
+
+
+@given(
+    st.lists(LENGTHS, min_size=3, max_size=3),
+    st.floats(0.4, 0.6),
+    st.floats(-2, 2),
+    st.sampled_from(["exact", "small-angle", "small-angle-2"]),
+    st.dictionaries(st.sampled_from(["friction", "restitution"]), st.floats(0, 1) | st.integers(0, 1)),
+    st.text(st.characters(categories=["L", "N"]), min_size=1, max_size=20),
+)
+def test_round_trip(
+    sides: list[str], along: float, height: float, flight: str, world: dict[str, float], name: str
+) -> None:
+    table = {
+        "name": name,
+        "part": {
+            "sides": sides,
+            "mass": {
+                "center": {"side": 0, "along": f"{along * 4!r} in", "above": "0.9 in"},
+                "radius_of_gyration": "3 cm",
+            },
+        },
+        "arm": {"surface_height": f"{height:.8f} in", "length": "2.5 ft"},
+        "throw": {"kappa": "30 in"},
+        "model": {"flight": flight},
+        "world": world,
+    }
+    scene = load(table)
+    again = load(dump(scene))
+    assert again == scene
+    assert again.as_dict() == table
+    assert (again.sides.a == scene.sides.a).all()
+    assert (again.sides.corner == scene.sides.corner).all()
+
+
+# ----------------------------------------------------------------
+# A part with a side on which it cannot rest: what loads, what is refused and how, and where its states lie.
+
+
+BOTH = {"landing": True, "roll": True}
+CHAMFER = 3
+
+
+def chamfered(**tables: Any) -> dict[str, Any]:
+    """A square plate of 4 cm with a corner cut off, on which it tips over the right end."""
+    corners = ((0, 0), (4, 0), (4, 3.6), (3.0, 4), (0, 4))
+    return {
+        "name": "chamfered",
+        "part": {
+            "vertices": [[f"{x} cm", f"{y} cm"] for x, y in corners],
+            "mass": {"plate_density": "23.55 kg/m^2"},
+        },
+        "arm": {"surface_height": "-3 mm", "length": "40 cm"},
+        "throw": {"kappa": "20 cm"},
+    } | tables
+
+
+def test_the_error_names_the_lines_to_add() -> None:
+    with pytest.raises(TipsError) as caught:
+        ls.load(chamfered())
+    assert "the part cannot rest on side 3: it tips over the right end by 0.197 cm" in str(caught.value)
+    assert "add landing = true and roll = true to [effects]" in str(caught.value)
+    assert caught.value.key == "part.mass"
+
+
+@pytest.mark.parametrize("effects", [{"roll": True}, {"landing": True}, {"landing": True, "roll": False}])
+def test_one_of_the_lines_is_not_enough(effects: dict[str, bool]) -> None:
+    with pytest.raises(TipsError):
+        ls.load(chamfered(effects=effects))
+
+
+def test_with_the_lines_it_loads_and_has_no_states_on_the_chamfer() -> None:
+    scene = ls.load(chamfered(effects=BOTH))
+    assert scene.sides.rests.tolist() == [True, True, True, False, True]
+    assert scene.domain.inhabited.tolist() == scene.sides.rests.tolist()
+    cells = ls.grid(scene.domain, cells=100)
+    assert cells.shape[:, 0].tolist() == [100, 100, 100, 0, 100]
+    assert (cells.index([1.0, 20.0, scene.arm_length], CHAMFER) == -1).all()
+    assert (cells.index([20.0, scene.arm_length], 0) >= 0).all()
+    assert cells.side_of([299, 300]).tolist() == [2, 4]
+    assert cells.refine(3).shape[:, 0].tolist() == [300, 300, 300, 0, 300]
+    assert ls.load(scene.as_dict()) == scene
+
+
+@pytest.mark.parametrize(
+    ("tables", "key", "words"),
+    [
+        ({"model": {"flip": "energy"}}, "model.flip", "signed"),
+        (
+            {"effects": BOTH | {"drive": True}, "world": {"stroke": "5 deg"}},
+            "effects.drive",
+            "cannot rest on side 3",
+        ),
+        ({"goal": {"oriented_beyond": {"x": "10 cm", "side": 3}}}, "goal.oriented_beyond.side", "0, 1, 2, 4"),
+        ({"goal": {"flip_order": [0, 3]}}, "goal.flip_order[1]", "cannot rest on it"),
+        (
+            {"cavity": {"position": "39 cm", "width": "9 cm", "depth": "2 cm", "angle": "45 deg"}},
+            "cavity",
+            "rests on each of its sides",
+        ),
+        (
+            {"feedback": {"sensor": {"side": 0}, "throws": [{"name": "one", "kappa": "20 cm"}]}},
+            "feedback",
+            "rests on each of its sides",
+        ),
+    ],
+)
+def test_what_knows_nothing_of_a_chamfer_is_refused(tables: dict[str, Any], key: str, words: str) -> None:
+    with pytest.raises(SceneError, match=words) as caught:
+        ls.load(chamfered(**{"effects": BOTH, **tables}))
+    assert caught.value.key == key
+
+
+def test_only_what_analyse_reads_switches_the_effects_on() -> None:
+    scene, switched = load_to_analyse(chamfered())
+    assert switched == ("landing", "roll")
+    assert scene.as_dict()["effects"] == BOTH
+    assert load_to_analyse(chamfered(effects={"roll": True}))[1] == ("landing",)
+    assert load_to_analyse(chamfered(effects=BOTH))[1] == ()
+    assert load_to_analyse("paper-designed") == (ls.load("paper-designed"), ())
+    with pytest.raises(SceneError, match='flight = "exact"'):
+        load_to_analyse(chamfered(model={"flight": "small-angle"}))
+
+
+def test_no_throw_begins_on_a_chamfer() -> None:
+    thrown = ls.load(chamfered(effects=BOTH)).map
+    with pytest.raises(MapError, match="0, 1, 2, 4; it tips over on side 3"):
+        trace(thrown, 20.0, CHAMFER)
+    assert trace(thrown, 20.0, 0).code[0] >= 0
+
+
+def test_a_domain_has_states_somewhere_and_no_box_that_is_empty_in_part() -> None:
+    from limitsets.systems.cells import Domain
+
+    assert Domain([[0.0], [1.0]], [[1.0], [1.0]]).inhabited.tolist() == [True, False]
+    for lo, hi in (([[1.0]], [[1.0]]), ([[0.0, 1.0]], [[1.0, 1.0]]), ([[2.0], [0.0]], [[1.0], [1.0]])):
+        with pytest.raises(GridError, match="lo < hi"):
+            Domain(np.array(lo), np.array(hi))

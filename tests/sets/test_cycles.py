@@ -1,7 +1,9 @@
-"""Periodic orbits: counts and multipliers known on paper, and the same orbits found in another way."""
+"""Cycles: each orbit closes, once, on the branch that the map takes."""
 
 import math
+import re
 from collections import Counter
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -9,9 +11,14 @@ import pytest
 import limitsets as ls
 from limitsets import maps
 from limitsets.base.errors import AnswerError
+from limitsets.parameters.atlas import Axis
 from limitsets.systems.cells import CellSet, as_domain
 from limitsets.systems.sets import cycles_from, cycles_of
 from tests.test_paper import LIMIT_SETS
+
+# ----------------------------------------------------------------
+# Periodic orbits: counts and multipliers known on paper, and the same orbits found in another way.
+
 
 UNIT = as_domain([(0.0, 1.0)])
 ALL = {0: [(0.0, 1.0)]}
@@ -192,3 +199,329 @@ def test_wrong_questions():
         ls.cycles(graph, 2, within="everything")
     with pytest.raises(AnswerError, match="the plane"):
         cycles_from(maps.Logistic(3.2), [[0.1, 0.1]], 0, 1)
+
+
+# ----------------------------------------------------------------
+# Cycles close under `image`, and each comes once: against counts on paper and by another way.
+
+
+UNIT_CLOSING, ALL_CLOSING = as_domain([(0.0, 1.0)]), {0: [(0.0, 1.0)]}
+
+
+class Turned(NamedTuple):
+    """The circle map with `floor` in place of branches."""
+
+    omega: float
+    coupling: float
+
+
+def turned(p, x, side):
+    y = x + p.omega - p.coupling / math.tau * math.sin(math.tau * x)
+    return y - math.floor(y), side, 0
+
+
+class Twice(NamedTuple):
+    factor: float
+
+
+def twice(p, x, side):
+    y = p.factor * x
+    return y - math.floor(y), side, 0
+
+
+class Kicked(NamedTuple):
+    """The standard map on the torus."""
+
+    k: float
+
+
+def kicked(p, x, side):
+    v = x[1] + p.k / math.tau * math.sin(math.tau * x[0])
+    u = x[0] + v
+    return (u - math.floor(u), v - math.floor(v)), side, 0
+
+
+class Cat(NamedTuple):
+    a: float
+
+
+def cat(p, x, side):
+    u, v = p.a * x[0] + x[1], x[0] + x[1]
+    return (u - math.floor(u), v - math.floor(v)), side, 0
+
+
+class Open(NamedTuple):
+    """x / 2 + 1/4 below 1/2, where the limit is a fixed point and the map is not; x / 2 above."""
+
+    half: float
+
+
+def opened(p, x, side):
+    branch = 0 if x < 0.5 else 1
+    after, to = opened_on(p, x, side, branch)
+    return after, to, branch
+
+
+def opened_on(p, x, side, branch):
+    return (p.half * x + 0.25 if branch == 0 else p.half * x), side
+
+
+class Cancels(NamedTuple):
+    """The logistic map by a formula that loses six digits."""
+
+    r: float
+
+
+def cancels(p, x, side):
+    return (p.r * x * (1.0 - x) + 1e6) - 1e6, side, 0
+
+
+ls.register(Turned, image=turned)
+ls.register(Twice, image=twice)
+ls.register(Kicked, image=kicked, dimension=2)
+ls.register(Cat, image=cat, dimension=2)
+ls.register(Open, image=opened, image_on=opened_on, branches=("below", "above"))
+ls.register(Cancels, image=cancels)
+
+
+def require_closed(params, found):
+    """Hold every cycle against the map itself."""
+    for cycle in found:
+        points = cycle.x if cycle.x.ndim > 1 else cycle.x[:, None]
+        miss = []
+        for x, side, branch, to, to_side in zip(
+            cycle.x,
+            cycle.side,
+            cycle.branches,
+            np.roll(points, -1, axis=0),
+            np.roll(cycle.side, -1),
+            strict=True,
+        ):
+            one = maps.images(params, np.array([x]), int(side))
+            assert (one.code[0], one.side[0]) == (branch, to_side)
+            miss.append(np.abs(one.x[0] - to).max())
+        assert max(miss) == cycle.residual <= cycle.rounding
+        assert len(np.unique(np.column_stack([points, cycle.side]), axis=0)) == cycle.period
+    points = [np.round(c.x.reshape(c.period, -1), 7) + 0.0 for c in found]
+    rounded = {
+        tuple(sorted((*x, s) for x, s in zip(p.tolist(), c.side.tolist(), strict=True)))
+        for p, c in zip(points, found, strict=True)
+    }
+    assert len(rounded) == len(found)
+
+
+def lifted(p, n, up_to):
+    """Count the cycles of each period of a circle map: changes of sign of F^p(x) - x - q, of its lift, on a grid."""
+    x = (np.arange(n) + 0.5) / n
+    count, y = {}, x.copy()
+    for period in range(1, up_to + 1):
+        y = y + p.omega - p.coupling / math.tau * np.sin(math.tau * y)
+        for q in range(math.floor((y - x).min()), math.ceil((y - x).max()) + 1):
+            sign = np.sign(y - x - q)
+            points = int((sign != np.roll(sign, -1)).sum())
+            shorter = sum(d * n for (d, of), n in count.items() if period % d == 0 and of * period == q * d)
+            if points > shorter:
+                count[period, q] = (points - shorter) // period
+    found = Counter()
+    for (period, _), number in count.items():
+        found[period] += number
+    return found
+
+
+@pytest.mark.parametrize(
+    ("omega", "coupling"), [(0.61, 0.9), (0.35, 0.95), (0.5, 0.9), (0.4, 0.99), (0.02, 0.3)]
+)
+def test_an_own_circle_map_has_the_cycles_of_its_lift(omega, coupling):
+    params = Turned(omega, coupling)
+    found = cycles_of(params, ALL_CLOSING, UNIT_CLOSING, 6)
+    require_closed(params, found)
+    assert Counter(c.period for c in found) == lifted(params, 200_001, 6)
+    same = maps.Circle(omega, coupling)
+    other = cycles_of(same, ALL_CLOSING, UNIT_CLOSING, 6)
+    require_closed(same, other)
+    assert [c.multiplier for c in other] == pytest.approx([c.multiplier for c in found], abs=1e-9)
+
+
+def test_the_circle_map_at_one_half():
+    # 0 and 1/2 are one orbit, of slope (1 - K) (1 + K); the other one goes from x to 1 - x
+    first, second = cycles_of(maps.Circle(0.5, 0.9), ALL_CLOSING, UNIT_CLOSING, 4)
+    assert first.x.tolist() == [0.0, 0.5]
+    assert first.multiplier == pytest.approx((1.0 - 0.9) * (1.0 + 0.9), abs=1e-12)
+    assert second.x.sum() == pytest.approx(1.0, abs=1e-14)
+
+
+def test_the_doubling_map_by_floor_has_2_to_the_p_minus_1_points():
+    found = cycles_of(Twice(2.0), ALL_CLOSING, UNIT_CLOSING, 9)
+    require_closed(Twice(2.0), found)
+    for p in range(1, 10):
+        assert sum(c.period for c in found if p % c.period == 0) == 2**p - 1
+
+
+def test_a_limit_that_is_no_orbit_is_no_cycle():
+    assert [c.x.tolist() for c in cycles_of(Open(0.5), ALL_CLOSING, UNIT_CLOSING, 3) if c.period == 1] == []
+
+
+def test_a_formula_that_cancels_loses_no_cycle():
+    plain, rough = (cycles_of(cls(3.9), ALL_CLOSING, UNIT_CLOSING, 6) for cls in (maps.Logistic, Cancels))
+    require_closed(Cancels(3.9), rough)
+    assert Counter(c.period for c in rough) == Counter(c.period for c in plain)
+    assert max(c.rounding for c in plain) < 1e-12 < max(c.rounding for c in rough) < 1e-8
+
+
+def test_near_a_doubling_a_cycle_of_twice_the_period_is_there_or_not():
+    # the cycle of period 2 is born at r = 3; its points are sqrt(r - 3) apart, in units of about 1
+    for r, periods in ((3.0 - 1e-9, [1, 1]), (3.0, [1, 1]), (3.0 + 1e-6, [1, 1, 2])):
+        found = cycles_of(maps.Logistic(r), ALL_CLOSING, UNIT_CLOSING, 4)
+        assert [c.period for c in found] == periods
+        require_closed(maps.Logistic(r), found)
+
+
+def test_the_standard_map_has_two_cycles_of_period_two():
+    graph = ls.transitions(Kicked(1.2), ls.grid([(0.0, 1.0)] * 2, cells=64))
+    found = ls.cycles(graph, 3)
+    require_closed(Kicked(1.2), found)
+    two = [c for c in found if c.period == 2]
+    # (0, 1/2), (1/2, 1/2): the trace of (1 + K, 1; K, 1) (1 - K, 1; -K, 1) is 2 - K^2
+    assert two[0].multiplier == pytest.approx(1.0, abs=1e-9)
+    # the other has v = 2 x at x and 1 - x, with 4 x = 1 - K sin(2 pi x) / (2 pi) up to a turn
+    assert len(two) == 2
+    x = two[1].x[0, 0]
+    assert two[1].x[1, 0] == pytest.approx(1.0 - x, abs=1e-12)
+    assert two[1].x[0, 1] == pytest.approx((2.0 * x) % 1.0, abs=1e-12)
+
+
+def test_the_cat_map_has_its_points():
+    # |trace of A^p - 2| points: 1, 5, 16
+    random = np.random.default_rng(3)
+    found = cycles_from(Cat(2.0), random.random((4000, 2)), 0, 3)
+    require_closed(Cat(2.0), found)
+    assert Counter(c.period for c in found) == {1: 1, 2: 2, 3: 5}  # those of periods 1 and 3 lie on the seams
+
+
+# ----------------------------------------------------------------
+# Maps that jump inside one branch (a floor in `image`, nothing else registered): cycles, attractors, ends.
+# Known on paper: m x mod 1 returns after p steps at the m^p - 1 points j / (m^p - 1); and a circle map with x + 1/2
+# at 0 and at 1/2 has the cycle {0, 1/2}, of multiplier (1 - k - m) (1 + k - m).
+
+
+class Times(NamedTuple):
+    m: float
+
+
+class Waves(NamedTuple):
+    omega: float
+    k: float
+    m: float
+
+
+def times(params, x, side):
+    y = params.m * x
+    return y - math.floor(y), side, 0
+
+
+def lift(params, x):
+    first, second = math.sin(2.0 * math.pi * x), math.sin(4.0 * math.pi * x)
+    return x + params.omega - params.k / (2.0 * math.pi) * first - params.m / (4.0 * math.pi) * second
+
+
+def waves(params, x, side):
+    y = lift(params, x)
+    return y - math.floor(y), side, 0
+
+
+ls.register(Times, image=times)
+ls.register(Waves, image=waves)
+
+
+def graph_of(params, cells=256):
+    return ls.transitions(params, ls.grid([(0.0, 1.0)], cells=cells))
+
+
+@pytest.mark.parametrize("m", [3.0, 5.0])
+def test_m_x_mod_1_returns_at_every_multiple(m):
+    found = ls.cycles(graph_of(Times(m)), 4)
+    assert found.complete
+    for p in range(1, 5):
+        points = np.sort(np.concatenate([c.x for c in found if p % c.period == 0]))
+        assert points == pytest.approx(np.arange(m**p - 1) / (m**p - 1), abs=1e-12)
+
+
+def test_a_folded_circle_has_every_cycle_that_its_lift_crosses():
+    """A point of period p crosses the diagonal of the lift, moved by a whole number: crossings are counted."""
+    params = Waves(0.3, 4.0, 0.3)
+    found = ls.cycles(graph_of(params), 5)
+    start = np.linspace(0.0, 1.0, 400_001) + 1.2345e-7
+    y = start
+    for p in range(1, 6):
+        y = np.array(
+            y + 0.3 - 2.0 / np.pi * np.sin(2.0 * np.pi * y) - 0.075 / np.pi * np.sin(4.0 * np.pi * y)
+        )
+        turns = np.abs(np.diff(np.floor(y - start))).sum()
+        assert sum(c.period for c in found if p % c.period == 0) == turns
+
+
+def test_a_cycle_on_the_cut_is_all_that_attracts():
+    params = Waves(0.5, 0.7, 0.2)
+    graph = graph_of(params, 1024)
+    (attractor,) = ls.attractors(graph)
+    for extents, wide in ((attractor.extents, 0.01), (ls.limit_set(graph, attractor).extents, 1e-9)):
+        places = [0.5 * (lo + hi) for lo, hi in extents[0]]
+        assert places == pytest.approx([0.0, 0.5, 1.0], abs=wide)
+        assert sum(hi - lo for lo, hi in extents[0]) < wide
+    # What is left open lies at the repelling cycle, not in all that meets the jump.
+    assert ls.basins(graph, (attractor,)).attractors[0] > 0.98
+    assert min(c.multiplier for c in ls.cycles(graph, 2)) == pytest.approx((1 - 0.9) * (1 + 0.5), abs=1e-9)
+
+
+def test_basins_say_that_starts_are_undecided_by_the_enclosed_image_of_a_jump():
+    """Cells that lead to the jump, counted apart: the lift rises, so that its ends bound the image of a cell."""
+    params, cells = Waves(0.34, 0.95, 0.0), 1024
+    graph = ls.transitions(params, ls.grid([(0.0, 1.0)], cells=cells), "boxes")
+    ends = np.linspace(0.0, 1.0, cells + 1)
+    after = ends + 0.34 - 0.95 / (2.0 * np.pi) * np.sin(2.0 * np.pi * ends)
+    first, last = np.floor(after[:-1] * cells).astype(int), np.floor(after[1:] * cells).astype(int)
+    leads = (first < cells) & (last >= cells)
+    for _ in range(cells):
+        leads = leads | np.array(
+            [leads[np.arange(a, b + 1) % cells].any() for a, b in zip(first, last, strict=True)]
+        )
+    found = ls.basins(graph, ls.attractors(graph))
+    assert found.undecided_between > 0.1
+    words = re.search(
+        r"from (.*) % of the starts .*, from (.*) % a cell whose enclosed image is a whole", found.advice
+    )
+    assert float(words[2]) / 100.0 == pytest.approx(leads.mean(), abs=0.003)
+    assert "one branch before the jump" in found.advice
+    sampled = graph_of(params, cells)
+    assert "enclosed image" not in ls.basins(sampled, ls.attractors(sampled)).advice
+
+
+def test_the_atlas_decides_circle_maps_with_a_floor():
+    """Denjoy: with an irrational rotation number the whole circle is the attractor, and its exponent is 0.
+
+    Below omega = k / (2 pi) the map is locked to a fixed point; the rotation by 1/4 has a cycle through each point.
+    """
+    axis = Axis("omega", [0.05, 0.30001, (math.sqrt(5.0) - 1.0) / 2.0])
+    wanted = ["lyapunov", "lyapunov_error", "bands", "lowest", "reach", "period", "undecided"]
+    found = ls.atlas(Waves(0.5, 0.5, 0.0), axis, domain=[(0.0, 1.0)], variables=wanted).dataset
+    assert found.undecided.values.tolist() == [0, 0, 0]
+    assert found.period.values[:, 0].tolist() == [1, 0, 0]
+    assert found.lowest.values[0, 0, 0] == pytest.approx(
+        math.asin(2.0 * math.pi * 0.05 / 0.5) / math.tau, abs=1e-6
+    )
+    for point in (1, 2):
+        assert found.bands.values[point, 0, 0] == 1
+        ends = found.lowest.values[point, 0, 0], found.reach.values[point, 0, 0]
+        assert ends == pytest.approx((0.0, 1.0), abs=1e-9)
+        assert abs(found.lyapunov.values[point, 0]) < 1e-3
+    quarter = ls.atlas(Waves(0.5, 0.0, 0.0), "omega=0.25:0.25:1", domain=[(0.0, 1.0)]).dataset
+    assert quarter.undecided.attrs["flag_meanings"].split()[int(quarter.undecided.values[0])] == "not_one"
+
+
+def test_the_atlas_finds_the_bands_of_a_falling_map_with_a_floor():
+    """x -> -5 x / 2 mod 1 expands, and its images of any interval fill [0, 1]."""
+    found = ls.atlas(Times(-2.5), "m=-2.5:-2.25:2", domain=[(0.0, 1.0)]).dataset
+    assert found.undecided.values.tolist() == [0, 0]
+    assert found.bands.values[:, 0, 0].tolist() == [1, 1]
+    assert found.lowest.values[:, 0, 0] == pytest.approx(0.0, abs=1e-9)
+    assert found.reach.values[:, 0, 0] == pytest.approx(1.0, abs=1e-9)

@@ -1,16 +1,26 @@
-"""The study of accuracy: errors and exponents, never seconds."""
+"""Numbers of the studies of accuracy, fits, atlases and sizes."""
+
+from __future__ import annotations
 
 import importlib
 import importlib.util
 import json
+import math
 import sys
+import tomllib
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 import limitsets as ls
+from tests.studies.test_studies import STUDIES, load_study
+
+# ----------------------------------------------------------------
+# The study of accuracy: errors and exponents, never seconds.
+
 
 FOLDER = Path(__file__).resolve().parents[2] / "studies" / "03_accuracy"
 
@@ -145,3 +155,177 @@ def test_what_leaving_effects_out_is_worth(answer):
     assert effects["paper-designed"]["roll"]["changed"] == 0.0
     # 8.3 % of the jogs, which are 80 % of the throws; 4000 throws of one orbit
     assert effects["paper-initial"]["roll"]["changed"] == pytest.approx(0.083 * 0.8002, abs=0.006)
+
+
+# ----------------------------------------------------------------
+# The study of fits: machines of known truth.
+
+
+FOLDER_FIT_STUDY = Path(__file__).resolve().parents[2] / "studies" / "10_fit"
+EXPECTED = json.loads((FOLDER_FIT_STUDY / "expected.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def study():
+    spec = importlib.util.spec_from_file_location("study_10_fit", FOLDER_FIT_STUDY / "study.py")
+    loaded = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
+@pytest.mark.sweep  # fits of many machines
+def test_intervals_hold_and_are_as_wide_as_claimed(study):
+    found = study.many(10, seed=3, flipped=0.05)
+    for name in study.NAMES[:4]:
+        assert found[name]["held"] >= binom.ppf(1e-4, found[name]["told"], 0.95)
+        # of ten machines' median half width against that of two hundred
+        assert found[name]["half"] == pytest.approx(EXPECTED["half"][name], rel=0.25)
+
+
+@pytest.mark.sweep  # fits of many machines
+def test_the_table_of_the_page_is_that_of_the_study(study):
+    page = (FOLDER_FIT_STUDY / "README.md").read_text(encoding="utf-8")
+    for line in study.table(EXPECTED["numbers"]).splitlines():
+        assert line in page
+
+
+@pytest.mark.sweep
+def test_the_figure_and_the_bootstrap(study, tmp_path):
+    numbers = study.one(0, tmp_path, 4)
+    assert (tmp_path / "residuals.png").stat().st_size > 20_000
+    assert numbers["bootstrap"]["films"] == 4
+    for each in numbers["quantities"].values():
+        assert each["lo"] <= each["hi"]
+    assert numbers["enough"] == EXPECTED["numbers"]["one"]["enough"]
+    assert numbers["misread"] == EXPECTED["numbers"]["one"]["misread"]
+
+
+# ----------------------------------------------------------------
+# The study of the atlas, smaller: the same classes, closed forms of the textbook maps, and what the README says.
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    return json.loads((STUDIES / "08_atlas" / "expected.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def study_atlas_study():
+    return load_study("08_atlas")
+
+
+def test_feeders_of_a_coarser_grid_have_the_same_classes(study_atlas_study, recorded, tmp_path):
+    found = study_atlas_study.feeders(48, tmp_path)
+    assert (tmp_path / "feeders.png").stat().st_size > 20_000
+    wanted = {each["class"]: each["share"] for each in recorded["feeders"]["classes"]}
+    shares = {each["class"]: each["share"] for each in found["classes"]}
+    assert set(shares) - {"undecided"} == set(wanted) - {"undecided"}
+    for name, share in shares.items():
+        # a boundary crosses at most some hundred of the 2304 pixels
+        assert share == pytest.approx(wanted[name], abs=0.02)
+    for words, share in found["starts"].items():
+        assert share == pytest.approx(recorded["feeders"]["starts"][words], abs=0.02)
+
+
+def test_a_tenth_of_the_evaluations_gives_the_same_picture(recorded):
+    refined = recorded["feeders"]["refined"]["8"]
+    assert refined["computed"] < 0.1
+    assert refined["differ"] == 0.0
+
+
+def test_windows_of_the_logistic_map_begin_where_theory_says(recorded):
+    windows, step = recorded["logistic"]["windows"], recorded["logistic"]["step"]
+    # The point nearest a bifurcation may be undecided; Myrberg 1958, Metropolis, Stein and Stein 1973
+    ends = {"1": (None, 3.0), "2": (3.0, 1 + math.sqrt(6)), "4": (1 + math.sqrt(6), 3.5440903596)}
+    ends["3"] = (1 + math.sqrt(8), 3.8414990075)
+    for period, (first, last) in ends.items():
+        if first is not None:
+            assert first <= windows[period][0] < first + 2 * step
+        assert last - 2 * step < windows[period][1] <= last
+
+
+def test_tongues_of_the_circle_map(study_atlas_study, recorded, tmp_path):
+    assert recorded["circle"]["main tongue differs"] == 0
+    assert set(range(1, 20)) <= set(recorded["circle"]["periods"])
+    refined = [recorded["circle"]["refined"][step] for step in ("4", "8", "16")]
+    assert [each["differ"] for each in refined] == sorted(each["differ"] for each in refined)
+    assert [each["computed"] for each in refined] == sorted(
+        (each["computed"] for each in refined), reverse=True
+    )
+    found = study_atlas_study.circle(40, tmp_path)
+    assert found["main tongue differs"] == 0
+
+
+def test_a_row_of_a_class_is_as_wide_as_its_pixels_without_a_gap(study_atlas_study):
+    found = study_atlas_study.widths(np.array([[1, 1, 2, 1], [3, 3, 3, 3]]))
+    assert found.tolist() == [[2, 2, 1, 1], [4, 4, 4, 4]]
+
+
+def test_the_readme_says_what_was_found(recorded):
+    text = " ".join((STUDIES / "08_atlas" / "README.md").read_text(encoding="utf-8").split())
+    starts = recorded["feeders"]["starts"]
+    for share in (*starts.values(), recorded["feeders"]["refined"]["8"]["computed"]):
+        assert f"{100 * share:.1f} %" in text
+    for step in ("4", "8", "16"):
+        each = recorded["circle"]["refined"][step]
+        assert (
+            f"| {step} | {100 * each['computed']:.1f} % | {100 * each['differ']:.2f} % | {each['widest missed']} |"
+            in text
+        )
+    assert f"({100 * recorded['logistic']['undecided']:.1f} % of all)" in text
+    assert f"steps of {recorded['logistic']['step']:.4f}" in text
+
+
+# ----------------------------------------------------------------
+# The sizes of Section IV follow from the triangle, as their file says.
+
+
+SIZES = tomllib.loads((Path(__file__).parents[2] / "studies" / "sizes.toml").read_text())
+
+
+def inches(text):
+    value, unit = text.split()
+    assert unit == "in"
+    return float(value)
+
+
+A, B, C = (inches(text) for text in SIZES["triangle"]["sides"])  # sides 0, 1, 2
+AT_LEFT = math.degrees(math.acos((A * A + C * C - B * B) / (2 * A * C)))  # at P1, by the law of cosines
+
+
+def test_the_triangle_is_the_one_of_the_scenes():
+    import limitsets as ls
+
+    assert ls.load("paper-designed").sides.length == pytest.approx((A, B, C))
+
+
+def test_the_ramp_and_the_wall_hold_the_triangle():
+    cavity = SIZES["cavity"]
+    angle = float(cavity["angle"].removesuffix(" deg"))
+    width, depth = inches(cavity["width"]), inches(cavity["depth"])
+    assert angle == pytest.approx(AT_LEFT, abs=5e-3)
+    assert width == pytest.approx(1.6 * A + 0.1, abs=1e-9)
+    assert depth == pytest.approx(width * math.tan(math.radians(angle)), abs=5e-5)
+    # with side 2 on the ramp and P0 at the wall, P2 lies left of the wall: the corner at P0 is below a right angle
+    at_top = math.degrees(math.acos((A * A + B * B - C * C) / (2 * A * B)))
+    assert 89.0 < at_top < 90.0
+
+
+def test_the_quadrilateral_fills_what_is_left_of_the_mouth():
+    corners = [tuple(map(inches, corner)) for corner in SIZES["quadrilateral"]["vertices"]]
+    (x0, y0), (x1, y1), (x2, y2), (x3, y3) = corners
+    assert (x1 - x0, y0, y1) == (A, 0.0, 0.0)
+    assert x2 == x1
+    assert y2 == y3
+    assert x2 - x3 == pytest.approx(1.6 * A, abs=1e-9)
+    assert math.degrees(math.atan2(y3, -x3)) == pytest.approx(AT_LEFT, abs=0.05)
+    area = 0.5 * sum(a * d - b * c for (a, b), (c, d) in zip(corners, corners[1:] + corners[:1], strict=True))
+    assert area > 0.0  # counterclockwise
+
+
+def test_the_tray_follows_from_side_2():
+    tray = SIZES["tray"]
+    height = A * math.sin(math.radians(AT_LEFT))
+    assert inches(tray["depression_width"]) == pytest.approx(1.04 * C, abs=1e-9)
+    assert inches(tray["depression_depth"]) == pytest.approx(0.5 * height, abs=5e-3)
+    assert inches(tray["pitch"]) == pytest.approx(2 * inches(tray["depression_width"]), abs=1e-9)

@@ -1,14 +1,24 @@
-"""Every public answer is shown in a notebook: well-formed, labelled, with its numbers; and saved in full."""
+"""Tables of answers, and progress bars."""
 
 import csv
 import io
+import math
+import sys
+import time
+from html.parser import HTMLParser
+from types import SimpleNamespace
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.base.tables import Tabled
+from limitsets import progress
+from limitsets.base.tables import Column, Table, Tabled, aligned, facts, joined
 from limitsets.parameters.margins.single import Margin
+
+# ----------------------------------------------------------------
+# Every public answer is shown in a notebook: well-formed, labelled, with its numbers; and saved in full.
 
 
 @pytest.fixture(scope="module")
@@ -190,3 +200,250 @@ def test_a_margin_is_rounded_to_the_safe_side():
     found = Margin("throw.speed", "fixed", (), *ends, "%", 2.7, "", True, 1.0, scene, {}, {}, {}, (), None)
     assert found.table().shown()[0][2:4] == ["0.7331", "0.7338"]  # at six digits 0.733197 would be claimed
     assert found.table().csv().splitlines()[1].split(",")[2:4] == ["0.7331966", "0.7337001"]
+
+
+# ----------------------------------------------------------------
+# Tables: what people see, what spreadsheets get, what notebooks show.
+
+
+THIRD = 1.0 / 3.0
+
+
+def made(rows, caption="", how=""):
+    columns = ("side", Column("x", "in", ".2f", ends=True), Column("share", show=".1f"), "settled")
+    return Table(columns, rows, caption, how)
+
+
+def read(text):
+    return list(csv.reader(io.StringIO(text)))
+
+
+def test_csv_has_units_in_the_head_and_every_digit():
+    found = read(made([(0, (THIRD, np.float64(2.0) / 3.0), 0.1 + 0.2, True)]).csv())
+    assert found[0] == ["side", "x low [in]", "x high [in]", "share", "settled"]
+    assert [float(word) for word in found[1][1:4]] == [THIRD, 2.0 / 3.0, 0.1 + 0.2]
+    assert found[1][4] == "true"
+    assert "np." not in made([(np.int64(3), np.array([1.5, 2.5]), np.float64(0.5), np.bool_(False))]).csv()
+
+
+def test_what_is_missing_is_empty_and_what_is_open_is_infinite():
+    found = read(made([(1, None, math.nan, None), (2, (-math.inf, math.inf), 0.0, False)]).csv())
+    assert found[1] == ["1", "", "", "", ""]
+    assert found[2] == ["2", "-inf", "inf", "0.0", "false"]
+
+
+def test_words_with_commas_quotes_and_line_breaks_come_back():
+    word = 'a, "b"\nµ'
+    assert read(Table(["what"], [[word]]).csv())[1] == [word]
+
+
+def test_people_see_rounded_numbers():
+    table = made([(0, (1.004, 2.006), 0.25, True), (1, (3.0, 3.0), None, False)])
+    assert table.shown() == [["0", "1.00 to 2.01", "0.2", "yes"], ["1", "3.00", "-", "no"]]
+    assert table.heads == ["side", "x [in]", "share", "settled"]
+
+
+def test_html_is_well_formed_and_escaped():
+    table = Table([Column("<i>", "&")], [['<script>alert("1")</script>']], "a < b", "proved")
+    tree = ET.fromstring(table.html())
+    assert tree.findtext("caption") == "a < b (proved)"
+    assert tree.findtext("thead/tr/th") == "<i> [&]"
+    assert tree.findtext("tbody/tr/td") == '<script>alert("1")</script>'
+    seen = []
+    reader = HTMLParser()
+    reader.handle_starttag = lambda tag, _: seen.append(tag)
+    reader.feed(table.html())
+    assert set(seen) == {"table", "caption", "thead", "tr", "th", "tbody", "td"}
+
+
+def test_of_many_rows_a_notebook_shows_the_ends_and_csv_all():
+    table = Table(["k"], [[k] for k in range(1000)])
+    cells = [cell.text for cell in ET.fromstring(table.html()).iter("td")]
+    assert (cells[0], cells[-1]) == ("0", "999")
+    assert "..." in cells
+    assert len(cells) < 50
+    assert len(read(table.csv())) == 1001
+
+
+class Answer(Tabled):
+    def __init__(self, x):
+        self.x = x
+
+    def tables(self):
+        return Table([Column("x", "mm", ".1f")], [[self.x]], "An answer", "sampled, not proved"), facts(
+            "f", {"a": 1}
+        )
+
+
+def test_an_answer_is_shown_saved_and_given_to_pandas(tmp_path):
+    answer = Answer(THIRD)
+    assert answer._repr_html_().count("<table>") == 2
+    file = answer.to_csv(tmp_path / "a.csv")
+    assert file.read_bytes() == f"x [mm]\n{THIRD!r}\n".encode()
+    answer.to_csv(file)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+    assert answer.to_dataframe()["x [mm]"].tolist() == [THIRD]
+    assert read(joined([answer, Answer(2.0)]).csv())[2] == ["2.0"]
+
+
+def test_without_pandas_one_line_names_the_extra(monkeypatch):
+    from limitsets.base.errors import AnswerError
+
+    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    with pytest.raises(AnswerError, match=r"pip install 'limitsets\[atlas\]'"):
+        Answer(1.0).to_dataframe()
+
+
+def test_columns_of_text_stand_under_each_other():
+    lines = aligned(["a", "long head"], [["wide cell", "b"], ["c", "d"]])
+    assert {line.index(word) for line, word in zip(lines, ("long", "b", "d"), strict=True)} == {11}
+
+
+# ----------------------------------------------------------------
+# Progress: counted right, in one place, shown where it lasts, under the cell of a notebook.
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(progress, "PATIENCE", 0.05)
+
+
+def lines(monkeypatch, *told):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with progress.bar() as tell:
+        for step in told:
+            tell(*step)
+            time.sleep(0.15)
+    return stream.getvalue().splitlines()
+
+
+def test_the_last_of_a_hundred_is_the_hundredth(impatient, monkeypatch):
+    told = lines(
+        monkeypatch, ("designs", 0, 100), ("designs", 99, 100), ("designs", 100, 100), ("done", 0, 0)
+    )
+    assert told == [
+        "limitsets: designs (1 of 100)",
+        "limitsets: designs (100 of 100)",
+        "limitsets: designs (100 of 100)",
+        "limitsets: done (1 of 1)",
+    ]
+
+
+def test_what_is_quick_says_nothing(monkeypatch):
+    assert lines(monkeypatch, ("designs", 0, 100)) == []
+
+
+def test_a_terminal_has_a_bar_with_the_same_count(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress.bar() as tell:
+        tell("designs [x]", 100, 100)
+        time.sleep(0.3)
+    assert "designs [x]" in stream.getvalue()
+    assert "100 of 100" in stream.getvalue()
+    assert "101" not in stream.getvalue()
+
+
+def test_a_step_that_counts_anew_has_a_bar_of_its_own(monkeypatch):
+    shown = []
+
+    class Bars:
+        def __init__(self, *columns, **how):
+            self.tasks = []
+
+        def __enter__(self):
+            shown.append(self)
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def add_task(self, description, total, number):
+            self.tasks.append(
+                SimpleNamespace(description=description, total=total, completed=0, number=number)
+            )
+            return len(self.tasks) - 1
+
+        def update(self, task, **now):
+            vars(self.tasks[task]).update(now)
+
+        def stop_task(self, task):
+            pass
+
+    monkeypatch.setattr("rich.progress.Progress", Bars)
+    with progress._on_terminal() as tell:
+        for step, done, of in (("a", 0, 2), ("b", 1, 2), ("cells", 0, 9), ("cells", 5, 9)):
+            tell(step, done, of)
+    assert [(each.description, each.completed, each.total) for each in shown[0].tasks] == [
+        ("b", 2, 2),
+        ("cells", 5, 9),
+    ]
+
+
+def test_outside_of_a_notebook_a_function_is_as_silent_as_it_was(impatient, capfd):
+    told = []
+
+    @progress.shown_in_notebooks
+    def work(*, progress=None):
+        if progress is not None:
+            progress("work", 0, 1)
+        time.sleep(0.1)
+        return told
+
+    assert work() is told
+    assert capfd.readouterr() == ("", "")
+    work(progress=lambda *step: told.append(step))
+    assert told == [("work", 0, 1)]
+
+
+SLOW = """
+kept = []
+paint = p._Notebook._paint
+p._Notebook._paint = lambda self: (kept.append(self.state), paint(self))
+
+@p.shown_in_notebooks
+def inner(*, progress=None):
+    return progress
+
+@p.shown_in_notebooks
+def slow(*, progress=None):
+    assert inner() is None  # the outermost alone shows a bar
+    for k in range(4):
+        progress('<steps>', k, 4)
+        time.sleep(0.3)
+    return 7
+
+slow()
+"""
+
+
+@pytest.mark.sweep
+def test_a_notebook_shows_a_bar_and_tables():
+    nbformat = pytest.importorskip("nbformat", reason="notebooks")
+    nbclient = pytest.importorskip("nbclient", reason="notebooks")
+    pytest.importorskip("ipykernel", reason="notebooks")
+    cells = [
+        "import time, limitsets as ls, limitsets.progress as p\np.PATIENCE = 0.1",
+        "scene = ls.load('paper-designed')\nscene",
+        SLOW,
+        "print(kept[0], len(kept) > 1)",
+        "ls.orbit(scene.map, 15.0, 2, 3)",
+    ]
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
+    nbclient.NotebookClient(book, timeout=300, kernel_name="python3").execute()
+    outputs = [cell.outputs for cell in book.cells]
+    assert "<table>" in outputs[1][0]["data"]["text/html"]
+    assert "centre of mass" in outputs[1][0]["data"]["text/plain"]
+    assert [each["data"].get("text/html", "7") for each in outputs[2]] == [
+        "",
+        "7",
+    ]  # the bar is gone at the end
+    assert outputs[3][0]["text"] == "('<steps>', 0, 4) True\n"
+    assert "<td>3</td>" in outputs[4][0]["data"]["text/html"]

@@ -1,30 +1,43 @@
-"""Passages of about a million throws: counted right, and never taken for an end of the orbit or of a limit set.
-
-A map x' = x + D(x) with small D crosses from x0 to x1 in
-
-    N = integral of dx / D + ln(D(x1) / D(x0)) / 2 + O(D')
-
-steps, the flow that interpolates the map (Julia's equation) to second order.  The angle phi of the impact gives both x
-and D of a jog in closed form, so that N is one integral, taken here at 40 digits.
-
-Where a jog is what the part does, D is convex in phi as long as the centre of mass is right of the vertex (its second
-derivative is X), and D = 0 at phi = 0: for h > 0 it has one more zero there and no two to merge.  The two that merge
-at a larger h lie on the jog branch continued beyond the vertex, which is followed by `along`, as limit sets do.
-"""
+"""Hard throws: slow passages, bounds of a turn, several roots, and their machine code."""
 
 from __future__ import annotations
 
+import json
 import math
+import os
+import subprocess
+import sys
+from fractions import Fraction
 
+import mpmath
 import numpy as np
 import pytest
+from llvmlite.binding import get_host_cpu_features
 from mpmath import mp, mpf
 
 import limitsets as ls
 from limitsets import maps
 from limitsets.feeder.thrower import Throw, throw_map
+from limitsets.feeder.thrower import flight_box as boxes
+from limitsets.feeder.thrower.flight import V0, V1, V2, V3, V4, V5, V6, V7, W0, W1, W2, W3, W4, W5, W6, W7
+from limitsets.feeder.thrower.traced import impact_angles
+from limitsets.numbers.interval import Interval
 from limitsets.systems.cells import Domain
+from limitsets.systems.graph.images.enclosed import enclosures
+from limitsets.systems.maps import OUTSIDE_MODEL, images
 from limitsets.systems.sets import limit_set_of
+
+# ----------------------------------------------------------------
+# Passages of about a million throws: counted right, and never taken for an end of the orbit or of a limit set.
+# A map x' = x + D(x) with small D crosses from x0 to x1 in
+#     N = integral of dx / D + ln(D(x1) / D(x0)) / 2 + O(D')
+# steps, the flow that interpolates the map (Julia's equation) to second order.  The angle phi of the impact gives
+# both x and D of a jog in closed form, so that N is one integral, taken here at 40 digits.
+# Where a jog is what the part does, D is convex in phi as long as the centre of mass is right of the vertex (its
+# second derivative is X), and D = 0 at phi = 0: for h > 0 it has one more zero there and no two to merge.  The two
+# that merge at a larger h lie on the jog branch continued beyond the vertex, which is followed by `along`, as limit
+# sets do.
+
 
 mp.dps = 40
 
@@ -156,3 +169,229 @@ def test_a_million_throws_are_made_or_the_reason_is_given() -> None:
     for x, side in ((15.0, 2), (float(np.nextafter(scene.map.a[0], math.inf)), 0)):
         path = ls.orbit(scene.map, x, side, 1_000_000)
         assert (path.code.size == 1_000_000) == (path.stopped is None)
+
+
+# ----------------------------------------------------------------
+# The bounds of `turn_box`, proved in exact rationals; and both versions of `turn` against mpmath.
+
+
+U = Fraction(1, 2**53)
+W = [Fraction(c) for c in (W0, W1, W2, W3, W4, W5, W6, W7)]
+V = [Fraction(c) for c in (V0, V1, V2, V3, V4, V5, V6, V7)]
+# t = phi/8 is exact; pi < 355/113 bounds it.
+T = Fraction(355, 113) / 4
+Q = T * T
+
+
+def series_relative_error(coefficients, shift):
+    """Relative error of the computed t^p (c0 + q c1 + ...) against the function, for 0 <= t <= T.
+
+    The sum is at least c0 - |c1| Q; rounding is followed through Horner's scheme term by term.
+    """
+    exact = [Fraction((-1) ** k, math.factorial(2 * k + shift)) for k in range(len(coefficients))]
+    size, error = abs(coefficients[-1]), Fraction(0)
+    for c in reversed(coefficients[:-1]):
+        error = error * Q * (1 + U) ** 2 + 3 * U * size * Q  # q known to u, product rounded
+        size = size * Q * (1 + 3 * U) + abs(c)
+        error = error * (1 + U) + U * size
+    truncated = Q ** len(exact) / math.factorial(2 * len(exact) + shift)
+    coefficient = sum(abs(c - x) * Q**k for k, (c, x) in enumerate(zip(coefficients, exact, strict=True)))
+    smallest = exact[0] - abs(exact[1]) * Q
+    relative = (error + truncated + coefficient) / smallest
+    return (1 + relative) * (1 + U) ** 4 - 1  # the powers of t in front: q and up to three products
+
+
+def doubled(angle, ew, ev, es):
+    """Errors after one doubling, from angles up to `angle` <= pi.
+
+    |error of s| <= es phi, |error of v| <= ev phi^2/2, |error of w| <= ew w.  With s <= phi and v <= phi^2/2:
+    w' = 2 (w + s v) >= 2 w, and phi v <= 3 w, phi^3/2 <= 5 w for phi <= pi (both ratios are monotone; at pi 2, 4.94);
+    v' = 2 s^2 against phi'^2/2 = 2 phi^2;  s' = 2 s (1 - v), |1 - v| <= 1, against phi' = 2 phi.
+    """
+    new_w = (1 + ew + 3 * es + 5 * ev + 5 * es * ev) * (1 + U) ** 2 - 1
+    new_v = (1 + es) ** 2 * (1 + U) - 1
+    absolute_v = ev * angle * angle / 2
+    new_s = (1 + es) * (1 + absolute_v + U * (1 + absolute_v)) * (1 + U) - 1
+    return new_w, new_v, new_s
+
+
+def test_the_bound():
+    ew = series_relative_error(W, 3)
+    ev = series_relative_error(V, 2)
+    es = ew * Q / 6 * 2 + U  # s = t - w, w <= t Q / 6
+    angle = T
+    for _ in range(3):
+        ew, ev, es = doubled(angle, ew, ev, es)
+        angle *= 2
+    # s -+ BOUND phi, and so on: a product or two and a sum round, by U of phi, of phi^2 and of w at most, and the
+    # results are clipped to what they may be.
+    assert ew + 4 * U < Fraction(boxes.BOUND)
+    assert es + 4 * U < Fraction(boxes.BOUND)
+    assert ev / 2 + 4 * U < Fraction(boxes.BOUND)
+    assert angle >= 2 * Fraction(math.pi)
+    assert math.pi**3 / 2 < 5 * math.pi
+
+
+def test_enclosures_hold_against_mpmath():
+    rng = np.random.default_rng(3)
+    angles = np.concatenate([rng.uniform(0, 2 * np.pi, 1500), 10.0 ** rng.uniform(-200, 0.7, 1500)])
+    angles = np.concatenate([angles, np.arange(0, 9) * np.pi / 4])
+    with mpmath.workdps(450):
+        for phi in angles[angles <= 2 * np.pi].tolist():
+            p = mpmath.mpf(phi)
+            exact = (mpmath.sin(p), 1 - mpmath.cos(p), p - mpmath.sin(p))
+            for box, value in zip(boxes.turn_point(phi)[1:], exact, strict=True):
+                assert box.lo <= value <= box.hi
+
+
+def test_boxes_hold_their_points_and_their_extremes():
+    rng = np.random.default_rng(4)
+    for lo, hi in np.sort(rng.uniform(0, 2 * np.pi, (500, 2)), axis=1).tolist():
+        _, s, v, w = boxes.turn_box(Interval(lo, hi))
+        for phi in np.linspace(lo, hi, 7):
+            assert s.lo <= math.sin(phi) + 1e-15
+            assert math.sin(phi) - 1e-15 <= s.hi
+            assert v.lo <= 1 - math.cos(phi) + 1e-15
+            assert 1 - math.cos(phi) - 1e-15 <= v.hi
+            assert w.lo <= phi - math.sin(phi) + 1e-15
+            assert phi - math.sin(phi) - 1e-15 <= w.hi
+
+
+# ----------------------------------------------------------------
+# Boxes where kappa < ell: several roots, a first root that jumps, impacts that graze, none within a full turn.
+
+
+@pytest.mark.parametrize("kappa", [4.0, 2.0, 1.0, 0.3])
+@pytest.mark.parametrize("side", [0, 1, 2])
+def test_enclosures_hold_whatever_the_number_of_roots(kappa, side):
+    """The point map finds the smallest root by a march of its own (`tests/thrower` holds it against 50 digits)."""
+    scene = ls.load("paper-designed").with_values({"throw.kappa": kappa})
+    a = scene.map.a[side]
+    edges = np.linspace(a * (1.0 + 1e-6), min(28.0, 3.0 * kappa + a), 1501)
+    found = enclosures(scene.map, scene.map, edges, side)
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        x = rng.uniform(edges[:-1], edges[1:])
+        got = images(scene.map, x, side)
+        flown = (got.code > OUTSIDE_MODEL) & ~found.lost
+        inside = np.zeros(x.size, dtype=bool)
+        for (to, _), (lo, hi) in found.hulls.items():
+            # the point map rounds, by some 1e-15 of the lengths involved
+            slack = 1e-13 * (np.abs(x) + np.abs(got.x))
+            inside |= (got.side == to) & (got.x >= lo - slack) & (got.x <= hi + slack)
+        assert not (flown & ~inside).any()
+        beyond = (
+            got.code == OUTSIDE_MODEL
+        )  # but for the cell in which a full turn is reached, nothing is proved there
+        assert not beyond.any() or found.lost[beyond].mean() > 0.9
+
+
+def test_a_cell_on_which_the_impact_grazes_has_a_wide_bracket_and_is_still_enclosed():
+    """kappa = 2, side 2: the first root jumps from one hump of the height to the next as x grows."""
+    scene = ls.load("paper-designed").with_values({"throw.kappa": 2.0})
+    edges = np.linspace(scene.map.a[2] * (1.0 + 1e-6), 8.0, 3001)
+    found = enclosures(scene.map, scene.map, edges, 2)
+    width = found.witness[1] - found.witness[0]
+    wide = np.flatnonzero((width > 0.2) & ~found.lost)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    phi = impact_angles(scene.map, middle, 2)
+    good = ~found.lost & np.isfinite(phi)
+    assert ((found.witness[0] <= phi) & (phi <= found.witness[1]))[good].all()
+    jumps = np.flatnonzero(np.diff(phi) > 0.2)
+    assert jumps.size >= 1
+    assert wide.size >= 1
+    assert all(np.abs(wide - k).min() <= 1 for k in jumps if not found.lost[k])
+
+
+# A start at the upper end of what is known of a: no reach is proved, and the march once never came back from there.
+AT_A = """
+import numpy as np
+import limitsets as ls
+from limitsets.systems.graph.images.enclosed import enclosures
+
+scene = ls.load("paper-designed").with_values({"throw.kappa": 2.0})
+wide = scene.map._replace(a=scene.map.a + 0.001)
+for low, upper in ((scene.map, scene.map), (scene.map, wide)):
+    found = enclosures(low, upper, upper.a[0] + np.array([0.0, 1e-9, 1.0]), 0)
+    print(found.lost[0])
+"""
+
+
+def test_a_cell_that_begins_at_the_upper_end_of_a_is_answered():
+    done = subprocess.run(
+        [sys.executable, "-c", AT_A], capture_output=True, text=True, check=False, timeout=300
+    )
+    assert done.stdout.split() == ["True", "True"], done.stderr
+
+
+# ----------------------------------------------------------------
+# What the compiler makes of kernels: operations fused, vectors as wide as the processor's, references counted.
+# The formulas of the throw are written once and called on floats and on intervals: a bound must not be fused.
+
+
+# In a process of its own with an empty cache: code that comes from the cache cannot be read.
+READ = r"""
+import json, re, sys
+import numba
+import numpy as np
+import limitsets as ls
+from limitsets.systems.graph.images.enclosed import _enclose, enclosures
+from limitsets.systems.graph.images.sampled import _hulls
+from limitsets.maps import drivers, images
+
+fused = re.compile(r"\bvfn?m(add|sub)|\bvfm(addsub|subadd)")
+x = np.linspace(8.0, 28.0, 50)
+for flight, flip in json.loads(sys.argv[1]):
+    scene = ls.load({**ls.load("paper-designed").as_dict(), "model": {"flight": flight, "flip": flip}})
+    enclosures(scene.map, scene.map, x, 0)
+    images(scene.map, x, 0)
+ls.transitions(scene.map, ls.grid(scene.domain, cells=8))
+codes = {"boxes": _enclose.inspect_asm(), "floats": drivers.fill_images.inspect_asm()}
+found = {key: [len(fused.findall(code)) for code in found.values()] for key, found in codes.items()}
+found["widest"] = [code.count("zmm") for code in codes["floats"].values()]
+found["counted"] = [code.count("NRT_") for code in _hulls.inspect_asm().values()]
+found["target"] = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
+print(json.dumps(found))
+"""
+
+WIDE = bool(get_host_cpu_features().get("avx512vl"))
+
+
+MODELS = [("small-angle", "signed"), ("exact", "energy"), ("small-angle-2", "energy")]
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(each, marks=pytest.mark.sweep) for each in ([("exact", "signed")], MODELS)],
+    ids=len,
+)
+def fused(request, tmp_path_factory):
+    # One of the processors for which LLVM by itself prefers vectors of 256 bits to those of 512 that it has.
+    processor = {"NUMBA_CPU_NAME": "skylake-avx512"} if WIDE else {}
+    environment = {**os.environ, **processor, "NUMBA_CACHE_DIR": str(tmp_path_factory.mktemp("cache"))}
+    command = [sys.executable, "-c", READ, json.dumps(request.param)]
+    found = json.loads(subprocess.run(command, env=environment, check=True, capture_output=True).stdout)
+    assert [len(found[key]) for key in ("boxes", "floats")] == [len(request.param)] * 2
+    return found
+
+
+def test_no_bound_is_fused(fused):
+    assert not any(fused["boxes"])
+
+
+def test_floats_are_fused_where_the_processor_can(fused):
+    """So the test above can fail."""
+    assert all(fused["floats"]) == bool(get_host_cpu_features().get("fma"))
+
+
+def test_vectors_are_the_widest_of_the_processor(fused):
+    assert all(count > 0 for count in fused["widest"]) == WIDE
+
+
+def test_the_key_of_compiled_code_covers_the_width(fused):
+    """Numba's own key has the features of the target, and `jit` puts it into the name of each file."""
+    assert ("-prefer-256-bit" in fused["target"][2]) == WIDE
+
+
+def test_images_are_placed_without_counting_references(fused):
+    assert fused["counted"] == [0]

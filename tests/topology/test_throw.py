@@ -1,15 +1,23 @@
-"""The throw: the paper's four scenes, escape and collapse with the height of the arm, and Henon's cells beside them."""
+"""The topology of throws, and of narrow cycles."""
+
+from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import limitsets as ls
+from limitsets import maps
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.systems.maps import INWARD, advance
 from limitsets.systems.maps.pieces import point_of, stacked
 from limitsets.systems.topology import topologies
+
+# ----------------------------------------------------------------
+# The throw: the paper's four scenes, escape and collapse with the height of the arm, and Henon's cells beside them.
+
 
 # docs/model.md, reference numbers: limit sets of the decimal scenes at 40 digits, jogs per visit, flips and exponent
 # per throw (where the digits are given).
@@ -140,3 +148,203 @@ def test_henon_has_a_cycle_of_seven():
         path = ls.orbit(henon, x[0], 0, 7).x
         assert (np.abs(path[7] - path[0]).max() < 1e-6) == (period == 7)
         assert np.abs(path[1:7] - path[0]).max(axis=1).min() > 1e-3
+
+
+# ----------------------------------------------------------------
+# Attracting cycles with narrow basins, told apart from chaos: against orbits of the critical point, in plain numpy.
+
+
+class TwoSines(NamedTuple):
+    """A circle map of two harmonics with a branch for each whole turn."""
+
+    omega: float
+    k: float
+    m: float
+
+
+def _lift(p, x):
+    turned = p.k / (2 * math.pi) * math.sin(2 * math.pi * x) + p.m / (4 * math.pi) * math.sin(4 * math.pi * x)
+    return x + p.omega - turned
+
+
+def _sines(p, x, side):
+    y = _lift(p, x)
+    return y - math.floor(y), side, math.floor(y) + 1
+
+
+def _sines_on(p, x, side, branch):
+    return _lift(p, x) - (branch - 1), side
+
+
+ls.register(TwoSines, image=_sines, image_on=_sines_on, branches=("back", "same", "on"))
+
+
+class Monotone(NamedTuple):
+    """The same map where it rises: two branches."""
+
+    omega: float
+    k: float
+    m: float
+
+
+def _monotone(p, x, side):
+    y = _lift(p, x)
+    return (y, side, 0) if y < 1.0 else (y - 1.0, side, 1)
+
+
+def _monotone_on(p, x, side, branch):
+    return _lift(p, x) - branch, side
+
+
+ls.register(Monotone, image=_monotone, image_on=_monotone_on, branches=("same", "on"))
+
+# The longest cycle that is looked for, and what is near enough for Newton's method to begin.
+LONGEST, NEAR = 256, 1e-2
+
+
+class Ricker(NamedTuple):
+    """Ricker's map with a share m harvested: x exp(r - x) (1 - m); its critical point is 1."""
+
+    r: float = 2.7
+    m: float = 0.0
+
+
+def _ricker(p, x, side):
+    return x * math.exp(p.r - x) * (1.0 - p.m), side, 0
+
+
+def _ricker_on(p, x, side, branch):
+    factor = math.exp(p.r - x) * (1.0 - p.m)
+    return x * factor, side, factor * (1.0 - x)
+
+
+ls.register(Ricker, image=_ricker, image_on=_ricker_on)
+
+
+def periods(f, slope, critical, throws=20_000):
+    """Periods of the attracting cycles that orbits of critical points come to, 0 for none up to `LONGEST`.
+
+    `f(x, k)` and `slope(x, k)` take the numbers k of the points.
+    """
+    every = np.arange(critical.size)
+    x = critical.copy()
+    for _ in range(throws):
+        x = f(x, every)
+    found = np.zeros(x.size, np.int64)
+    y, returns = x.copy(), []
+    for period in range(1, LONGEST + 1):
+        y = f(y, every)
+        returns += [(k, period) for k in np.flatnonzero(np.abs(y - x) <= NEAR * np.abs(x))]
+    for k, period in returns:
+        if found[k]:
+            continue
+        z = x[k]
+        for _ in range(40):
+            w, rate = z, 1.0
+            for _ in range(period):
+                rate, w = rate * slope(w, k), f(w, k)
+            move = (w - z) / (1.0 - rate) if rate != 1.0 else math.inf
+            z += move
+            if not abs(z - x[k]) <= 0.1 * abs(x[k]) or abs(move) <= 1e-13 * abs(z):
+                break
+        if abs(z - x[k]) <= 0.1 * abs(x[k]) and abs(move) <= 1e-9 * abs(z) and abs(rate) < 1.0:
+            found[k] = period
+    return found
+
+
+def of_ricker(count, seed):
+    """Topologies at random points, and the periods by the other way."""
+    rng = np.random.default_rng(seed)
+    r, m = rng.uniform(2.7, 3.6, count), rng.uniform(0.0, 0.3, count)
+    stack = stacked([Ricker(*pair) for pair in zip(r.tolist(), m.tolist(), strict=True)])
+    t = topologies(stack, np.zeros((count, 1)), np.full((count, 1), 14.0))
+    return t, periods(
+        lambda x, k: x * np.exp(r[k] - x) * (1.0 - m[k]),
+        lambda x, k: np.exp(r[k] - x) * (1.0 - m[k]) * (1.0 - x),
+        np.ones(count),
+    )
+
+
+def test_a_cycle_that_was_told_as_two_bands():
+    # period 60, multiplier 0.44: its immediate basin is narrower than the finest cells
+    t = topologies(stacked([Ricker(3.021714671660232, 0.228946186747888)]), [[0.0]], [[14.0]])
+    assert (t.undecided[0], t.attractors[0], t.period[0, 0], t.bands[0, 0, 0]) == (0, 1, 60, 60)
+
+
+@pytest.mark.parametrize("count", [600, pytest.param(10_000, marks=pytest.mark.sweep)])
+def test_no_cycle_of_rickers_map_is_told_as_chaos(count):
+    t, period = of_ricker(count, seed=27)
+    told = t.undecided == 0
+    assert (told & (period > 0) & (t.period[:, 0] != period)).sum() == 0
+    longer = told & (period == 0) & (t.period[:, 0] > 0)
+    assert (t.period[longer, 0] > LONGEST).all()
+    assert (~told).sum() <= 0.04 * count
+    assert (~told & (period > 0)).sum() <= 0.005 * count
+    assert (period > 0).sum() > 0.25 * count  # cycles there are
+
+
+def test_no_cycle_of_the_logistic_map_is_told_as_chaos():
+    r = np.random.default_rng(3).uniform(3.5, 4.0, 1500)
+    t = topologies(stacked([maps.Logistic(each) for each in r]), np.zeros((r.size, 1)), np.ones((r.size, 1)))
+    period = periods(
+        lambda x, k: r[k] * x * (1.0 - x), lambda x, k: r[k] * (1.0 - 2.0 * x), np.full(r.size, 0.5)
+    )
+    told = t.undecided == 0
+    assert (told & (period > 0) & (t.period[:, 0] != period)).sum() == 0
+    assert (~told).sum() <= 0.04 * r.size
+    assert (~told & (period > 0)).sum() <= 0.005 * r.size
+
+
+@pytest.mark.parametrize(("r", "period"), [(3.0, 1), (1.0 + math.sqrt(6.0), 2), (1.0 + math.sqrt(8.0), 3)])
+def test_at_a_bifurcation_no_longer_cycle_is_told(r, period):
+    # the multiplier is 1 or -1 to rounding: orbits close as slowly as 1 / sqrt(throws)
+    t = topologies(stacked([maps.Logistic(r)]), [[0.0]], [[1.0]])
+    assert t.undecided[0] or t.period[0, 0] == period
+
+
+@pytest.mark.parametrize(
+    ("circle", "period"),
+    # the orbit {0, 1/2} of multiplier (1 - m)^2 - k^2, and the fixed point 0 of multiplier 1 - k - m
+    [(Monotone(0.5, 0.75, 0.2), 2), (Monotone(0.5, 0.4, 0.2), 2), (TwoSines(0.0, 1.5, 0.3), 1)],
+)
+def test_a_cycle_on_the_cut_of_a_circle_is_not_told_twice(circle, period):
+    """0 and 1 are one place of the circle: the same cycle was told as two attractors, of periods 3 and 2."""
+    t = topologies(stacked([circle]), [[0.0]], [[1.0]])
+    assert t.undecided[0] or (t.attractors[0] == 1 and t.period[0, 0] == period)
+
+
+@pytest.mark.parametrize("cubic", [1.5, 2.4, 2.9])
+def test_two_attractors_of_two_critical_points_stay_two(cubic):
+    # x' = r x - x^3 is odd: its two critical points have mirrored orbits, to one symmetric attractor or to two
+    t = topologies(stacked([maps.Cubic(cubic)]), [[-2.0]], [[2.0]])
+    x, _, _, _ = advance(maps.Cubic(cubic), [math.sqrt(cubic / 3.0)], [0], 5000)
+    path = ls.orbit(maps.Cubic(cubic), float(x[0]), 0, 5000).x
+    assert t.undecided[0] or t.attractors[0] == (2 if (path > 0.0).all() or (path < 0.0).all() else 1)
+
+
+def test_no_cycle_of_the_throw_is_told_as_chaos():
+    """Where jogs shrink (a surface above the joint) a throw may contract: orbits that close are no bands."""
+    scene = ls.load("paper-designed")
+    rng = np.random.default_rng(11)
+    stack = throw_stack(
+        scene,
+        {
+            "throw.speed": np.radians(rng.uniform(120.0, 180.0, 60)),
+            "arm.surface_height": rng.uniform(-0.4, 0.2, 60),
+        },
+    )
+    t = topologies(stack.params, stack.lo, stack.hi, stack.anchor)
+    for k in np.flatnonzero((t.undecided == 0) & (t.attractors > 0)):
+        side = np.repeat(np.arange(stack.lo.shape[1]), 4)
+        x = stack.lo[k][side] + (stack.hi[k] - stack.lo[k])[side] * np.tile(
+            [0.37, 0.55, 0.71, 0.93], side.size // 4
+        )
+        params = point_of(stack.params, int(k))
+        x, side, code, _ = advance(params, x, side, 4000)
+        first, on = x[code >= 0], side[code >= 0]
+        y, to, closed = first, on, np.zeros(first.size, bool)
+        for _ in range(LONGEST):
+            y, to, _, _ = advance(params, y, to, 1)
+            closed |= (to == on) & (np.abs(y - first) <= 1e-9)
+        closed &= first - params.a[on] > 0.1  # what creeps to the joint hardly moves
+        assert closed.any() <= (t.period[k] > 0).any()

@@ -1,13 +1,12 @@
-"""What every effect has to pass, as a table: a row for each effect.
-
-Absent it changes nothing; in a limit it changes nothing; the energy of a throw is accounted for.  Worked numbers and
-the simulation written apart have their places in the files of the effects.
-"""
+"""What holds for every effect, and what an absent effect costs: nothing."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,8 +25,14 @@ from limitsets.feeder.thrower.motion import DOWN, LOST, above, right_of
 from limitsets.numbers.jit import entry_of, kernel
 from limitsets.systems.maps.drivers import images
 from tests.kept import kept
+from tests.thrower.effects.copies import environment_of_copy
 from tests.thrower.effects.simulation import Law, OutsideError, Simulation
 from tests.thrower.effects.throws import Case, cases, same_end
+
+# ----------------------------------------------------------------
+# What every effect has to pass, as a table: a row for each effect.
+# Absent it changes nothing; in a limit it changes nothing; the energy of a throw is accounted for.  Worked numbers
+# and the simulation written apart have their places in the files of the effects.
 
 
 def _modes(case: Case, law: Law) -> set[str]:
@@ -206,3 +211,44 @@ def test_the_energy_of_a_throw_is_accounted_for() -> None:
         assert started == pytest.approx(ended + lost + simulation.rubbed, rel=1e-12)
     assert min(kinds.values()) > 30
     assert rubbing > 20
+
+
+# ----------------------------------------------------------------
+# What a scene does not ask for is not in its machine code: the bare map's is the same with the effects deleted.
+
+
+# Prints a digest of the machine code of one compiled loop over throws; symbols carry counters, so they are left out.
+SCRIPT = """
+import hashlib, re, sys
+import numpy as np
+import limitsets as ls
+from limitsets.maps import drivers, images
+if sys.argv[1] == "with":
+    import limitsets.feeder.thrower.effects
+images(ls.load("paper-designed").map, np.linspace(9.0, 20.0, 8), 2)
+(signature,) = drivers.fill_images.signatures
+code = drivers.fill_images.inspect_asm(signature)
+lines = [line for line in code.splitlines() if not line.lstrip().startswith((".", "#"))]
+symbol = r"[A-Za-z0-9_.$]*_ZN?[A-Za-z0-9_.$]*|\\.?numba[A-Za-z0-9_.$]*|NRT[A-Za-z0-9_]*"
+body = re.sub(symbol, "symbol", "\\n".join(lines))
+print(len(lines), hashlib.sha256(body.encode()).hexdigest())
+"""
+
+
+def machine_code(folder: Path, word: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, word],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment_of_copy(folder, word),
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.sweep
+def test_the_bare_map_has_the_same_machine_code_without_the_effects(tmp_path: Path) -> None:
+    whole, bare = machine_code(tmp_path, "with"), machine_code(tmp_path, "without")
+    assert whole == bare
+    assert int(whole.split()[0]) > 500  # there is a loop in it

@@ -1,22 +1,37 @@
-"""Restitution: heights and times of a bouncing part, energy, limits, and an independent simulation."""
+"""Bounce, pivot and drive against closed forms."""
 
 from __future__ import annotations
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+import limitsets as ls
+from limitsets.feeder.scene import Scene
 from limitsets.feeder.thrower import throw_map
-from limitsets.feeder.thrower.contact import next_contact
+from limitsets.feeder.thrower.contact import force, gives_way, lets_go, next_contact
 from limitsets.feeder.thrower.effects.bounce import Bounce, struck
+from limitsets.feeder.thrower.effects.drive import all_the_way
+from limitsets.feeder.thrower.effects.landing import Landing, first_arrival
 from limitsets.feeder.thrower.effects.slip import Slip
 from limitsets.feeder.thrower.flight import turn
 from limitsets.feeder.thrower.full import gather_full, with_effects
-from limitsets.feeder.thrower.motion import Arrival, FullSide, above, right_of
+from limitsets.feeder.thrower.motion import OFF, ON, Arrival, Contact, FullSide, above, right_of
+from limitsets.numbers.jit import entry_of, kernel
+from limitsets.systems.maps import codes
+from limitsets.systems.maps import images as images_of_drive
 from limitsets.systems.maps.drivers import images
-from tests.thrower.effects.throws import agree, cases, same_end
+from tests.kept import kept
+from tests.thrower.effects.test_slip import square
+from tests.thrower.effects.throws import Case, agree, cases, same_end
+
+# ----------------------------------------------------------------
+# Restitution: heights and times of a bouncing part, energy, limits, and an independent simulation.
+
 
 SIDES = 60
 
@@ -122,3 +137,262 @@ def test_throws_end_where_an_independent_simulation_sees_them_end() -> None:
 def test_all_together_end_where_an_independent_simulation_sees_them_end() -> None:
     names = ("landing", "roll", "slip", "pivot", "bounce")
     assert [case for case in cases(60, 13) if not agree(case, names)] == []
+
+
+# ----------------------------------------------------------------
+# A vertex that only friction and weight hold: the hinge where that suffices, and an independent simulation.
+
+
+def _worst_hold(case: Case) -> float:
+    """Least of N - |T|/mu along the hinged way of a throw, from a fine grid of its angles; nan where not in doubt."""
+    part = gather_full(case.full(("landing", "pivot")), case.side)
+    a, d, rho2 = part.own.a, part.own.d, part.own.rho2
+    grid = np.linspace(1e-5, 2 * np.pi, 400_000)
+    height = case.x * grid - a * np.sin(grid) + d * (1 - np.cos(grid)) - case.kappa / 2 * grid**2
+    phi = float(grid[np.flatnonzero(height <= 0)[0]])
+    if phi > part.own.corner:
+        return math.nan
+    x, high = a * math.cos(phi) - d * math.sin(phi), a * math.sin(phi) + d * math.cos(phi)
+    inertia = rho2 + a * a + d * d
+    omega = (rho2 + x * (case.x - case.kappa * phi) + high * (case.height + d)) / inertia
+    angles = np.linspace(0.0, part.own.corner, 20_001)
+    xs, hs = a * np.cos(angles) - d * np.sin(angles), a * np.sin(angles) + d * np.cos(angles)
+    rate2 = omega**2 + 2 * case.kappa * (high - hs) / inertia
+    # Newton's law for the centre of mass, which goes round the vertex at omega, omega' = -kappa X/M
+    along = -rate2 * xs + case.kappa * xs / inertia * hs
+    off = case.kappa - rate2 * hs - case.kappa * xs / inertia * xs
+    # the way: from phi up to where it turns back or a side is down, and down again
+    here = int(np.searchsorted(angles, phi))
+    left, right = np.arange(here, angles.size), np.arange(here, -1, -1)
+    first, then = (left, right) if omega > 0 else (right, left)
+    turns = np.flatnonzero(rate2[first] < 0)
+    way = first if turns.size == 0 else np.concatenate([first[: turns[0]], then])
+    return float((off - np.abs(along) / case.world.friction)[way].min())
+
+
+def test_where_the_force_stays_in_the_cone_it_is_the_hinge() -> None:
+    names = ("landing", "pivot")
+    held = 0
+    for case in cases(80, 5, friction=2.0):
+        if _worst_hold(case) > 1e-3:
+            held += 1
+            assert same_end(case.mapped(names), case.mapped(("landing",)))
+    assert held > 10
+
+
+def test_where_it_does_not_the_part_ends_elsewhere() -> None:
+    names = ("landing", "pivot")
+    worst = [(_worst_hold(case), case) for case in cases(80, 5, friction=0.2)]
+    slipped = [case for hold, case in worst if hold < -1e-3]
+    assert len(slipped) > 10
+    assert not any(same_end(case.mapped(names), case.mapped(("landing",))) for case in slipped)
+
+
+def test_the_force_on_a_vertex_that_stands_still() -> None:
+    # the square at rest on a corner, turned by sin = 3/5: X = 1/5, H = 7/5; rho^2 = 2, M = 4, kappa = 4:
+    # omega' = -kappa X/M = -1/5, so T = -H omega' = 7/25 and N = kappa + X omega' = 4 - 1/25
+    along, off = force(square(1.0), Contact(0, turn(math.asin(0.6)), 0.0, 0.0, 0.0, 0.0))
+    assert along / 4 == pytest.approx(7 / 25, rel=1e-14)
+    assert off / 4 == pytest.approx(4 - 1 / 25, rel=1e-14)
+
+
+def test_a_vertex_lets_go_when_it_would_have_to_be_pulled() -> None:
+    # omega^2 H over kappa = 4: the vertex rises by itself. On its corner, upright, H = sqrt 2.
+    fast, slow = (Contact(0, turn(math.pi / 4), 0.0, rate, 0.0, 0.0) for rate in (1.69, 1.68))
+    assert gives_way(square(1.0), 1.0, fast)[1] == OFF  # 1.69^2 sqrt 2 = 4.04
+    assert gives_way(square(1.0), 1.0, slow)[1] == ON  # 3.99
+
+
+def test_it_slips_where_the_cone_ends() -> None:
+    # Falling from rest near the top about a corner, T/N as above: mu = 1/10 is passed at once off the top.
+    start = Contact(0, turn(math.pi / 4 - 1e-3), 0.0, 0.0, 0.0, 0.0)
+    at, slips = lets_go(square(0.1), 0.1, start)
+    assert slips
+    along, off = force(square(0.1), at)
+    assert abs(along) == pytest.approx(0.1 * off, rel=1e-10)
+    # a bullet-proof hold does not
+    assert not lets_go(square(5.0), 5.0, start)[1]
+
+
+@pytest.mark.sweep
+def test_throws_end_where_an_independent_simulation_sees_them_end_of_pivot() -> None:
+    names = ("landing", "pivot")
+    assert [case for case in cases(60, 6) if not agree(case, names)] == []
+
+
+# ----------------------------------------------------------------
+# The effect `drive` against the same throw followed in the frame of the room, and against forces sampled densely.
+
+
+DESIGNED = ls.load("paper-designed")
+
+
+def scene(stroke: float, friction: float | None = None, **changes: str) -> Scene:
+    tree = DESIGNED.with_values(changes).as_dict() if changes else DESIGNED.as_dict()
+    tree["effects"] = {"drive": True}
+    tree["world"] = {"stroke": f"{stroke!r} rad"} | ({} if friction is None else {"friction": friction})
+    return ls.load(tree)
+
+
+def in_the_room(case: Scene, stroke: float, x: float, side: int) -> tuple[float, int]:
+    """One throw in the frame of the room: the arm stands still at the angle `stroke`, gravity points down.
+
+    Everything by vectors from the joint; the landing by a root finder, the pivot by the law of energy.
+    """
+    a, d = case.sides.a[side], case.sides.d[side]
+    h, kappa, rho2 = case.surface_height, case.kappa, case.radius_of_gyration**2
+
+    def turn(vector: tuple[float, float], angle: Any) -> np.ndarray:
+        c, s = np.cos(angle), np.sin(angle)
+        return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
+
+    along, across = turn((1.0, 0.0), stroke), turn((0.0, 1.0), stroke)
+    start = turn((x, h + d), stroke)
+    velocity = turn((-(h + d), x), stroke)  # omega = 1 about the joint
+
+    def centre(phi: Any) -> np.ndarray:
+        return np.array(
+            [start[0] + velocity[0] * phi, start[1] + velocity[1] * phi - 0.5 * kappa * phi * phi]
+        )
+
+    def vertex(phi: Any) -> np.ndarray:
+        return centre(phi) + turn((-a, -d), stroke + phi)
+
+    # the left vertex over the arm's surface, which is h from the joint
+    grid = np.linspace(1e-3, 2 * math.pi, 20001)
+    height = across @ vertex(grid) - h
+    first = int(np.flatnonzero((height[:-1] > 0) & (height[1:] <= 0))[0])
+    phi = brentq(lambda t: across @ vertex(t) - h, grid[first], grid[first + 1], xtol=1e-15)
+
+    v = velocity + np.array([0.0, -kappa * phi])
+    arm = centre(phi) - vertex(phi)  # from the vertex to the centre of mass
+    inertia = rho2 + arm @ arm
+    omega = (rho2 + arm[0] * v[1] - arm[1] * v[0]) / inertia
+    kinetic = 0.5 * inertia * omega**2
+    to_top = kappa * (math.sqrt(arm @ arm) - arm[1])
+    flips = omega > 0 and kinetic > to_top if arm[0] > 0 else not (omega < 0 and kinetic >= to_top)
+    place = float(vertex(phi) @ along)
+    if not flips:
+        return place + a, side
+    after = (side + 1) % len(case.sides)
+    return place - case.sides.right[after], after
+
+
+@pytest.mark.parametrize("stroke", [0.02, 0.1, 0.25])
+def test_is_the_throw_as_seen_from_the_room(stroke: float) -> None:
+    case = scene(stroke)
+    random = np.random.default_rng(5)
+    for side in range(3):
+        x = random.uniform(case.sides.a[side] + 2.0, 26.0, 40)
+        found = images_of_drive(case.map, x, side)
+        seen = found.code != codes.OUTSIDE_MODEL
+        assert seen.sum() > 10
+        for k in np.flatnonzero(seen):
+            place, lies = in_the_room(case, stroke, float(x[k]), side)
+            assert found.side[k] == lies
+            assert found.x[k] == pytest.approx(place, abs=1e-11)
+
+
+def test_a_short_stroke_is_an_impulse() -> None:
+    """First order in the stroke: x' differs by (kappa/2) sin s phi^2 and smaller things."""
+    x = np.linspace(9.0, 15.0, 301)
+    bare = images_of_drive(DESIGNED.map, x, 2).x
+    gaps = [np.abs(images_of_drive(scene(s).map, x, 2).x - bare).max() for s in (1e-4, 1e-5, 1e-6)]
+    assert gaps[0] / gaps[1] == pytest.approx(10.0, rel=1e-3)
+    assert gaps[1] / gaps[2] == pytest.approx(10.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("stroke", "friction"), [(0.002, None), (0.4, 0.3)])
+def test_the_stroke_needs_a_force_that_pushes_within_the_side_and_within_friction(
+    stroke: float, friction: float | None
+) -> None:
+    """Force and its place from Newton's laws in the room's frame, at 4001 angles of the stroke."""
+    case = scene(stroke, friction)
+    h, kappa, rho2 = case.surface_height, case.kappa, case.radius_of_gyration**2
+    theta = np.linspace(0.0, stroke, 4001)
+    acceleration, rate2 = 0.5 / stroke, theta / stroke
+    answers = set()
+    for side in range(3):
+        a, d, right = case.sides.a[side], case.sides.d[side], case.sides.right[side]
+        for x in np.linspace(a + 0.1, 27.9, 60):
+            height = h + d
+            force = np.array(
+                [
+                    -acceleration * height - rate2 * x + kappa * np.sin(theta),
+                    acceleration * x - rate2 * height + kappa * np.cos(theta),
+                ]
+            )
+            # the moment about the centre of mass turns the part: c N + d T = rho^2 alpha
+            place = (rho2 * acceleration - d * force[0]) / force[1]
+            room = np.minimum.reduce([force[1], right - place, place + a])
+            if friction is not None:
+                room = np.minimum(room, friction * force[1] - np.abs(force[0]))
+            if abs(room.min()) < 1e-3:
+                continue
+            holds = bool(room.min() > 0)
+            code = int(images_of_drive(case.map, [x], side).code[0])
+            leans = friction is not None and math.tan(stroke) > friction
+            if holds and not leans and code == codes.OUTSIDE_MODEL:
+                # the part flew, but lies nowhere: the side it came down on leans over too far
+                assert any(math.tan(stroke) > case.sides.a[s] / case.sides.d[s] for s in range(3))
+                continue
+            assert (code != codes.OUTSIDE_MODEL) == (holds and not leans)
+            answers.add(holds)
+    assert answers == {True, False}
+
+
+def test_the_least_value_is_found_inside_the_stroke() -> None:
+    random = np.random.default_rng(11)
+    theta = np.linspace(0.0, 1.5, 20001)
+    seen = set()
+    for _ in range(300):
+        stroke = random.uniform(0.05, 1.5)
+        a, b, c, d = random.normal(size=4)
+        at = theta[theta <= stroke]
+        least = (a + b * at + c * np.sin(at) + d * np.cos(at)).min()
+        if abs(least) > 1e-6:
+            assert all_the_way(stroke, a, b, c, d) == (least > 0)
+            seen.add(bool(least > 0))
+    assert seen == {True, False}
+
+
+@kept
+@kernel(entry=True)
+def arrivals(params: Any, x: np.ndarray, side: int, out: np.ndarray) -> None:
+    part = gather_full(params, side)
+    for k in range(x.size):
+        hit, _ = first_arrival(entry_of(part.effects, Landing), part, x[k])
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = hit.shift, hit.vx, hit.vy, hit.omega
+        out[k, 4], out[k, 5] = right_of(part, hit.vertex, hit.psi), above(part, hit.vertex, hit.psi)
+
+
+@pytest.mark.parametrize("stroke", [0.02, 0.3])
+def test_the_flight_keeps_its_energy(stroke: float) -> None:
+    """Of the vertical in the room, which leans over the arm by the stroke; to 1e-12 of what was thrown."""
+    case = scene(stroke)
+    for side in range(3):
+        a, d = case.sides.a[side], case.sides.d[side]
+        x = np.random.default_rng(8).uniform(a + 0.5, 27.0, 200)
+        out = np.empty((x.size, 6))
+        arrivals(case.map, x, side, out)
+        shift, vx, vy, omega, right, high = out.T
+        moved = shift - a + right  # along the arm, from where it was thrown
+        fallen = (d - high) * math.cos(stroke) - moved * math.sin(stroke)
+        rho2, height = case.radius_of_gyration**2, case.surface_height + d
+        before = 0.5 * (height**2 + x**2 + rho2)
+        after = 0.5 * (vx**2 + vy**2 + rho2 * omega**2) - case.kappa * fallen
+        assert after == pytest.approx(before, rel=1e-12)
+
+
+def test_by_hand() -> None:
+    """Gravity along the arm takes (kappa/2) sin s phi^2 from a jog and leaves kappa cos s across."""
+    stroke = 0.1
+    case = scene(stroke)
+    # the same flight in the minimal model with kappa cos s
+    across = DESIGNED.with_values({"throw.kappa": DESIGNED.kappa * math.cos(stroke)})
+    from limitsets.feeder.thrower import trace
+
+    plain, leaning = trace(across.map, 12.0, 2), trace(case.map, 12.0, 2)
+    assert leaning.phi[0] == pytest.approx(plain.phi[0], rel=1e-13)
+    lost = 0.5 * DESIGNED.kappa * math.sin(stroke) * plain.phi[0] ** 2
+    assert leaning.displacement[0] == pytest.approx(plain.displacement[0] - lost, rel=1e-12)

@@ -1,23 +1,32 @@
-"""The boxes of a throw with landing, roll and spread: they hold the images of points, and are decided on most cells.
+"""Boxes of effects hold their throws; chamfers."""
 
-Points are thrown by the point kernels, which have tests of their own; the boxes share no code with them.
-"""
+from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 import limitsets as ls
 from limitsets.base.errors import SceneError
+from limitsets.feeder.thrower.full import with_effects
 from limitsets.feeder.thrower.motion import all_enclosed
 from limitsets.numbers.jit import cover_foreign_class
 from limitsets.proofs.prover.orbits import replay
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.systems.graph.images.enclosed import enclosures
 from limitsets.systems.maps import codes, images
+from limitsets.systems.maps.drivers import images as images_of_chamfer
+from tests.thrower.effects.simulation import Body
+from tests.thrower.effects.throws import Case, agree, same_end
+
+# ----------------------------------------------------------------
+# The boxes of a throw with landing, roll and spread: they hold the images of points, and are decided on most cells.
+# Points are thrown by the point kernels, which have tests of their own; the boxes share no code with them.
+
 
 EFFECTS = {"landing": True, "roll": True}
 
@@ -193,3 +202,176 @@ def test_no_orbit_is_proved_with_an_effect_that_no_box_kernel_names():
         replace(box, lo=lo, hi=hi), (9.0, 9.0), 2, np.tile([[box.lo.kappa], [box.hi.kappa]], 3), np.zeros(3)
     )
     assert other[0].size == 1
+
+
+# ----------------------------------------------------------------
+# A part with a side on which it cannot rest, a chamfer: it tips on to the next side, and never rests there.
+# The float kernel against the integrated rigid body of `simulation.py`, which knows nothing of sides that tip but
+# that nothing holds a part beside its foot, and against the energies of one throw by hand.
+
+
+BOTH = ("landing", "roll")
+
+
+def chamfered(rng: np.random.Generator) -> Body:
+    """A convex part that tips over on one of its sides, or on two, and so far that it takes energy to lie there."""
+    while True:
+        n = int(rng.integers(3, 7))
+        angles = np.sort(rng.uniform(0.0, 2 * np.pi, n))
+        corners = 2.0 * np.stack([np.cos(angles), rng.uniform(0.4, 1.0) * np.sin(angles)], 1)
+        corners -= rng.dirichlet(np.full(n, 2.0)) @ corners
+        body = Body(corners, rng.uniform(0.5, 0.9) * float(np.hypot(*corners.T).mean()))
+        facts = body.numbers()
+        a, d, right = facts["a"], facts["d"], facts["length"] - facts["a"]
+        beside = np.minimum(a, right)
+        clear = ((beside > 0.05) | (beside < -0.4)).all() and (d > 0.15).all()
+        if clear and (beside < 0).any():
+            return body
+
+
+def chamfered_cases(count: int, seed: int) -> list[Case]:
+    rng = np.random.default_rng(seed)
+    found = []
+    while len(found) < count:
+        body = chamfered(rng)
+        facts = body.numbers()
+        rests = np.flatnonzero((facts["a"] > 0) & (facts["a"] < facts["length"]))
+        side = int(rng.choice(rests))
+        kappa = float(np.hypot(facts["a"], facts["d"]).max() * np.exp(rng.uniform(0.1, 2.0)))
+        x = float(facts["a"][side] + kappa * rng.uniform(0.1, 1.5))
+        world = SimpleNamespace(friction=0.7, restitution=0.4, bounce_threshold=0.01)
+        found.append(Case(body, kappa, float(rng.uniform(-1.0, 0.5)), x, side, world))
+    return found
+
+
+@pytest.mark.sweep
+def test_it_ends_where_the_rigid_body_does() -> None:
+    """Integrated in (x, y, theta); many of these throws come down on the chamfer, and go on over it or back."""
+    on = back = 0
+    for case in chamfered_cases(60, 7):
+        simulation = case.simulation(BOTH)
+        end = simulation.run(case.x, case.side)
+        assert same_end(case.mapped(BOTH), end, 1e-8)
+        if "tips" in simulation.modes:
+            on, back = on + (end[1] != case.side), back + (end[1] == case.side)
+    assert on > 5
+    assert back > 1
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("others", [("slip",), ("bounce",), ("slip", "bounce"), ("pivot",)])
+def test_it_ends_where_the_rigid_body_does_with_other_effects(others: tuple[str, ...]) -> None:
+    assert all(agree(case, (*BOTH, *others)) for case in chamfered_cases(30, 11))
+
+
+def test_no_start_comes_to_rest_on_a_chamfer_and_none_begins_there() -> None:
+    rng = np.random.default_rng(3)
+    seen = set()
+    for _ in range(40):
+        (case,) = chamfered_cases(1, int(rng.integers(1 << 30)))
+        bare = case.bare
+        rests = (bare.a > 0) & (bare.a < bare.length)
+        thrown = case.full(BOTH)
+        for side in range(rests.size):
+            x = max(float(bare.a[side]), 0.0) + case.kappa * rng.uniform(0.0, 2.0, 2000)
+            got = images_of_chamfer(thrown, x, side)
+            if not rests[side]:
+                assert (got.code == -3).all()
+                continue
+            landed = got.code != -3
+            assert landed.mean() > 0.9  # beyond a full turn there is no model
+            assert rests[got.side[landed]].all()
+            seen |= set(got.code.tolist())
+    assert {0, 1, 2} <= seen
+
+
+def thin_triangle() -> Body:
+    """An obtuse plate: on its shortest side the centre of mass stands beside the left end."""
+    corners = np.array([(0.0, 0.0), (5.0, 0.0), (6.5, 1.0)])
+    return Body(corners - corners.mean(axis=0), 1.3)
+
+
+def test_from_a_chamfer_it_tips_on_with_no_energy_of_its_own() -> None:
+    """Where it flips on to the chamfer it lies on the side after that: two flips farther in than a jog.
+
+    By hand: the angle of the landing by bisection, the rate after the impact by the momentum about the vertex.
+    """
+    body, kappa, height = thin_triangle(), 20.0, -0.3
+    facts = body.numbers()
+    a, d, length, rho2 = facts["a"], facts["d"], facts["length"], body.rho**2
+    chamfer = int(np.flatnonzero(a < 0)[0])
+    side, after = (chamfer - 1) % 3, (chamfer + 1) % 3
+    case = Case(body, kappa, height, 0.0, side, SimpleNamespace())
+    seen = 0
+    for x in np.linspace(a[side] + 0.5, a[side] + 2.0 * kappa, 60):
+
+        def over(phi: float, x: float = x) -> float:
+            return x - a[side] * np.sin(phi) / phi + d[side] * (1 - np.cos(phi)) / phi - 0.5 * kappa * phi
+
+        lo, hi = 1e-9, 4.0
+        for _ in range(200):
+            lo, hi = (0.5 * (lo + hi), hi) if over(0.5 * (lo + hi)) > 0 else (lo, 0.5 * (lo + hi))
+        if hi > facts["corner"][side]:  # another vertex lands
+            continue
+        right = a[side] * np.cos(hi) - d[side] * np.sin(hi)
+        above = a[side] * np.sin(hi) + d[side] * np.cos(hi)
+        inertia = rho2 + a[side] ** 2 + d[side] ** 2
+        rate = (rho2 + right * (x - kappa * hi) + above * (height + d[side])) / inertia
+        climb = kappa * (np.hypot(a[side], d[side]) - above)
+        flips = 0.5 * inertia * rate * abs(rate) > (climb if right > 0 else -climb)
+        got = images_of_chamfer(case.full(BOTH), np.array([x]), side)
+        if flips:
+            seen += 1
+            jog = x - height * hi + a[side] * (1 - np.cos(hi)) - d[side] * (hi - np.sin(hi))
+            twice = (a[side] + length[chamfer] - a[chamfer]) + (a[chamfer] + length[after] - a[after])
+            # what is left may take it over the next end as well: then it has gone on, and not back
+            if got.side[0] == after:
+                assert got.x[0] == pytest.approx(jog - twice, abs=1e-12)
+            assert got.code[0] == 2
+    assert seen > 10
+
+
+@pytest.mark.sweep
+def test_boxes_hold_the_points() -> None:
+    rng = np.random.default_rng(5)
+    points = lost = cells = 0
+    for number in range(12):
+        (case,) = chamfered_cases(1, int(rng.integers(1 << 30)))
+        bare = case.bare._replace(arm_length=case.kappa)
+        params = with_effects(bare, dict.fromkeys(BOTH, True), case.world)
+        width = 0.0 if number % 3 else 0.002
+        lo, hi = with_kappa(params, 1.0 - width), with_kappa(params, 1.0 + width)
+        for side in range(bare.a.size):
+            edges = np.linspace(max(float(bare.a[side]), 0.0) + 1e-6, case.kappa, 251)
+            found = enclosures(lo, hi, edges, side)
+            if not 0 < bare.a[side] < bare.length[side]:
+                assert found.lost.all()
+                continue
+            model = images_of_chamfer(params, edges[:-1], side).code != codes.OUTSIDE_MODEL
+            lost, cells = lost + int((found.lost & model).sum()), cells + int(model.sum())
+            for _ in range(15):
+                x = rng.uniform(edges[:-1], edges[1:])
+                got = images_of_chamfer(with_kappa(params, 1.0 + width * rng.uniform(-1, 1)), x, side)
+                assert not outside(found, x, got).any()
+                points += x.size
+    assert points > 1e5
+    assert lost < 0.01 * cells
+
+
+def test_where_it_depends_on_the_parameters_whether_it_can_rest_nothing_is_proved() -> None:
+    body = thin_triangle()
+    facts = body.numbers()
+    case = Case(body, 20.0, -0.3, 0.0, 0, SimpleNamespace())
+    thrown = case.full(BOTH)
+    chamfer = int(np.flatnonzero(facts["a"] < 0)[0])
+    side = (chamfer + 1) % 3
+    edges = np.linspace(float(facts["a"][side]) + 1.0, 12.0, 5)
+
+    def standing(foot: float) -> Any:
+        a = thrown.bare.a.copy()
+        a[chamfer] = foot
+        return thrown._replace(bare=thrown.bare._replace(a=a))
+
+    assert not enclosures(standing(-2e-9), standing(-1e-9), edges, side).lost.any()
+    assert not enclosures(standing(1e-9), standing(2e-9), edges, side).lost.any()
+    assert enclosures(standing(-1e-9), standing(1e-9), edges, side).lost.all()
