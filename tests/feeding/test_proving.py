@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import re
 import time
 import zipfile
@@ -330,6 +331,29 @@ def test_a_proof_with_effects_has_no_certificate(tmp_path):
     end = arm_end_of(with_cavity(tables={"effects": {"landing": True}}))
     with pytest.raises(AnswerError, match="with effects"):
         write_proof(tmp_path / "fed.proof.zip", proved_feeding(end), end)
+
+
+@pytest.mark.parametrize(
+    ("took", "seconds", "pieces"),
+    # a run of 64 cells that takes so long says 32 times this for the first 2048 in 256 pieces
+    [
+        (0.5, 20.0, 256),
+        (2.5, 20.0, 64),
+        (20.0, 20.0, 4),
+        (20.0, 40.0, 16),
+        (1e4, 20.0, 4),
+        (1e4, math.inf, 256),
+    ],
+)
+def test_noise_is_cut_as_finely_as_time_allows(monkeypatch, took, seconds, pieces):
+    clock = [0.0]
+
+    def slow_cover(box, cells, cuts):
+        clock[0] += took
+
+    monkeypatch.setattr(proving.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(proving, "cover", slow_cover)
+    assert proving._pieces(None, {}, seconds) == pieces
 
 
 # ----------------------------------------------------------------

@@ -576,6 +576,9 @@ def test_points_beside_a_measured_mass_are_told_how_to_be_added() -> None:
         ),
         (('"throw.speed" = "0.5 %"', '"throw.speed" = "90 deg/s"'), None),
         (('"throw.speed" = "0.5 %"', '"throw.speed" = "120 deg/s"'), 'tolerance."throw.speed"'),
+        # of dry materials hardly any pair has more than 1.5; a belt of soft rubber may have 2
+        (("[gravity]", "[world]\nfriction = 2\n[gravity]"), None),
+        (("[gravity]", "[world]\nfriction = 5\n[gravity]"), "world.friction"),
     ],
 )
 def test_more_that_is_improbable(change: tuple[str, str], key: str | None) -> None:
