@@ -29,9 +29,11 @@ from numba import types
 
 PACKAGE = Path(__file__).resolve().parents[2]
 
-# Rooms without kernels: editing a picture must not throw away every compiled loop.  An import contract keeps
+# Rooms and files without kernels: editing a picture must not throw away every compiled loop.  An import contract keeps
 # them from importing this file.
 KERNEL_FREE = (
+    "__init__.py",
+    "__main__.py",
     "base/",
     "checker/",
     "systems/resilience/",
