@@ -39,6 +39,59 @@ def leaves_of(n: int) -> int:
     return 1 << max(int(n - 1).bit_length(), 0)
 
 
+@kernel
+def _child_of_inner(node: Any, end: Any, at: Any, rank: Any) -> tuple[int, int]:
+    """Return the next child of an inner node without a rank, or -1; and the least rank of those before it."""
+    child, least, step = np.int64(-1), rank[node], np.int64(at[0])
+    while step < 2 and child < 0:
+        target = 2 * node + step
+        if target < end and rank[target] == 0:
+            child = target
+            break
+        if target < end:
+            least = min(least, rank[target])
+        step += 1
+    at[0] = step
+    return child, least
+
+
+@kernel
+def _child_of_cell(r: Ranges, leaf: int, node: Any, at: Any, rank: Any, loops: Any) -> tuple[int, int]:
+    """Return the next node without a rank in the cover of a cell's image, or -1; and the least rank before it."""
+    cell, child, least = node - leaf, np.int64(-1), rank[node]
+    box, left, right = np.int64(at[0]), np.int64(at[1]), np.int64(at[2])
+    _, last = boxes_of(r, cell)
+    while child < 0:
+        if left >= right:  # the next box
+            if box >= last:
+                break
+            begin = np.int64(r.box[box, START])
+            if begin <= cell < begin + r.box[box, RUN]:
+                loops[cell] = True
+            left, right = leaf + begin, leaf + begin + np.int64(r.box[box, RUN])
+            box += 1
+            continue
+        # nodes of the cover on this level, each looked at before the level is left
+        if left & 1:
+            known = rank[left]
+            if known == 0:
+                child = left
+                break
+            least = min(least, known)
+            left += 1
+        if right & 1:
+            known = rank[right - 1]
+            if known == 0:
+                child = right - 1
+                break
+            least = min(least, known)
+            right -= 1
+        left >>= 1
+        right >>= 1
+    at[0], at[1], at[2] = box, left, right
+    return child, least
+
+
 @kernel(entry=True, counting=False)
 def _strong(
     r: Ranges,
@@ -69,54 +122,10 @@ def _strong(
         clock += 1
         while depth >= 0:
             node = np.int64(path[depth])
-            best = rank[node]
-            child = np.int64(-1)
             if node < leaf:
-                step = np.int64(at[depth, 0])
-                while step < 2 and child < 0:
-                    target = 2 * node + step
-                    if target >= leaf + n:
-                        step += 1
-                        continue
-                    known = rank[target]
-                    if known == 0:
-                        child = target
-                    else:
-                        best = min(best, known)
-                        step += 1
-                at[depth, 0] = step
+                child, best = _child_of_inner(node, leaf + n, at[depth], rank)
             else:
-                cell = node - leaf
-                box, left, right = np.int64(at[depth, 0]), np.int64(at[depth, 1]), np.int64(at[depth, 2])
-                _, last = boxes_of(r, cell)
-                while child < 0:
-                    if left >= right:  # the next box
-                        if box >= last:
-                            break
-                        begin = np.int64(r.box[box, START])
-                        if begin <= cell < begin + r.box[box, RUN]:
-                            loops[cell] = True
-                        left, right = leaf + begin, leaf + begin + np.int64(r.box[box, RUN])
-                        box += 1
-                        continue
-                    # nodes of the cover on this level, each looked at before the level is left
-                    if left & 1:
-                        known = rank[left]
-                        if known == 0:
-                            child = left
-                            break
-                        best = min(best, known)
-                        left += 1
-                    if right & 1:
-                        known = rank[right - 1]
-                        if known == 0:
-                            child = right - 1
-                            break
-                        best = min(best, known)
-                        right -= 1
-                    left >>= 1
-                    right >>= 1
-                at[depth, 0], at[depth, 1], at[depth, 2] = box, left, right
+                child, best = _child_of_cell(r, leaf, node, at[depth], rank, loops)
             rank[node] = best
             if child >= 0:
                 depth += 1

@@ -257,6 +257,12 @@ def _joins(params: Any, x: float, side: int, known: int, scale: float, u: Unions
     return DOUBTFUL
 
 
+@kernel
+def _goes_on(p: Pieces, q: int, x: float, to: int, close: float) -> bool:
+    """Whether the image of piece q begins where that of the piece before ends: a turning point, whose orbit is one."""
+    return p.to[q - 1] == to and abs(p.y_hi[q - 1] - x) <= close
+
+
 @kernel(entry=True, counting=False)
 def _of_ends(params: Any, inside: bool, scale: float, p: Pieces, u: Unions) -> tuple[int, int]:
     """Length of the one cycle that the orbits of all ends come to, or `DOUBTFUL`; and how many ends there are.
@@ -275,13 +281,8 @@ def _of_ends(params: Any, inside: bool, scale: float, p: Pieces, u: Unions) -> t
                     if p.branch[q] < 0 or c < u.lo[SET, i] or c > u.hi[SET, i]:
                         continue
                     x, to = (p.y_lo[q] if end == 0 else p.y_hi[q]), p.to[q]
-                    if (
-                        end == 0
-                        and q > first
-                        and p.to[q - 1] == to
-                        and abs(p.y_hi[q - 1] - x) <= CLOSES * scale
-                    ):
-                        continue  # a turning point: one orbit
+                    if end == 0 and q > first and _goes_on(p, q, x, to, CLOSES * scale):
+                        continue
                 count += 1
                 length = _joins(params, x, to, DOUBTFUL if missed else known, scale, u)
                 missed = missed or length == NO_CYCLE

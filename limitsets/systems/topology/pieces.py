@@ -148,6 +148,34 @@ def _sample(here: Any, side: int, decided: bool, bottom: float, span: float, sca
                 _, _, s.slope[j] = image_on(here, s.x[j], side, s.branch[j])
 
 
+@kernel
+def _cuts_at_dips(here: Any, side: int, j: int, decided: bool, close: float, s: Samples, n: int) -> int:
+    """Add the two cuts about sample j where the margin or the slope dips below 0 between samples; the new number."""
+    before, a, b, branch = s.x[j - 1], s.x[j], s.x[j + 1], s.branch[j]
+    for what in range(2):
+        f = s.margin if what == MARGIN else s.slope
+        if (what == MARGIN and not decided) or not _dips(f[j - 1], f[j], f[j + 1]):
+            continue
+        x = _bottom(here, side, branch, what, before, a, b, f[j])
+        if x == x:
+            f_x = _followed(here, x, side, branch, what)
+            s.cuts[n] = _change(here, side, branch, what, before, x, f[j - 1], f_x, close)
+            s.cuts[n + 1] = _change(here, side, branch, what, x, b, f_x, f[j + 1], close)
+            n += 2
+    return n
+
+
+@kernel
+def _sort(cuts: Any, n: int) -> None:
+    """Sort the first n, which are nearly sorted: by insertion."""
+    for i in range(1, n):
+        x, j = cuts[i], i
+        while j > 0 and cuts[j - 1] > x:
+            cuts[j] = cuts[j - 1]
+            j -= 1
+        cuts[j] = x
+
+
 @kernel(entry=True, counting=False)
 def _cuts(here: Any, side: int, decided: bool, close: float, s: Samples) -> int:
     """Fill `s.cuts`, ascending; their number, -1 where there are too many."""
@@ -171,22 +199,8 @@ def _cuts(here: Any, side: int, decided: bool, close: float, s: Samples) -> int:
                 n += 2
         if j == 0 or branch < 0 or s.branch[j - 1] != branch or s.branch[j + 1] != branch:
             continue
-        for what in range(2):
-            f = s.margin if what == MARGIN else s.slope
-            if (what == MARGIN and not decided) or not _dips(f[j - 1], f[j], f[j + 1]):
-                continue
-            x = _bottom(here, side, branch, what, s.x[j - 1], a, b, f[j])
-            if x == x:
-                f_x = _followed(here, x, side, branch, what)
-                s.cuts[n] = _change(here, side, branch, what, s.x[j - 1], x, f[j - 1], f_x, close)
-                s.cuts[n + 1] = _change(here, side, branch, what, x, b, f_x, f[j + 1], close)
-                n += 2
-    for i in range(1, n):
-        x, j = s.cuts[i], i
-        while j > 0 and s.cuts[j - 1] > x:
-            s.cuts[j] = s.cuts[j - 1]
-            j -= 1
-        s.cuts[j] = x
+        n = _cuts_at_dips(here, side, j, decided, close, s, n)
+    _sort(s.cuts, n)
     return n
 
 

@@ -262,6 +262,27 @@ def _meets_both_ends(r: Region, scale: float, u: Unions) -> bool:
     return low and high
 
 
+@kernel
+def _bands_join(gap: float, u: Unions) -> bool:
+    """Whether two bands of SET on one side are nearer than `gap`."""
+    for k in range(1, u.size[SET]):
+        if u.side[SET, k] == u.side[SET, k - 1] and u.lo[SET, k] - u.hi[SET, k - 1] < gap:
+            return True
+    return False
+
+
+@kernel
+def _fill_extent(u: Unions, t: Topologies, i: int, a: int) -> None:
+    """Write on each side how many bands SET has, and where the lowest begins and the highest ends."""
+    t.bands[i, a, :], t.reach[i, a, :], t.lowest[i, a, :] = 0, np.nan, np.nan
+    for k in range(u.size[SET]):
+        side = u.side[SET, k]
+        if t.bands[i, a, side] == 0:
+            t.lowest[i, a, side] = u.lo[SET, k]
+        t.bands[i, a, side] += 1
+        t.reach[i, a, side] = u.hi[SET, k]
+
+
 @kernel(entry=True, counting=False)
 def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topologies, i: int) -> int:
     """Fill the fields of one attractor of point i; DECIDED, or a doubt."""
@@ -275,11 +296,12 @@ def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topolog
     x, side = u.lo[SET, 0] + INNER * (u.hi[SET, 0] - u.lo[SET, 0]), u.side[SET, 0]
     if settled == MOVES or (widest > POINT * scale and not expands):
         cycle = one_cycle(params, x, side, scale, w.pieces, u)
-    if cycle == DOUBTFUL or (cycle == NO_CYCLE and settled == MOVES):
-        return NOT_ONE if cycle == DOUBTFUL else MOVING
-    for k in range(1, u.size[SET] if cycle == NO_CYCLE else 0):
-        if u.side[SET, k] == u.side[SET, k - 1] and u.lo[SET, k] - u.hi[SET, k - 1] < UNSURE_GAP * scale:
-            return BANDS_JOIN
+    if cycle == DOUBTFUL:
+        return NOT_ONE
+    if cycle == NO_CYCLE and settled == MOVES:
+        return MOVING
+    if cycle == NO_CYCLE and _bands_join(UNSURE_GAP * scale, u):
+        return BANDS_JOIN
     t.period[i, a] = u.size[SET] if cycle > 0 or widest <= POINT * scale else 0
     if cycle > 0:
         x, side = u.lo[SET, 0], u.side[SET, 0]
@@ -289,13 +311,7 @@ def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topolog
     if t.period[i, a] == 0 and not fills(params, x, side, scale, w.pieces, u):
         return NOT_ONE
     t.start[i, a], t.start_side[i, a] = x, side
-    t.bands[i, a, :], t.reach[i, a, :], t.lowest[i, a, :] = 0, np.nan, np.nan
-    for k in range(u.size[SET]):
-        side = u.side[SET, k]
-        if t.bands[i, a, side] == 0:
-            t.lowest[i, a, side] = u.lo[SET, k]
-        t.bands[i, a, side] += 1
-        t.reach[i, a, side] = u.hi[SET, k]
+    _fill_extent(u, t, i, a)
     jogs_min, jogs_max, order = t.jogs_min[i, a], t.jogs_max[i, a], t.flip_order[i, a]
     obstacle = push_through(params, sides, scale, w.pieces, u, jogs_min, jogs_max, order)
     return DECIDED if obstacle == NOTHING else MOVING
