@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.base.arguments import arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, unknown_goal
 from limitsets.feeder.scene import Scene, load
@@ -39,7 +39,6 @@ from limitsets.proofs.prover.query import Outcome, Query
 # an orbit is proved to violate the goal.  Floats only propose both.
 
 
-Progress = Callable[[str, int, int], None]
 GoalLike = Goal | Callable[..., Any]
 
 
@@ -277,11 +276,11 @@ class MarginsBeyond(Tabled):
 
     scene: Scene
     side: int
-    x: NDArray[np.float64]
+    x: Array
     names: tuple[str, ...]
     units: tuple[str, ...]
-    proved: NDArray[np.float64]
-    refuted: NDArray[np.float64]
+    proved: Array
+    refuted: Array
     margins: tuple[tuple[Margin, ...], ...]
 
     def tables(self) -> tuple[Table, ...]:
@@ -397,7 +396,7 @@ def _one(
     return answer
 
 
-def places_beyond(scene: Scene, side: int, places: int) -> NDArray[np.float64]:
+def places_beyond(scene: Scene, side: int, places: int) -> Array:
     """Return places between the farthest that the limit set gets on other sides and on this one, as many as asked."""
     extents = Query.of(scene, (OrientedBeyond(0.0, side),)).cells(None, 2).cells.extents()
     highest = {s: max(hi for _, hi in parts) for s, parts in extents.items() if parts}

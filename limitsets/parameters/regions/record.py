@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene
@@ -34,7 +35,6 @@ from limitsets.systems.maps import Orbit, orbit
 # Jogs per visit: how many throws a part stays on a side of an attracting block, between one flip and the next.
 
 
-Mask = NDArray[np.bool_]
 Ends = NDArray[np.int32]
 
 
@@ -107,9 +107,6 @@ SURE = 1.0 - 2.0**-4
 
 # Images hold the next interval with this much to spare, so that other arithmetic can confirm it.
 ROOM = 1e-9
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Chain(NamedTuple):
@@ -501,7 +498,7 @@ def _order(extents: Mapping[int, Any], jogs: Mapping[int, Visit], sides: int) ->
 
 
 def _bands(
-    attracting: Attraction, inside: NDArray[np.bool_], extents: Mapping[int, list[tuple[float, float]]]
+    attracting: Attraction, inside: Mask, extents: Mapping[int, list[tuple[float, float]]]
 ) -> dict[int, int]:
     """Count the intervals of each side to which every orbit of the block comes."""
     grid = attracting.cover.grid

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Arrays
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import NOISE_ONLY, find
@@ -146,7 +145,6 @@ def placed(scene: Scene, axes: Sequence[CellAxis]) -> Scene:
 STARTS = ("every", "almost-every", "from", "cells")
 """The codes of the array `starts`, in order."""
 
-Arrays = dict[str, NDArray[Any]]
 LAST = np.nextafter(np.float32(2.0 * math.pi), np.float32(0.0))  # within a full turn
 
 

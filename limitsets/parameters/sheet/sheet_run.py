@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
-from limitsets.base.progress import GOES_ON, shown_in_notebooks
+from limitsets.base.progress import GOES_ON, Progress, shown_in_notebooks
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, by_side
 from limitsets.feeder.scattering import Scattering
 from limitsets.feeder.scene import Scene, load
@@ -58,7 +58,6 @@ NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reach
 # For the proofs; of what is left the share for the joint margin; how many times as many for the noise.
 SECONDS, FOR_JOINT, FOR_NOISE = 12.0, 0.5, 5.0
 
-Progress = Callable[[str, int, int], None]
 
 
 class _SheetRun:

@@ -8,11 +8,12 @@ from typing import TypeAlias
 
 import numpy as np
 
+from limitsets.base.arrays import Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.scene import require_rests
-from limitsets.proofs.policies.game import Game, Mask, game_of, image_of
+from limitsets.proofs.policies.game import Game, game_of, image_of
 from limitsets.proofs.prover.certifying import spelled_deviations
 from limitsets.proofs.prover.cover import Cover, cover_on
 from limitsets.proofs.prover.parameters import ParameterBox, joined, parameter_box, scattered

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.thrower import Exact
 from limitsets.feeder.thrower.flight_box import bracket, exact_turn, turn_box, turn_point
@@ -342,7 +343,7 @@ class Cover:
         return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
 
 
-def _widened(enclosed: Enclosures, edges: NDArray[np.float64], landing: float) -> Enclosures:
+def _widened(enclosed: Enclosures, edges: Array, landing: float) -> Enclosures:
     """Widen the images by the slack and by the scatter of the landing place, which no decision depends on."""
     more = np.nextafter(landing + SLACK_OF_IMAGE * np.diff(edges), np.inf)
     hulls = {

@@ -32,8 +32,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.feeder.thrower.params import gather_box
 from limitsets.feeder.thrower.throw_box import BOTH, NOTHING, throw_box
 from limitsets.numbers.interval import Interval
@@ -58,7 +58,6 @@ from limitsets.systems.maps import codes
 
 Pair = tuple[float, float]
 Intervals = dict[int, list[Pair]]
-Array = NDArray[np.float64]
 
 UNDECIDED = (BOTH, NOTHING)
 

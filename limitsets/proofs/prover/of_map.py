@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base.arguments import arguments_checked_as
+from limitsets.base.arrays import Array, Ints
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
 from limitsets.base.progress import Progress, shown_in_notebooks
@@ -46,7 +47,6 @@ from limitsets.systems.maps.derived import NEVER, SURE, UNKNOWN, branch_boxes
 from limitsets.systems.sets import Cycle, Cycles, cycles, cycles_of
 from limitsets.systems.sets.basin import longest_stays, passing
 
-Floats: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = list[list[Intervals]]
 
 # Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
@@ -78,12 +78,12 @@ class CycleOfMap:
         Whether every eigenvalue of it is below 1 in modulus; None where that is open.
     """
 
-    lo: Floats
-    hi: Floats
-    side: NDArray[np.int64]
-    branches: NDArray[np.int64]
-    slope_lo: Floats
-    slope_hi: Floats
+    lo: Array
+    hi: Array
+    side: Ints
+    branches: Ints
+    slope_lo: Array
+    slope_hi: Array
     attracts: bool | None
 
     @property
@@ -311,7 +311,7 @@ def _expanding(proof: ProofOfMap) -> Claim:
 # ---------------------------------------------------------------- cycles
 
 
-def _stepped(proof: ProofOfMap, lo: Floats, hi: Floats, cycle: Cycle) -> tuple[Intervals, Intervals] | str:
+def _stepped(proof: ProofOfMap, lo: Array, hi: Array, cycle: Cycle) -> tuple[Intervals, Intervals] | str:
     """Enclose images (p, d) and slopes (p, d, d) of boxes around the points of an orbit; or say what is missing."""
     image, slope = np.empty((2, *lo.shape)), np.empty((2, *lo.shape, lo.shape[1]))
     for side, branch in sorted(set(zip(cycle.side.tolist(), cycle.branches.tolist(), strict=True))):
@@ -327,7 +327,7 @@ def _stepped(proof: ProofOfMap, lo: Floats, hi: Floats, cycle: Cycle) -> tuple[I
     return Intervals(*image), Intervals(*slope)
 
 
-def _matrix(lo: Floats, hi: Floats) -> Matrix:
+def _matrix(lo: Array, hi: Array) -> Matrix:
     return [[Intervals.of(a, b) for a, b in zip(*rows, strict=True)] for rows in zip(lo, hi, strict=True)]
 
 
@@ -336,7 +336,7 @@ def _times(a: Matrix, b: Matrix) -> Matrix:
     return [[reduce(add, map(mul, row, column)) for column in columns] for row in a]
 
 
-def _ends(a: Matrix) -> tuple[Floats, Floats]:
+def _ends(a: Matrix) -> tuple[Array, Array]:
     lo, hi = (np.array([[getattr(entry, end)[0] for entry in row] for row in a]) for end in ("lo", "hi"))
     return lo, hi
 
@@ -347,7 +347,7 @@ def _slope(steps: Intervals) -> Matrix:
     return reduce(lambda total, step: _times(step, total), each)
 
 
-def _exactly(x: Floats) -> Intervals:
+def _exactly(x: Array) -> Intervals:
     return Intervals(x, x)
 
 
@@ -356,7 +356,7 @@ def _sum(terms: Intervals) -> Intervals:
     return reduce(add, map(Intervals, np.moveaxis(terms.lo, -1, 0), np.moveaxis(terms.hi, -1, 0)))
 
 
-def _inverse(slope: Intervals) -> Floats:
+def _inverse(slope: Intervals) -> Array:
     """Invert DF in floats; nan, which proves nothing, where it is singular."""
     p, d = slope.lo.shape[:2]
     derivative = np.zeros((p, d, p, d))
@@ -369,7 +369,7 @@ def _inverse(slope: Intervals) -> Floats:
         return np.full((p * d, p * d), np.nan)
 
 
-def _krawczyk(middle: Floats, c: Floats, off: Intervals, slope: Intervals, wide: Intervals) -> Intervals:
+def _krawczyk(middle: Array, c: Array, off: Intervals, slope: Intervals, wide: Intervals) -> Intervals:
     """K(X), from F at the middles, the slopes on X, and X less the middles."""
     p, d = middle.shape
     of_points = c.reshape(p * d, p, d)
@@ -435,11 +435,11 @@ def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
     return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
 
 
-def _meet(one: tuple[Floats, Floats], two: tuple[Floats, Floats]) -> bool:
+def _meet(one: tuple[Array, Array], two: tuple[Array, Array]) -> bool:
     return bool(((one[0] <= two[1]) & (two[0] <= one[1])).all())
 
 
-def _within(cells: CellSet, lo: Floats, hi: Floats, side: int) -> bool:
+def _within(cells: CellSet, lo: Array, hi: Array, side: int) -> bool:
     """Whether the cells cover a box."""
     grid = cells.grid
     corners = grid.index(np.array([lo, hi]), side)

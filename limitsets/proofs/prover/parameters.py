@@ -15,8 +15,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from limitsets.base.arrays import Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.geometry.polygon import above_side
@@ -262,7 +262,7 @@ class ParameterBox:
         return isinstance(self.lo, FullThrow)
 
     @property
-    def rests(self) -> npt.NDArray[np.bool_]:
+    def rests(self) -> Mask:
         """On which sides the part rests; on the others it tips over, for all parameters."""
         return (self.lo.a > 0) & (self.hi.a < self.lo.length)
 

@@ -10,14 +10,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Mask
 from limitsets.feeder.goals import Goal, Laid, by_side
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.basin import NO_STARTS, ROUNDING, leaving_cells
 from limitsets.proofs.prover.cover import everywhere
-from limitsets.proofs.prover.goals.kind import Answer, Kind, Mask, undecided
+from limitsets.proofs.prover.goals.kind import Answer, Kind, undecided
 from limitsets.proofs.prover.goals.reaches import not_null
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph
@@ -166,7 +166,7 @@ def laid_only(answer: Answer, attraction: Attraction, laid: Laid) -> Answer:
     )
     number = answer.recurs.get("component")
     if number is not None:
-        meets: NDArray[np.bool_] = starts_in(attraction, laid)[0]
+        meets: Mask = starts_in(attraction, laid)[0]
         begins |= bool((meets & (attraction.component == number)).any())
     if begins:
         return answer

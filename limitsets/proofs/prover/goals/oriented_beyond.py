@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Mask
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
@@ -31,7 +31,7 @@ from limitsets.proofs.prover.two_throws import stays_below
 from limitsets.systems.cells import CellSet
 
 
-def _exceptions(attraction: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
+def _exceptions(attraction: Attraction, goal: OrientedBeyond) -> Mask:
     """Cells that lie, in part, beyond x on another side."""
     bad = np.zeros(attraction.component.size, dtype=bool)
     for side, (edges,) in enumerate(attraction.cover.grid.edges):
@@ -101,7 +101,7 @@ def _again(attraction: Attraction, goal: OrientedBeyond) -> dict[str, int]:
     return {}
 
 
-def _thrown_there(attraction: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
+def _thrown_there(attraction: Attraction, goal: OrientedBeyond, bad: Mask) -> str:
     """Name a throw that may land beyond x on another side; empty if there is none."""
     start = thrown_into(attraction, bad)
     if start:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base.arrays import Mask
 from limitsets.feeder.goals import Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.goals.kind import (
     Answer,
     Kind,
-    Mask,
     above,
     against,
     begins,

@@ -17,8 +17,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints
 from limitsets.feeder.goals import Laid
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
@@ -70,9 +70,6 @@ PLACES, KAPPAS, BACK, CLOSINGS = 20_000, 5, 400, 20
 
 # An exact landing between two values of kappa: so near to it, as shares of the way to the ends of the noise.
 SPANS = (1e-6, 1e-4, 1e-2, 0.1, 0.5, 1.0)
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Refutation(NamedTuple):
