@@ -59,14 +59,6 @@ class Chances(NamedTuple):
     mean: tuple[float, float] | None
 
 
-def holds_chances(header: dict[str, Any]) -> bool:
-    """Whether a file claims probabilities."""
-    claims = header.get("claims")
-    return isinstance(claims, list) and any(
-        isinstance(c, dict) and c.get("claim") == "probabilities" for c in claims
-    )
-
-
 def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chances:
     """Read a file; raises BadFileError."""
     (claim,) = rows(header["claims"], "claims of probabilities", 1, 1)

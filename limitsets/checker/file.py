@@ -329,6 +329,12 @@ def open_certificate(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict
     return header, stored_entries(entries["arrays.npz"], 60_000, "arrays.npz")
 
 
+def claims_a(word: str, header: dict[str, Any]) -> bool:
+    """Whether a file makes a claim."""
+    claims = header.get("claims")
+    return isinstance(claims, list) and any(isinstance(c, dict) and c.get("claim") == word for c in claims)
+
+
 @dataclass
 class Cells:
     """The arrays of one box; the cells of all sides stand one after another."""

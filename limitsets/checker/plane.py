@@ -5,7 +5,6 @@ docs/certificates.md, "Regions".
 
 import copy
 import itertools
-import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -25,7 +24,7 @@ from .region import (
     check_region_cell,
     start_region_worker,
 )
-from .scene import quantities, read_scene
+from .scene import place_of, quantities, read_scene
 
 STARTS_WORDS = ("every", "almost-every", "from", "cells")  # the codes of the array `starts`
 MOST_BORDERS = 4_097
@@ -64,14 +63,6 @@ class Plane(NamedTuple):
     blocks: Array
     chain: Array
     ends: Array
-
-
-def holds_plane(header: dict[str, Any]) -> bool:
-    """Whether a file claims regions of a plane."""
-    claims = header.get("claims")
-    return isinstance(claims, list) and any(
-        isinstance(c, dict) and c.get("claim") == "region" for c in claims
-    )
 
 
 def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
@@ -185,12 +176,13 @@ def check_codes(plane: Plane, has_goal: bool) -> str:
 def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
     """Put together, cell by cell, what is claimed of it."""
     f = plane.flat
-    at = np.arange(len(f["cells"]) + 1)
-    blocks, chain = np.searchsorted(plane.blocks[:, 0], at), np.searchsorted(plane.chain[:, 0], at)
+    numbers = np.arange(len(f["cells"]) + 1)
+    blocks, chain = np.searchsorted(plane.blocks[:, 0], numbers), np.searchsorted(plane.chain[:, 0], numbers)
     for k, (a, b, c, d) in enumerate(f["cells"].tolist()):
         raw = copy.deepcopy(plane.raw)
         for axis, low, high in ((plane.axes[0], a, b), (plane.axes[1], c, d)):
-            put_at(raw, axis.name, [axis.texts[low], axis.texts[high]])
+            holder, at = place_of(raw, axis.name)
+            holder[at] = [axis.texts[low], axis.texts[high]]
         rows_of = slice(int(plane.first[k]), int(plane.first[k + 1]))
         grid, orbit = int(f["grid"][k]), slice(chain[k], chain[k + 1])
         yield Claimed(
@@ -206,17 +198,6 @@ def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
             chain=plane.chain[orbit, 1:].tolist(),
             ends=plane.ends[orbit].tolist(),
         )
-
-
-def put_at(tree: Any, name: str, value: object) -> None:
-    """Write a value into a scene, under the name of a quantity that it has."""
-    words = re.findall(r"[^.\[\]]+", name)
-    for k, word in enumerate(words):
-        at = word if isinstance(tree, dict) else int({"x": "0", "y": "1"}.get(word, word))
-        if k == len(words) - 1:
-            tree[at] = value
-        else:
-            tree = tree[at]
 
 
 def check_plane_cells(

@@ -12,7 +12,7 @@ import numpy as np
 from flint import arb
 
 from .balls import Array
-from .cells import Crew, first_bad, tasks_of
+from .cells import Crew, first_bad, marked, targets_of, tasks_of
 from .file import (
     LENGTHS,
     Cells,
@@ -76,14 +76,6 @@ class Policy(NamedTuple):
     def at(self, where: Quantity) -> Fraction:
         """Give a place in the unit of the arm's length."""
         return where.lo / LENGTHS[self.choices[0].scene.unit]
-
-
-def holds_policy(header: dict[str, Any]) -> bool:
-    """Whether a file claims a policy."""
-    claims = header.get("claims")
-    return isinstance(claims, list) and any(
-        isinstance(c, dict) and c.get("claim") == "policy" for c in claims
-    )
 
 
 def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Policy:
@@ -344,15 +336,7 @@ def check_ranges(policy: Policy) -> str:
 def mask_of(policy: Policy, state: int) -> Array:
     """Give the cells in which the part may lie in a state."""
     begin, end = np.searchsorted(policy.belief[:, 0], [state, state + 1])
-    return spread(policy.belief[begin:end, 1:], len(policy.cells[0].side))
-
-
-def spread(ranges: Array, n: int) -> Array:
-    """Mark the cells of ranges."""
-    steps = np.zeros(n + 1, dtype=np.int64)
-    np.add.at(steps, ranges[:, 0], 1)
-    np.add.at(steps, ranges[:, 1] + 1, -1)
-    return np.asarray(np.cumsum(steps[:-1]) > 0)
+    return marked(policy.belief[begin:end, 1:], len(policy.cells[0].side))
 
 
 def check_begin(policy: Policy, board: Board) -> str:
@@ -389,8 +373,7 @@ def check_state(policy: Policy, board: Board, state: int) -> str:
     bad = check_targets(c, belief)
     if bad:
         return bad
-    ranges = np.concatenate([each[belief & (each[:, 0] >= 0)] for each in (c.jog, c.flip)])
-    image = spread(ranges, len(belief))
+    image = targets_of([c.jog, c.flip], belief)
     if (image & board.lost).any():
         return "its throw may bring the part down on a wrong side"
     if policy.mode == "catch":

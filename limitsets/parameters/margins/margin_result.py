@@ -9,7 +9,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import Any
 
-from limitsets.base.errors import AnswerError, LimitsetsError
+from limitsets.base.errors import LimitsetsError
 from limitsets.base.files import as_table, picked
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, as_written, by_side
@@ -17,8 +17,8 @@ from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.left_out import Model
 from limitsets.parameters.margins.deviations import nominal_of
 from limitsets.proofs.prover.certificate import DeniedError
-from limitsets.proofs.prover.goals import State, rechecked
-from limitsets.proofs.prover.proof import KINDS, Proof, write_refutation
+from limitsets.proofs.prover.goals import State
+from limitsets.proofs.prover.proof import KINDS, Proof, require_checkable, write_refutation
 from limitsets.proofs.prover.query import Outcome, joined_claims
 
 # ----------------------------------------------------------------
@@ -225,7 +225,8 @@ class Margin(Tabled):
         DeniedError
             The checker does not confirm one: it is kept as NAME.denied.zip.
         """
-        self._require_checkable()
+        effects = [name for name in self.scene.effects.on() if name != "spread"]
+        require_checkable(effects, self.goals, "the margin stands")
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         stem, written = self.stem, []
@@ -243,24 +244,6 @@ class Margin(Tabled):
                 write_refutation(path, *about, recheck=recheck)
                 written.append(path)
         return tuple(written)
-
-    def _require_checkable(self) -> None:
-        on = [name for name in self.scene.effects.on() if name != "spread"]
-        if on:
-            raise AnswerError(
-                "the certificate",
-                f"with the effects {', '.join(on)}",
-                "the minimal model, and noise",
-                "nothing rechecks other maps; the margin stands",
-            )
-        for goal in self.goals:
-            if not rechecked(goal):
-                raise AnswerError(
-                    "the certificate",
-                    f"of the goal {goal.kind}",
-                    "goals that the checker knows",
-                    "nothing rechecks others; the margin stands",
-                )
 
 
 def goal_table(goal: Goal, unit: str) -> dict[str, Any]:

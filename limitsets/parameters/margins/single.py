@@ -27,7 +27,12 @@ from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.laid import LaidLike, laid_goal, read_laid
 from limitsets.feeder.scene.units import exact_factor
 from limitsets.parameters.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
-from limitsets.parameters.margins.deviations import DeviationScale, deviation_scale, deviation_scales
+from limitsets.parameters.margins.deviations import (
+    DeviationScale,
+    Tolerance,
+    deviation_scale,
+    deviation_scales,
+)
 from limitsets.parameters.margins.joint import joint_margin
 from limitsets.parameters.margins.margin_result import Margin, bound, bound_above, failure
 from limitsets.proofs.prover.query import Outcome, Query
@@ -197,7 +202,7 @@ def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[
 def _of_bracket(
     query: Query, one: DeviationScale, bracket: Bracket, width: Fraction, seconds: float
 ) -> Margin:
-    deviations, noise = _texts(one, bracket.proved)
+    alone = Tolerance.alone(one)
     return Margin(
         quantity=one.quantity,
         reading=one.reading,
@@ -211,22 +216,14 @@ def _of_bracket(
         seconds=seconds,
         scene=query.scene,
         tolerance={},
-        deviations=deviations,
-        noise=noise,
+        deviations=alone.texts(bracket.proved) if bracket.proved else {},
+        noise=alone.noise(bracket.proved) if bracket.proved else {},
         pieces=tuple(bracket.pieces),
         against=bracket.against,
         direction=("more" if bracket.sign > 0 else "less")
         if one.reading == "fixed" and bracket.refuted
         else None,
     )
-
-
-def _texts(one: DeviationScale, size: Fraction) -> tuple[dict[str, str], dict[str, str]]:
-    """Say what is fixed but unknown, and what differs at every throw."""
-    if not size:
-        return {}, {}
-    said = {one.quantity: one.text(size)}
-    return (said, {}) if one.reading == "fixed" else ({}, said)
 
 
 def _nominal(one: DeviationScale) -> float | None:

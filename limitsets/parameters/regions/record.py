@@ -21,7 +21,7 @@ from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction, attraction
 from limitsets.proofs.prover.certificate import arrays_of
-from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.cover import cover, met
 from limitsets.proofs.prover.goals import cuts, prove
 from limitsets.proofs.prover.goals.kind import above, throws_to_reach
 from limitsets.proofs.prover.goals.violating_orbits import MORE_THAN_ROUNDING, middle
@@ -43,16 +43,6 @@ class Visit(NamedTuple):
 
     least: int
     most: int
-
-
-def met(ends: Ends, cells: Mask) -> Mask:
-    """Return the cells that images of some cells meet; `ends` are the first and last of each, -1 where it has none."""
-    some = ends[cells & (ends[:, 0] >= 0)]
-    count = np.zeros(cells.size + 1, dtype=np.int64)
-    np.add.at(count, some[:, 0], 1)
-    np.add.at(count, some[:, 1] + 1, -1)
-    reached: Mask = np.cumsum(count[:-1]) > 0
-    return reached
 
 
 def visit(jog: Ends, flip: Ends, block: Mask, side: Mask) -> Visit | None:
@@ -151,8 +141,7 @@ def violating_chain(attracting: Attraction, middle_box: ParameterBox, goal: Orie
     path = orbit(map_now, float(start.x[-1]), int(start.side[-1]), SEARCHED)
     if not goal.wrong()(path.x * MORE_THAN_ROUNDING, path.side).any():
         return Violation()
-    bare = box.bare[1]
-    if not (box.bare[0].kappa > np.hypot(bare.a, bare.d) * (1.0 + 1e-12)).all():
+    if not box.concave:
         return Violation(True)  # the impact may not depend continuously on where the throw starts
     chains = (_widened(box, near, above(goal.x)) for near in _returns(path, goal))
     return Violation(True, next((chain for chain in chains if chain is not None), None))
@@ -358,6 +347,7 @@ def certify_cell(
     """
     ends = {name: (Fraction(lo), Fraction(hi)) for name, (lo, hi) in spans.items()}
     piece = SceneBox(scene, {name: RationalInterval(*pair) for name, pair in ends.items()})
+    goal = scene.goal
     try:
         box = parameter_box(scene, tree=piece.tree())
         middle = parameter_box(scene, tree=_middle(piece).tree())
@@ -366,7 +356,9 @@ def certify_cell(
         for number in cells:
             attracting = _finer(coarse, scene, number)
             doubtful = _may_violate(attracting, scene)
-            against = _refuting(attracting, scene, middle) if doubtful and first is None else Violation()
+            against = Violation()
+            if doubtful and first is None and isinstance(goal, OrientedBeyond) and not goal.from_anywhere:
+                against = violating_chain(attracting, middle, goal)
             # if these cells prove nothing, finer cells come before two throws at once, which cost more
             record = _record(
                 attracting, scene, ends, ask=not against.seen and (not doubtful or number == cells[-1])
@@ -455,14 +447,6 @@ def _may_violate(attracting: Attraction, scene: Scene) -> bool:
         for side, parts in attracting.cells.extents().items()
         for _, hi in parts
     )
-
-
-def _refuting(attracting: Attraction, scene: Scene, middle: ParameterBox) -> Violation:
-    """Look for a periodic orbit of all parameters that violates the goal."""
-    goal = scene.goal
-    if not isinstance(goal, OrientedBeyond) or goal.from_anywhere:
-        return Violation()
-    return violating_chain(attracting, middle, goal)
 
 
 # ---------------------------------------------------------------- the blocks

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.arrays import Array
+from limitsets.base.arrays import Array, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.thrower import Exact
 from limitsets.feeder.thrower.flight_box import bracket, exact_turn, turn_box, turn_point
@@ -391,11 +391,16 @@ def cover(
     unknown = np.minimum(UNKNOWN * (box.hi.a - box.lo.a), 0.1 * (end - foot)) if not points else 0.0
     lo = np.where(rests, foot + np.maximum(NEAREST * (end - foot), unknown), end)
     plain = grid(Domain(lo[:, None], end[:, None], anchor), cells=cells)
+    return cover_on(box, cut_at(plain, cuts or {}), pieces, points)
+
+
+def cut_at(plain: Grid, cuts: Mapping[int, Sequence[float]]) -> Grid:
+    """Cut the cells of a grid at more places, by side."""
     sides = []
     for side, (edges,) in enumerate(plain.edges):
-        wanted = [x for x in (cuts or {}).get(side, ()) if edges[0] < x < edges[-1]]
+        wanted = [x for x in cuts.get(side, ()) if edges[0] < x < edges[-1]]
         sides.append((np.union1d(edges, wanted),))
-    return cover_on(box, Grid(plain.domain, tuple(sides)), pieces, points)
+    return Grid(plain.domain, tuple(sides))
 
 
 def cover_on(
@@ -427,6 +432,14 @@ def _graph(box: ParameterBox, cells: Grid, enclosed: Sequence[Enclosures]) -> Tr
             leaving[cells.of_side(side)] |= np.where(beyond, outward, 0).astype(np.uint8)
     ranges = build(cells, first, joined[0], joined[1], joined[2], leaving)
     return TransitionGraph(box.lo, cells, ranges, "boxes")
+
+
+def met(ends: NDArray[np.int32], cells: Mask) -> Mask:
+    """Return the cells that images of some cells meet; `ends` are the first and last of each, -1 where it has none."""
+    some = ends[cells & (ends[:, 0] >= 0)]
+    begin, past = (np.bincount(at, minlength=cells.size + 1) for at in (some[:, 0], some[:, 1] + 1))
+    reached: Mask = np.cumsum((begin - past)[:-1]) > 0
+    return reached
 
 
 def everywhere(covered: Cover) -> list[NDArray[np.int32]]:

@@ -76,13 +76,10 @@ class RationalInterval:
     __radd__ = __add__
 
     def __sub__(self, other: RationalInterval | int) -> RationalInterval:
-        b = _span(other)
-        if b is None:
-            return NotImplemented
-        return _short(self.lo - b.hi, self.hi - b.lo)
+        return self + (-other)
 
     def __rsub__(self, other: int) -> RationalInterval:
-        return RationalInterval.of(other) - self
+        return -self + other
 
     def __mul__(self, other: RationalInterval | int) -> RationalInterval:
         b = _span(other)

@@ -36,11 +36,12 @@ from limitsets.base.files import as_table, picked
 from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled, bands_of
 from limitsets.numbers.interval import guard
+from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.proof import Claim
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph, transitions
-from limitsets.systems.graph.components import attracting_of, ranks
+from limitsets.systems.graph.components import ranks
 from limitsets.systems.maps import coerce, has_slope, kernels, kind_of
 from limitsets.systems.maps.contract import between
 from limitsets.systems.maps.derived import NEVER, SURE, UNKNOWN, branch_boxes
@@ -222,16 +223,6 @@ def _place(grid: Grid, cell: int) -> str:
     lo, hi = (corner[0] for corner in grid.boxes(np.array([cell]), side))
     spans = ", ".join(f"[{a:.6g}, {b:.6g}]" for a, b in zip(lo, hi, strict=True))
     return f"side {side}, x in {spans}" if grid.sides > 1 else f"x in {spans}"
-
-
-def _components(graph: TransitionGraph) -> NDArray[np.int32]:
-    """Attracting component of each cell."""
-    sets = graph.recurrent_components()
-    good = attracting_of(graph.ranges, graph.components(), sets)
-    component = np.full(graph.n_cells, -1, dtype=np.int32)
-    for number, cells in enumerate(k for k, attracts in zip(sets, good, strict=True) if attracts):
-        component[cells] = number
-    return component
 
 
 def _invariant(proof: ProofOfMap) -> Claim:
@@ -560,7 +551,9 @@ def certify_map(
     if progress is not None:
         progress("transitions", 0, 1)
     graph = transitions(lower, grid, "boxes", upper=upper)
-    proof = ProofOfMap(lower, upper, graph, component=_components(graph), claims=(), cycles=(), seconds=0.0)
+    proof = ProofOfMap(
+        lower, upper, graph, component=components_of(graph)[0], claims=(), cycles=(), seconds=0.0
+    )
     orbits: tuple[CycleOfMap, ...] = ()
     answers = []
     for word in wanted:

@@ -25,7 +25,15 @@ from limitsets.proofs.prover.goals import (
     stays_on_arm,
 )
 from limitsets.proofs.prover.goals.kind import Answer, Kind, undecided
-from limitsets.proofs.prover.goals.laid_starts import hexed, laid_only, narrowed, prove_laid, starts_in
+from limitsets.proofs.prover.goals.laid_starts import (
+    LITTLE,
+    WHOLE,
+    hexed,
+    laid_only,
+    narrowed,
+    prove_laid,
+    starts_in,
+)
 from limitsets.proofs.prover.goals.reaches import not_null
 from limitsets.proofs.prover.goals.violating_orbits import State
 
@@ -41,11 +49,6 @@ __all__ = [
     "rechecked",
     "sentence",
 ]
-
-# If some starts leave and no more than this share is open, finer cells are not tried.
-LITTLE = 1e-3
-
-WHOLE = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
 
 KINDS: dict[str, Kind] = {
     "attracts_all": attracts_all.KIND,

@@ -344,7 +344,7 @@ def _loop(cycle: ProvedCycle) -> Loop:
 
 def _enclosed(box: ParameterBox, around: Orbit) -> Loop | None:
     """Prove a periodic orbit of a map with effects: an interval goes one way, and its ends part or come nearer."""
-    if not _continuous(box):
+    if not box.concave:
         return None
     x, side, period = float(around.x[0]), int(around.side[0]), around.code.size
     kappa = np.tile([[box.lo.kappa], [box.hi.kappa]], period)
@@ -366,12 +366,6 @@ def _enclosed(box: ParameterBox, around: Orbit) -> Loop | None:
                 whole[0][:-1], whole[1][:-1], whole[2][:-1].astype(np.int64), branches, bool(inward), {}
             )
     return None
-
-
-def _continuous(box: ParameterBox) -> bool:
-    """Whether heights are concave, so that what goes one way depends continuously on where it starts and on kappa."""
-    bare = box.bare[1]
-    return bool((box.bare[0].kappa > np.hypot(bare.a, bare.d) * (1.0 + 1e-12)).all())
 
 
 def _of(loop: Loop, box: ParameterBox, attraction: Attraction) -> Refutation:
@@ -505,7 +499,7 @@ def _closing(box: ParameterBox, state: State, kappa: float, to: float, on: int) 
         lo, hi, side = _landed(box, state, only)
         near = side == on and max(abs(lo - to), abs(hi - to)) < box.landing * (1.0 - 1e-9)
         return only if near else None
-    if not _continuous(box):
+    if not box.concave:
         return None
     low, high = _ends(box)
     for share in SPANS:
