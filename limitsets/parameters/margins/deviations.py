@@ -100,6 +100,15 @@ class DeviationScale:
         return Fraction(self.given.number)
 
     @property
+    def about(self) -> float | None:
+        """The value about which it deviates; of a length or an angle in the unit of the deviation."""
+        if self.key != self.quantity or self.quantity == "landing.x":
+            return None
+        return float(
+            self.nominal if self.relative else self.nominal * exact_factor(self.given.unit, self.unit)
+        )
+
+    @property
     def least(self) -> Fraction:
         """A size that is small for such a quantity: where a search begins."""
         if self.relative:

@@ -25,7 +25,6 @@ from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, unknown_goal
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.laid import LaidLike, laid_goal, read_laid
-from limitsets.feeder.scene.units import exact_factor
 from limitsets.parameters.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
 from limitsets.parameters.margins.deviations import (
     DeviationScale,
@@ -210,7 +209,7 @@ def _of_bracket(
         proved=float(bracket.proved),
         refuted=None if bracket.refuted is None else float(bracket.refuted),
         unit=one.unit,
-        nominal=_nominal(one),
+        nominal=one.about,
         reason=bracket.reason,
         closed=bracket.closed(width),
         seconds=seconds,
@@ -224,13 +223,6 @@ def _of_bracket(
         if one.reading == "fixed" and bracket.refuted
         else None,
     )
-
-
-def _nominal(one: DeviationScale) -> float | None:
-    """Give the value; of a length or an angle in the unit of its deviation."""
-    if one.key != one.quantity or one.quantity == "landing.x":
-        return None
-    return float(one.nominal if one.relative else one.nominal * exact_factor(one.given.unit, one.unit))
 
 
 def _of_none(query: Query, nominal: Outcome) -> Bracket:
