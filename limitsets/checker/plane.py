@@ -312,11 +312,11 @@ def area_shares(plane: Plane) -> tuple[Fraction, Fraction, Fraction]:
 def plane_in_words(plane: Plane, goal: dict[str, Any] | None) -> list[str]:
     """Put the claim in words, with what was checked."""
     undecided, proved, refuted = (f"{float(100 * share):.6g} %" for share in area_shares(plane))
-    f = plane.flat
+    f, whole = plane.flat, ", ".join(axis.between(0, len(axis.texts) - 1) for axis in plane.axes)
     what = "starts come to attracting blocks" if goal is None else "the scene's goal is proved"
     against = "" if goal is None else f" refuted on {refuted}, by a periodic orbit that violates it;"
     lines = [
-        f"region: {name_of_whole(plane)}, in {len(f['cells'])} cells of parameters, each for every parameter in it:",
+        f"region: {whole}, in {len(f['cells'])} cells of parameters, each for every parameter in it:",
         f"    {what} on {proved} of the area;{against} undecided on {undecided}",
     ]
     said = (
@@ -341,8 +341,3 @@ def plane_in_words(plane: Plane, goal: dict[str, Any] | None) -> list[str]:
     joined = "in which attracting blocks of neighbours correspond one to one"
     lines.append(f"    attracting blocks in each cell: at least {least}; regions, {joined}: {number}")
     return lines
-
-
-def name_of_whole(plane: Plane) -> str:
-    """Name the plane, for people."""
-    return ", ".join(axis.between(0, len(axis.texts) - 1) for axis in plane.axes)

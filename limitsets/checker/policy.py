@@ -100,7 +100,7 @@ def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Polic
     check_cavity(raw, mode, x)
     within = section["within"]
     require(type(within) is int and within >= 0, "within is not a number of throws")
-    words = answers_of_sensor(sensor)
+    words = ["any"] if sensor.side is None and sensor.place is None else ["yes", "no"]
     begin = table(section["first"], "first", " ".join(words))
     first = [NO_STATE if begin[word] is None else begin[word] for word in words]
     require(all(type(k) is int for k in first), "first holds no number of a state")
@@ -139,11 +139,6 @@ def read_sensor(value: object, n_sides: int) -> Sensor:
     error = one_length(asked["error"], "sensor.error") if "error" in asked else none
     require(error.lo >= 0, "the sensor's error is negative")
     return Sensor(None, place, error)
-
-
-def answers_of_sensor(sensor: Sensor) -> list[str]:
-    """Name the answers, in the order of the arrays."""
-    return ["any"] if sensor.side is None and sensor.place is None else ["yes", "no"]
 
 
 def one_length(value: object, where: str) -> Quantity:
@@ -266,7 +261,7 @@ def board_of(policy: Policy) -> Board:
     """Compare the borders of the cells with the places of sensor and goal, as exact numbers."""
     c = policy.cells[0]
     x, on = policy.at(policy.x), c.side == policy.side
-    won = on & reaching(c.lower(), x)
+    won = on & np.array([Fraction(value) >= x for value in c.lower().tolist()], dtype=bool)
     lost = ~on & beyond(c.upper(), x) & (policy.mode == "catch")
     place, error = policy.sensor.place, policy.sensor.error
     if place is not None and error is not None:
@@ -281,11 +276,6 @@ def board_of(policy: Policy) -> Board:
 def beyond(values: Array, limit: Fraction) -> Array:
     """Tell which floats are above a rational number."""
     return np.array([Fraction(value) > limit for value in values.tolist()], dtype=bool)
-
-
-def reaching(values: Array, limit: Fraction) -> Array:
-    """Tell which floats are not below a rational number."""
-    return np.array([Fraction(value) >= limit for value in values.tolist()], dtype=bool)
 
 
 def check_policy(

@@ -80,7 +80,7 @@ def check_record(scene: Scene, goal: dict[str, Any] | None, claimed: Claimed) ->
     starts = starts_of(claimed)
     every_throw = False
     if claimed.goal == GOAL_PROVED:
-        if claimed.starts == "cells" or open_share(c, scene, starts) > LARGEST_OPEN:
+        if claimed.starts == "cells" or 1.0 - sum(shares(c, scene, starts, c.rank >= 0)) > LARGEST_OPEN:
             return "starts of more than 1 % of the arm are open"
         if goal is not None:
             bad = check_goal_of_cell(c, scene, goal, starts, claimed.counts)
@@ -118,11 +118,6 @@ def starts_of(claimed: Claimed) -> Starts:
         near = ([q for q, _, _ in claimed.near], fixed)
     since = list(claimed.since) if claimed.starts == "from" else None
     return Starts(claimed.starts, since, claimed.counts[0], near)
-
-
-def open_share(c: Cells, scene: Scene, starts: Starts) -> float:
-    """Bound the share of the arm of whose starts nothing is claimed from above."""
-    return 1.0 - sum(shares(c, scene, starts, c.rank >= 0))
 
 
 def check_goal_of_cell(

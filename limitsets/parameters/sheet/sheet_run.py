@@ -245,11 +245,6 @@ def _tried(ask: Callable[..., Margin], *about: Any) -> Margin | str:
         return failure(error)
 
 
-def _place(goals: Sequence[Goal]) -> tuple[float, int] | None:
-    """Return x and side of the rests that count as fed."""
-    return next(((goal.x, goal.side) for goal in goals if isinstance(goal, OrientedBeyond | Reaches)), None)
-
-
 def _goals(
     scene: Scene, goal: GoalLike | Sequence[GoalLike] | None, laid: LaidLike | None
 ) -> tuple[Goal, ...]:
@@ -402,7 +397,9 @@ def _filled(
     begin: float,
 ) -> Robustness:
     """Compute the sheet part by part; for each part left out, say why."""
-    scene, goals, place = sheet.scene, sheet.goals, _place(sheet.goals)
+    scene, goals = sheet.scene, sheet.goals
+    # x and side of the rests that count as fed
+    place = next(((goal.x, goal.side) for goal in goals if isinstance(goal, OrientedBeyond | Reaches)), None)
     missing = sheet.left_out
     missing |= {part: "it was not asked for" for part in PARTS if part in leave_out}
     if not sheet.tolerance:

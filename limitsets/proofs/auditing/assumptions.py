@@ -88,10 +88,6 @@ def _positive(scene: Scene, _: ParameterBox | None) -> Terms:
     return Terms(0.0)
 
 
-def _enough(scene: Scene, _: ParameterBox | None) -> Terms:
-    return Terms(1.0)
-
-
 def _corner(scene: Scene, box: ParameterBox | None) -> Terms:
     corners = scene.sides.corner
     if box is None:
@@ -237,7 +233,7 @@ ASSUMPTIONS = (
         words="the part lies still once a side has come down",
         value="energy left, in that needed to roll on or back",
         column=Assumed.ROLL,
-        terms=_enough,
+        terms=lambda *_: Terms(1.0),
     ),
     Assumption(
         "drive",

@@ -244,7 +244,11 @@ def write(
         "quantiles": [],
         "mean": None,
     }
-    claimed = {name: _widened(within[name], allowance) for name in section["names"]}
+    claimed = {
+        name: np.stack([np.maximum(low - allowance, 0.0), np.minimum(high + allowance, 1.0)])
+        for name, (low, high) in within.items()
+        if name in section["names"]
+    }
     for name, pair in claimed.items():
         for share in QUANTILES:
             ends = _quantile(pair, float(share.split()[0]) / 100.0)
@@ -301,10 +305,6 @@ def _cut(places: Array, finer: int) -> Array:
     wide = np.flatnonzero(width > 1e-3 * np.median(width))
     more = [places[wide] + width[wide] * (k / finer) for k in range(1, finer)]
     return np.unique(np.concatenate([places, *more]))
-
-
-def _widened(pair: Array, allowance: float) -> Array:
-    return np.stack([np.maximum(pair[0] - allowance, 0.0), np.minimum(pair[1] + allowance, 1.0)])
 
 
 def _quantile(pair: Array, share: float) -> tuple[int, int] | None:

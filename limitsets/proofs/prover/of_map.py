@@ -20,7 +20,7 @@ checker knows the throw only.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add, mul
@@ -231,11 +231,6 @@ def _invariant(proof: ProofOfMap) -> Claim:
     return Claim("invariant", "proved", "", {})
 
 
-def _trapping(proof: ProofOfMap) -> Claim:
-    claim = _invariant(proof)
-    return Claim("trapping", claim.verdict, claim.reason, {})
-
-
 def _attracts_all(proof: ProofOfMap) -> Claim:
     graph, attracting = proof.graph, proof.component >= 0
     sets, parts = graph.recurrent_components(), graph.components()
@@ -413,21 +408,16 @@ def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
     step = _stepped(proof, at.lo, at.hi, cycle)
     if isinstance(step, str):
         return step
-    points = list(zip(at.lo, at.hi, strict=True))
     if any(
-        _meet(points[0], points[k])
+        ((at.lo[0] <= at.hi[k]) & (at.lo[k] <= at.hi[0])).all()
         for k in range(1, cycle.period)
         if cycle.period % k == 0 and cycle.side[k] == cycle.side[0]
     ):
         return "its period may be smaller"
-    if not _within(proof.cells, *points[0], int(cycle.side[0])):
+    if not _within(proof.cells, at.lo[0], at.hi[0], int(cycle.side[0])):
         return "its box is not in the attracting cells"
     slope = _slope(step[1])
     return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
-
-
-def _meet(one: tuple[Array, Array], two: tuple[Array, Array]) -> bool:
-    return bool(((one[0] <= two[1]) & (two[0] <= one[1])).all())
 
 
 def _within(cells: CellSet, lo: Array, hi: Array, side: int) -> bool:
@@ -477,11 +467,11 @@ def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[
 # ---------------------------------------------------------------- all together
 
 
-PROVERS = {
+PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "attracts-all": _attracts_all,
     "expanding": _expanding,
     "invariant": _invariant,
-    "trapping": _trapping,
+    "trapping": lambda proof: replace(_invariant(proof), claim="trapping"),
 }
 CLAIMS_OF_MAP = (*PROVERS, "cycles")
 """What can be claimed of any map."""

@@ -166,6 +166,13 @@ def cuts(goals: Sequence[Goal], sides: int) -> dict[int, list[float]]:
     return {side: wanted + [end for on, *ends in laid if on == side for end in ends] for side in range(sides)}
 
 
+COMES = {
+    "every": "Every start on the arm comes to the attracting cells.",
+    "almost-every": "Every start on the arm comes to the attracting cells, but for starts of total length zero.",
+    "cells": "Only some starts are proved to come to the attracting cells.",
+}
+
+
 def sentence(section: Mapping[str, Any]) -> str:
     """Put a proved goal in words for people, from its section of the certificate."""
     said = KINDS[section["kind"]].sentence(section)
@@ -174,12 +181,8 @@ def sentence(section: Mapping[str, Any]) -> str:
         return _of_laid(section, said)
     if section.get("from_anywhere") or starts is None:
         return said
-    if starts == "every":
-        return f"{said} Every start on the arm comes to the attracting cells."
-    if starts == "almost-every":
-        return f"{said} Every start on the arm comes to the attracting cells, but for starts of total length zero."
-    if starts == "cells":
-        return f"{said} Only some starts are proved to come to the attracting cells."
+    if isinstance(starts, str):
+        return f"{said} {COMES[starts]}"
     beyond = ", ".join(f"x > {float.fromhex(x):.6g} on side {side}" for side, x in starts["from"].items())
     but = ", but for starts of total length zero" if "thinning" in section else ""
     return f"{said} Every start with {beyond} comes to the attracting cells{but}."

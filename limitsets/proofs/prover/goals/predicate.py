@@ -6,7 +6,6 @@ predicate if it is false at both ends and in the middle of the enclosure of the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -82,8 +81,9 @@ def _throughout(goal: Predicate, last: State) -> bool:
     return not _good(goal, x, x, last.side).any()
 
 
-def _sentence(section: Mapping[str, Any]) -> str:
-    return f"In the attracting cells: {section['name']}, as its code says."
-
-
-KIND = Kind(_prove, _refute, _sentence, lambda goal: goal.cuts)
+KIND = Kind(
+    _prove,
+    _refute,
+    lambda section: f"In the attracting cells: {section['name']}, as its code says.",
+    lambda goal: goal.cuts,
+)
