@@ -26,6 +26,7 @@ from .file import (
     require,
     rounded,
     rows,
+    section_alone,
     table,
 )
 from .landings import MOST_PLACE, Chain, Noisy
@@ -61,12 +62,9 @@ class Chances(NamedTuple):
 
 def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chances:
     """Read a file; raises BadFileError."""
-    (claim,) = rows(header["claims"], "claims of probabilities", 1, 1)
-    table(claim, "a claim", "claim section")
     keys = "scene laws starts absorbing strata names quantiles mean"
-    section = table(claim["section"], "section of probabilities", keys)
-    alone = header["boxes"] == [] and header["noise"] is None and header["tolerance"] is None
-    require(alone, "a file of probabilities has no boxes, no other noise and no tolerance")
+    nothing = "a file of probabilities has no boxes, no other noise and no tolerance"
+    section = section_alone(header, "probabilities", "probabilities", keys, nothing)
     laws = read_laws(section["laws"])
     scene = read_scene(section["scene"], laws)
     require(

@@ -16,7 +16,7 @@ import numpy as np
 
 from .balls import Array
 from .cells import SMALL, workers_ignore_interrupts
-from .file import KINDS, Quantity, plain, quantity, read_array, require, rows, table
+from .file import KINDS, OTHERS, Arrays, Quantity, plain, quantity, require, rows, section_alone, table
 from .region import (
     GOAL_PROVED,
     GOAL_REFUTED,
@@ -67,25 +67,17 @@ class Plane(NamedTuple):
 
 def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
     """Read a file; raises BadFileError."""
-    (claim,) = rows(header["claims"], "claims of a plane", 1, 1)
-    table(claim, "a claim", "claim section")
-    section = table(claim["section"], "section of region", "scene axes")
-    alone = header["boxes"] == [] and header["noise"] is None and header["tolerance"] is None
-    require(alone, "a plane has no boxes, no noise and no tolerance")
+    nothing = "a plane has no boxes, no noise and no tolerance"
+    section = section_alone(header, "region", "a plane", "scene axes", nothing)
     raw = section["scene"]
     n_sides = len(read_scene(raw, None).sides)
     axes = [read_axis(one, raw) for one in rows(section["axes"], "axes", 2, 2)]
     require(axes[0].name != axes[1].name, "both axes are the same quantity")
-    said, read = header["arrays"], set[str]()
-    require(isinstance(said, dict), "arrays is not an object")
-
-    def array(name: str, dtype: str, columns: int) -> Array:
-        require(f"{name}.npy" in entries, f"array {plain(name)} is missing")
-        read.add(name)
-        return read_array(entries[f"{name}.npy"], name, dtype, columns, said.get(name))
+    arrays = Arrays(header["arrays"], entries)
+    array = arrays.read
 
     def either(name: str, columns: int) -> Array:
-        described = said.get(name)
+        described = arrays.said.get(name)
         dtype = described.get("dtype") if isinstance(described, dict) else None
         require(dtype in WHOLE, f"array {name} does not hold whole numbers")
         return array(name, str(dtype), columns)
@@ -111,9 +103,7 @@ def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
     blocks, chain = array("blocks", "<i4", 3 + 3 * n_sides), array("chain", "<i4", 3)
     ends = array("chain.ends", "<f8", 2)
     require(len(ends) == len(chain), "the arrays of the orbits do not fit")
-    require(
-        read == set(said) and {f"{name}.npy" for name in read} == set(entries), "there are other arrays too"
-    )
+    arrays.require_no_others(OTHERS, OTHERS)
     return Plane(
         raw,
         axes,

@@ -15,16 +15,18 @@ from .balls import Array
 from .cells import Crew, first_bad, marked, targets_of, tasks_of
 from .file import (
     LENGTHS,
+    OTHERS,
+    Arrays,
     Cells,
     Quantity,
     hex_float,
     plain,
     quantity,
-    read_array,
     read_side,
     require,
     rounded,
     rows,
+    section_alone,
     table,
 )
 from .model import FULL_TURN
@@ -80,11 +82,8 @@ class Policy(NamedTuple):
 
 def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Policy:
     """Read a file; raises BadFileError."""
-    (claim,) = rows(header["claims"], "claims of a policy", 1, 1)
-    table(claim, "a claim", "claim section")
-    section = table(claim["section"], "section of policy", "scene mode goal starts within first")
-    alone = header["boxes"] == [] and header["tolerance"] is None
-    require(alone, "a policy has no boxes and no tolerance")
+    keys, nothing = "scene mode goal starts within first", "a policy has no boxes and no tolerance"
+    section = section_alone(header, "policy", "a policy", keys, nothing, noisy=True)
     raw, noise = section["scene"], header["noise"]
     require(isinstance(raw, dict) and "feedback" in raw, "the scene has no feedback")
     require("goal" not in raw, "the scene has a goal of its own")
@@ -169,15 +168,8 @@ def read_arrays(
     said: object, entries: dict[str, memoryview], throws: int, n_sides: int, answers: int
 ) -> tuple[list[Cells], tuple[Array, Array, Array, Array]]:
     """Read the cells with the images under every throw, and the table."""
-    require(isinstance(said, dict), "arrays is not an object")
-    assert isinstance(said, dict)
-    read = set[str]()
-
-    def array(name: str, dtype: str, columns: int = 1) -> Array:
-        require(f"{name}.npy" in entries, f"array {name} is missing")
-        read.add(name)
-        return read_array(entries[f"{name}.npy"], name, dtype, columns, said.get(name))
-
+    arrays = Arrays(said, entries)
+    array = arrays.read
     edges = [array(f"edges.{i}", "<f8") for i in range(n_sides)]
     require(all(len(e) >= 2 and bool((np.diff(e) > 0).all()) for e in edges), "the borders do not ascend")
     n = sum(len(e) - 1 for e in edges)
@@ -201,8 +193,7 @@ def read_arrays(
     belief = array("belief", "<i4", 3)
     require(0 < len(throw) <= MOST_STATES, "there are no states, or too many")
     require(len(throw) == len(left) == len(after), "the table does not have one row for each state")
-    named = read == set(said) and {f"{name}.npy" for name in read} == set(entries)
-    require(named, "there are other arrays too")
+    arrays.require_no_others(OTHERS, OTHERS)
     return cells, (throw, left, after.reshape(len(throw), answers), belief)
 
 

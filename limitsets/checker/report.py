@@ -21,6 +21,7 @@ from .claims import CLAIMS, check_box_claims, read_claims
 from .feeding import verdict_of_feeds
 from .file import (
     KINDS,
+    Arrays,
     BadFileError,
     Cells,
     claims_a,
@@ -182,11 +183,14 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
     scenes = [read_scene(scene, header["noise"]) for scene in raw]
     same = all(model == (scene["model"]["flight"], scene["model"]["flip"]) for scene in raw)
     require(same, "map and scene name different models")
-    require(isinstance(header["arrays"], dict), "arrays is not an object")
+    arrays = Arrays(header["arrays"], entries)
     n_sides = len(scenes[0].sides)
     require(all(len(s.sides) == n_sides for s in scenes), "the boxes do not have the same number of sides")
-    cells = [read_cells(entries, header["arrays"], prefix, n_sides) for prefix in prefixes]
-    require_no_more_arrays(header["arrays"], entries, prefixes, n_sides)
+    cells = [read_cells(arrays, prefix, n_sides) for prefix in prefixes]
+    arrays.require_no_others(
+        "the header describes arrays that do not belong there",
+        "arrays.npz holds entries that do not belong there",
+    )
     claims, unknown = read_claims(header["claims"], n_sides)
     parameters = [b["parameters"] for b in boxes]
     noise, tolerance = header["noise"], header["tolerance"]
@@ -201,17 +205,6 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
         claims=claims,
         unknown=unknown,
     )
-
-
-def require_no_more_arrays(
-    said: dict[str, Any], entries: dict[str, memoryview], prefixes: list[str], n_sides: int
-) -> None:
-    """Require that header and file hold the arrays of the boxes and no others."""
-    expected = {p + name for p in prefixes for name in ["jog", "flip", "branch", "rank", "component", "phi"]}
-    expected |= {f"{p}edges.{i}" for p in prefixes for i in range(n_sides)}
-    require(set(said) == expected, "the header describes arrays that do not belong there")
-    named = set(entries) == {f"{name}.npy" for name in expected}
-    require(named, "arrays.npz holds entries that do not belong there")
 
 
 def recheck(
