@@ -21,7 +21,7 @@ from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction, attraction
 from limitsets.proofs.prover.certificate import arrays_of
-from limitsets.proofs.prover.cover import cover, met
+from limitsets.proofs.prover.cover import cell_ends, cover, met
 from limitsets.proofs.prover.goals import cuts, prove
 from limitsets.proofs.prover.goals.kind import above, throws_to_reach
 from limitsets.proofs.prover.goals.violating_orbits import MORE_THAN_ROUNDING, middle
@@ -455,17 +455,12 @@ def _may_violate(attracting: Attraction, scene: Scene) -> bool:
 def blocks_of(attracting: Attraction) -> tuple[Block, ...]:
     """Say of each attracting component what it is proved to be like."""
     grid, arrays = attracting.cover.grid, arrays_of(attracting, "")
-    jog, flip = arrays["jog"], arrays["flip"]
+    jog, flip, (on, _, _) = arrays["jog"], arrays["flip"], cell_ends(grid)
     blocks = []
     for number in range(int(attracting.component.max(initial=-1)) + 1):
         inside = attracting.component == number
-        sides = []
-        for side in range(grid.sides):
-            own = np.zeros_like(inside)
-            own[grid.of_side(side)] = True
-            sides.append(own)
         extents = CellSet(grid, inside).extents()
-        visits = {side: visit(jog, flip, inside, own) for side, own in enumerate(sides)}
+        visits = {side: visit(jog, flip, inside, on == side) for side in range(grid.sides)}
         jogs = {side: each for side, each in visits.items() if each is not None}
         blocks.append(
             Block(extents, _bands(attracting, inside, extents), jogs, _order(extents, jogs, grid.sides))
@@ -485,13 +480,10 @@ def _bands(
     attracting: Attraction, inside: Mask, extents: Mapping[int, list[tuple[float, float]]]
 ) -> dict[int, int]:
     """Count the intervals of each side to which every orbit of the block comes."""
-    grid = attracting.cover.grid
-    bands = {}
+    on, low, _ = cell_ends(attracting.cover.grid)
+    bands = dict.fromkeys(extents, 0)
     for side, parts in extents.items():
-        bands[side] = 0
-        low = grid.edges[side][0][:-1]
         for lo, hi in parts:
-            wanted = np.zeros_like(inside)
-            wanted[grid.of_side(side)] = (low >= lo) & (low < hi)
-            bands[side] += not throws_to_reach(attracting, inside, wanted & inside)[1].size
+            wanted = inside & (on == side) & (low >= lo) & (low < hi)
+            bands[side] += not throws_to_reach(attracting, inside, wanted)[1].size
     return bands

@@ -16,7 +16,7 @@ from limitsets.feeder.scene.scene import require_rests
 from limitsets.proofs.policies.game import Game, game_of, image_of
 from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.certifying import spelled_deviations
-from limitsets.proofs.prover.cover import Cover, cover_on, cut_at
+from limitsets.proofs.prover.cover import Cover, cell_ends, cover_on, cut_at
 from limitsets.proofs.prover.parameters import ParameterBox, joined, parameter_box, scattered
 from limitsets.systems.cells import CellSet, Domain, Grid, grid
 
@@ -111,9 +111,9 @@ def board_of(
     cells_of = _cells(
         scene, boxes, cells, {x, *cuts, *([starts] if isinstance(starts, float) else [])}, named
     )
-    beyond = np.concatenate([edges[:-1] >= x for (edges,) in cells_of.edges])
-    target = np.zeros(cells_of.n_cells, dtype=bool)
-    target[cells_of.of_side(side)] = beyond[cells_of.of_side(side)]
+    on, lo, _ = cell_ends(cells_of)
+    beyond = lo >= x
+    target = beyond & (on == side)
     covers = {}
     for k, (name, box) in enumerate(boxes.items()):
         if progress is not None:

@@ -16,6 +16,7 @@ import numpy as np
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.goals import Laid
 from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.cover import cell_ends
 from limitsets.proofs.prover.orbits import replay
 from limitsets.proofs.prover.parameters import ParameterBox
 from limitsets.systems.cells import Grid
@@ -265,9 +266,8 @@ def one_throw(
     attraction: Attraction, wrong: Wrong, up_to: float = math.inf, laid: Laid = ()
 ) -> tuple[State, ...]:
     """Find a start, laid down up to some x, whose next landing violates the goal, and prove it; empty if none is."""
-    grid, box = attraction.cover.grid, attraction.cover.box
-    x = np.concatenate([0.5 * (edges[:-1] + edges[1:]) for (edges,) in grid.edges])
-    side = np.repeat(np.arange(grid.sides), [edges.size - 1 for (edges,) in grid.edges])
+    box, (side, lo, hi) = attraction.cover.box, cell_ends(attraction.cover.grid)
+    x = 0.5 * (lo + hi)
     good = (x < up_to) & _lies_in(laid, x, side)
     x, side = x[good], side[good]
     if not x.size:
