@@ -26,6 +26,7 @@ from .file import (
     require,
     rounded,
     rows,
+    section_alone,
     table,
 )
 from .landings import MOST_PLACE, Chain, Noisy
@@ -59,22 +60,11 @@ class Chances(NamedTuple):
     mean: tuple[float, float] | None
 
 
-def holds_chances(header: dict[str, Any]) -> bool:
-    """Whether a file claims probabilities."""
-    claims = header.get("claims")
-    return isinstance(claims, list) and any(
-        isinstance(c, dict) and c.get("claim") == "probabilities" for c in claims
-    )
-
-
 def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chances:
     """Read a file; raises BadFileError."""
-    (claim,) = rows(header["claims"], "claims of probabilities", 1, 1)
-    table(claim, "a claim", "claim section")
     keys = "scene laws starts absorbing strata names quantiles mean"
-    section = table(claim["section"], "section of probabilities", keys)
-    alone = header["boxes"] == [] and header["noise"] is None and header["tolerance"] is None
-    require(alone, "a file of probabilities has no boxes, no other noise and no tolerance")
+    nothing = "a file of probabilities has no boxes, no other noise and no tolerance"
+    section = section_alone(header, "probabilities", "probabilities", keys, nothing)
     laws = read_laws(section["laws"])
     scene = read_scene(section["scene"], laws)
     require(

@@ -52,6 +52,26 @@ def range_max(values: Array, first: Array, last: Array) -> Array:
     return out
 
 
+def marked(ranges: Array, n: int) -> Array:
+    """Mark the cells of some ranges, each given by its first and its last one."""
+    begin, past = (np.bincount(at, minlength=n + 1) for at in (ranges[:, 0], ranges[:, 1] + 1))
+    return np.asarray(np.cumsum((begin - past)[:-1]) > 0)
+
+
+def targets_of(ways: list[Array], cells: Array) -> Array:
+    """Find the cells that are targets of some cells, along the ways given."""
+    return marked(np.concatenate([way[cells & (way[:, 0] >= 0)] for way in ways]), len(cells))
+
+
+def leading_into(c: Cells, cells: Array) -> Array:
+    """Find the cells from which a throw may lead to some cells."""
+    count, leading = np.concatenate([[0], np.cumsum(cells)]), np.zeros(len(cells), dtype=bool)
+    for way in (c.jog, c.flip):
+        q = np.flatnonzero(way[:, 0] >= 0)
+        leading[q] |= count[way[q, 1] + 1] > count[way[q, 0]]
+    return leading
+
+
 def check_structure(c: Cells, scene: Scene) -> str:
     """Check order of the edges, brackets, branches and targets, which every claim needs; "" or the reason."""
     n_sides = len(c.edges)

@@ -4,7 +4,8 @@ docs/certificates.md, "What is claimed", and the end of "Goals, end points, orbi
 """
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,18 +25,6 @@ from .refutations import (
 )
 from .scene import Scene, check_by_halves
 
-SECTIONS = {  # the known claims, and the keys of their sections
-    "attracts-all": "near_joint max_rank",
-    "invariant": "",
-    "trapping": "",
-    "goal": "kind",  # further keys depend on the kind, see GOALS
-    "expanding": "least_slope",
-    "end-points": "images ends pieces",
-    "cycles": "cycles complete",
-    "refuted": "goal nominal tolerance",
-    "feeds": "side",
-}
-MORE_KEYS = {"refuted": "recurs start throws", "feeds": FEEDS_KEYS}  # further keys that a section may have
 Failed = tuple[list[str], str]  # the claims that fail, and the reason
 
 
@@ -46,7 +35,7 @@ def read_claims(value: object, n_sides: int) -> tuple[dict[str, dict[str, Any]],
     for claim in rows(value, "claims", 1, 100):
         table(claim, "a claim", "claim", "section")
         name, section = claim["claim"], claim.get("section")
-        if not isinstance(name, str) or name not in SECTIONS:
+        if not isinstance(name, str) or name not in CLAIMS:
             unknown.append((plain(name), "not rechecked", "this checker does not know the claim"))
         elif section is None:
             unknown.append((name, "not rechecked", "the claim has no section"))
@@ -54,33 +43,25 @@ def read_claims(value: object, n_sides: int) -> tuple[dict[str, dict[str, Any]],
             unknown.append((name, "not rechecked", "this checker does not know the kind of goal"))
         else:
             require(name not in known, f"claim {name} is made twice")
-            if name == "goal":
-                known[name] = read_goal_claim(section, n_sides)
-            else:
-                section = table(section, f"section of {name}", SECTIONS[name], MORE_KEYS.get(name, ""))
-                known[name] = read_section(name, section, n_sides)
+            kind = CLAIMS[name]
+            if name != "goal":  # whose keys depend on its kind, see GOALS
+                section = table(section, f"section of {name}", kind.keys, kind.more)
+            known[name] = kind.read(section, n_sides)
     return known, unknown
 
 
-def read_section(name: str, section: dict[str, Any], n_sides: int) -> dict[str, Any]:
-    """Read the section of any claim but `goal`."""
-    if name == "attracts-all":
-        q, fixed = read_near_hinge(section["near_joint"], n_sides)
-        require(type(section["max_rank"]) is int, "max_rank is not an integer")
-        return {"q": q, "fixed": fixed, "max_rank": section["max_rank"]}
-    if name == "expanding":
-        least = hex_float(section["least_slope"], "least_slope")
-        require(least > 1, "least_slope is not above 1")
-        return {"least": least}
-    if name == "end-points":
-        return read_ends(section, n_sides)
-    if name == "cycles":
-        return read_orbits(section, n_sides)
-    if name == "refuted":
-        return read_refutation(section, n_sides)
-    if name == "feeds":
-        return read_feeds(section, n_sides)
-    return {}
+def read_attracts_all(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
+    """Read the section of attracts-all."""
+    q, fixed = read_near_hinge(section["near_joint"], n_sides)
+    require(type(section["max_rank"]) is int, "max_rank is not an integer")
+    return {"q": q, "fixed": fixed, "max_rank": section["max_rank"]}
+
+
+def read_expanding(section: dict[str, Any], _: int) -> dict[str, Any]:
+    """Read the section of expanding."""
+    least = hex_float(section["least_slope"], "least_slope")
+    require(least > 1, "least_slope is not above 1")
+    return {"least": least}
 
 
 def check_box_claims(
@@ -168,35 +149,54 @@ def check_throws_of_cells(
     return failed
 
 
-def statement_of(name: str, section: dict[str, Any], noisy: bool) -> str:
-    """Put a claim in words."""
-    if name == "attracts-all":
-        if None not in section["fixed"]:
-            return fixed_points_in_words(section, noisy)
-        return (
-            f"attracts-all: every start a_i < x <= arm.length on every side i enters the attracting cells and stays in"
-            f" them, within {section['max_rank']} throws where x is in the cells; nearer to the joint x - a_i grows by"
-            f" a factor of at least {rounded(min(section['q']), up=False)} with every throw"
-        )
-    if name == "goal":
-        return statement_of_goal(section, noisy)
-    if name == "expanding":
-        least = section["least"]
-        entropy = "" if noisy else f"; topological entropy >= ln({least!r}) >= {entropy_of(least)}"
-        return f"expanding: |dR'/dR| >= {least!r} on the attracting cells{entropy}"
-    if name == "end-points":
-        return ends_statement(section, noisy)
-    if name == "cycles":
-        return orbits_statement(section)
-    if name == "refuted":
-        return statement_of_refutation(section)
-    if name == "feeds":
-        return feeds_statement(section, noisy)
-    if name == "trapping":
-        return "trapping: the attracting cells are mapped into their interior (relative to x <= arm.length)"
-    return "invariant: no throw leaves the attracting cells, nor the component it starts in"
+def attracts_all_statement(section: dict[str, Any], noisy: bool) -> str:
+    """Put attracts-all in words."""
+    if None not in section["fixed"]:
+        return fixed_points_in_words(section, noisy)
+    return (
+        f"attracts-all: every start a_i < x <= arm.length on every side i enters the attracting cells and stays in"
+        f" them, within {section['max_rank']} throws where x is in the cells; nearer to the joint x - a_i grows by"
+        f" a factor of at least {rounded(min(section['q']), up=False)} with every throw"
+    )
+
+
+def expanding_statement(section: dict[str, Any], noisy: bool) -> str:
+    """Put expanding in words."""
+    least = section["least"]
+    entropy = "" if noisy else f"; topological entropy >= ln({least!r}) >= {entropy_of(least)}"
+    return f"expanding: |dR'/dR| >= {least!r} on the attracting cells{entropy}"
 
 
 def entropy_of(least: float) -> str:
     """Write the logarithm of a slope, rounded down by more than its error."""
     return rounded(math.log(least) * (1 - 2.0**-40), up=False, digits=6)
+
+
+class Kind(NamedTuple):
+    """A claim that is known: the keys of its section and those that it may have, how it is read, and put in words."""
+
+    keys: str
+    read: Callable[[dict[str, Any], int], dict[str, Any]]
+    statement: Callable[[dict[str, Any], bool], str]
+    more: str = ""
+
+
+INVARIANT = "invariant: no throw leaves the attracting cells, nor the component it starts in"
+TRAPPING = "trapping: the attracting cells are mapped into their interior (relative to x <= arm.length)"
+CLAIMS = {
+    "attracts-all": Kind("near_joint max_rank", read_attracts_all, attracts_all_statement),
+    "invariant": Kind("", lambda _, __: {}, lambda _, __: INVARIANT),
+    "trapping": Kind("", lambda _, __: {}, lambda _, __: TRAPPING),
+    "goal": Kind("kind", read_goal_claim, statement_of_goal),
+    "expanding": Kind("least_slope", read_expanding, expanding_statement),
+    "end-points": Kind("images ends pieces", read_ends, ends_statement),
+    "cycles": Kind("cycles complete", read_orbits, lambda section, _: orbits_statement(section)),
+    "refuted": Kind(
+        "goal nominal tolerance",
+        read_refutation,
+        lambda section, _: statement_of_refutation(section),
+        more="recurs start throws",
+    ),
+    "feeds": Kind("side", read_feeds, feeds_statement, more=FEEDS_KEYS),
+}
+"""The claims that are known."""

@@ -13,7 +13,7 @@ import numpy as np
 from flint import arb
 
 from .balls import Array, UnprovedError, exact, float_above, float_below, prove
-from .cells import Crew, Task, check_structure, extents, first_bad, tasks_of
+from .cells import Crew, Task, check_structure, extents, first_bad, leading_into, tasks_of
 from .file import Cells, by_side, decimal, hex_float, read_side, require, table
 from .near_hinge import (
     check_all_jog,
@@ -126,11 +126,7 @@ def cells_ahead(end: ArmEnd, scene: Scene, side: int) -> Array | None:
 
 def thrown_into(end: ArmEnd, places: Array, gaps: list[bool]) -> Array:
     """Find the cells from which a throw may lead to the places, or before the first cell of the sides in `gaps`."""
-    c, count = end.c, np.concatenate([[0], np.cumsum(places)])
-    hit = np.zeros(len(places), dtype=bool)
-    for array in (c.jog, c.flip):
-        q = np.flatnonzero(array[:, 0] >= 0)
-        hit[q] |= count[array[q, 1] + 1] > count[array[q, 0]]
+    hit = leading_into(end.c, places)
     for some, gap in zip(end.inward, gaps, strict=True):
         hit |= some & gap
     return hit

@@ -329,6 +329,24 @@ def open_certificate(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict
     return header, stored_entries(entries["arrays.npz"], 60_000, "arrays.npz")
 
 
+def claims_a(word: str, header: dict[str, Any]) -> bool:
+    """Whether a file makes a claim."""
+    claims = header.get("claims")
+    return isinstance(claims, list) and any(isinstance(c, dict) and c.get("claim") == word for c in claims)
+
+
+def section_alone(
+    header: dict[str, Any], word: str, of: str, keys: str, nothing: str, *, noisy: bool = False
+) -> dict[str, Any]:
+    """Return the section of a claim that stands alone in a file, which says so for a file with more in it."""
+    (claim,) = rows(header["claims"], f"claims of {of}", 1, 1)
+    table(claim, "a claim", "claim section")
+    section = table(claim["section"], f"section of {word}", keys)
+    quiet = header["tolerance"] is None and (noisy or header["noise"] is None)
+    require(header["boxes"] == [] and quiet, nothing)
+    return section
+
+
 @dataclass
 class Cells:
     """The arrays of one box; the cells of all sides stand one after another."""
@@ -363,13 +381,34 @@ class Cells:
         return f"side {side}, cell {cell}, x in [{float(self.edges[side][k])!r}, {float(self.edges[side][k + 1])!r}]"
 
 
-def read_cells(entries: dict[str, memoryview], said: dict[str, Any], prefix: str, sides: int) -> Cells:
+OTHERS = "there are other arrays too"
+
+
+class Arrays:
+    """The arrays of a file, read one by one, as its header describes them; `names` are those that were read."""
+
+    def __init__(self, said: object, entries: dict[str, memoryview]):
+        require(isinstance(said, dict), "arrays is not an object")
+        assert isinstance(said, dict)
+        self.said, self.entries, self.names = said, entries, set[str]()
+
+    def read(self, name: str, dtype: str, columns: int = 1) -> Array:
+        """Read one."""
+        require(f"{name}.npy" in self.entries, f"array {name} is missing")
+        self.names.add(name)
+        return read_array(self.entries[f"{name}.npy"], name, dtype, columns, self.said.get(name))
+
+    def require_no_others(self, described: str, held: str) -> None:
+        """Require that header and file have the arrays that were read and no others; else say which has."""
+        require(set(self.said) == self.names, described)
+        require(set(self.entries) == {f"{name}.npy" for name in self.names}, held)
+
+
+def read_cells(arrays: Arrays, prefix: str, sides: int) -> Cells:
     """Read the arrays of one box, and check that their lengths fit each other."""
 
     def read(name: str, dtype: str, columns: int = 1) -> Array:
-        require(f"{prefix}{name}.npy" in entries, f"array {prefix}{name} is missing")
-        key = prefix + name
-        return read_array(entries[f"{key}.npy"], key, dtype, columns, said.get(key))
+        return arrays.read(prefix + name, dtype, columns)
 
     edges = [read(f"edges.{i}", "<f8") for i in range(sides)]
     require(all(len(e) >= 2 for e in edges), "a side has no cells")
@@ -378,6 +417,6 @@ def read_cells(entries: dict[str, memoryview], said: dict[str, Any], prefix: str
         rank=read("rank", "<i4"), component=read("component", "<i4"), phi=read("phi", "<f8", 2),
     )  # fmt: skip
     n = len(cells.side)
-    arrays = (cells.jog, cells.flip, cells.branch, cells.rank, cells.component, cells.phi)
-    require(all(len(array) == n for array in arrays), "the arrays do not have one row for each cell")
+    rows_of = (cells.jog, cells.flip, cells.branch, cells.rank, cells.component, cells.phi)
+    require(all(len(array) == n for array in rows_of), "the arrays do not have one row for each cell")
     return cells

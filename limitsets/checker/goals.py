@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .cells import first_bad, range_max
+from .cells import first_bad, leading_into, range_max, targets_of
 from .file import LENGTHS, Cells, quantity, require, rows, table
 from .near_hinge import check_everywhere, check_thinning, near_landing, not_arriving
 from .scene import Scene
@@ -178,18 +178,11 @@ def check_one_component(c: Cells) -> str:
     inside = c.component >= 0
     start = np.zeros(len(inside), dtype=bool)
     start[np.argmax(inside)] = True
-    ways = [(array, np.flatnonzero((array[:, 0] >= 0) & inside)) for array in (c.jog, c.flip)]
     forward, backward = start.copy(), start.copy()
     while True:
         before = int(forward.sum()) + int(backward.sum())
-        count = np.concatenate([[0], np.cumsum(backward)])
-        marks = np.zeros(len(inside) + 1, dtype=np.int64)
-        for array, q in ways:
-            own = q[forward[q]]
-            np.add.at(marks, array[own, 0], 1)
-            np.add.at(marks, array[own, 1] + 1, -1)
-            backward[q] |= count[array[q, 1] + 1] > count[array[q, 0]]
-        forward |= np.cumsum(marks[:-1]) > 0
+        forward |= targets_of([c.jog, c.flip], forward & inside)
+        backward |= leading_into(c, backward) & inside
         if int(forward.sum()) + int(backward.sum()) == before:
             break
     connected = ~inside | (forward & backward)

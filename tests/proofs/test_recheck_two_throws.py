@@ -293,7 +293,7 @@ def test_the_kinds_hold_all_that_two_throws_of_an_orbit_do(good):
     raw = forge.scene("designed")
     raw["throw"]["kappa"] = f"{25.3778518 / (1 - 0.007) ** 2!r} in"
     plain = forge.Plain(raw)
-    cells = checker.file.read_cells(entries_of(f), f.header["arrays"], "0.", 3)
+    cells = checker.file.read_cells(checker.file.Arrays(f.header["arrays"], entries_of(f)), "0.", 3)
     bad = (cells.side != 2) & (cells.upper() > 19.0) & (cells.component >= 0)
     kinds = {tuple(kind): ranges for kind, ranges in checker.two_throws.kinds_of_two(cells, bad)}
     x, side, path = np.full(1, 15.0), np.full(1, 2), []

@@ -20,8 +20,8 @@ from limitsets.parameters.margins import brackets
 from limitsets.parameters.margins import single as finding
 from limitsets.parameters.margins.deviations import Tolerance, corners, deviation_scale, worst_corner
 from limitsets.parameters.margins.joint import joint_margin, sensitivity_of
+from limitsets.parameters.margins.margin_result import Margin
 from limitsets.parameters.sheet import sheet_run
-from limitsets.parameters.sheet.entries import Entry
 from limitsets.proofs.prover.certifying import certify
 from limitsets.proofs.prover.query import Query
 from tests.plates import plate
@@ -394,25 +394,25 @@ def test_a_sheet_goes_on_without_the_margin_that_fails(monkeypatch, capfd, tmp_p
     assert f"No joint margin: {BUG}." in page
 
 
-def entry(quantity, proved, refuted, unit, nominal, of, reason=""):
-    return Entry(
-        quantity,
-        "fixed",
-        (),
-        proved,
-        refuted,
-        unit,
-        nominal,
-        of,
-        False,
-        reason,
-        None,
-        (),
-        (),
-        None,
-        1,
-        0.0,
-        None,
+def made_up(scene, quantity, proved, refuted, unit, reason=""):
+    """A margin of a scene, as if it were found."""
+    return Margin(
+        quantity=quantity,
+        reading="fixed",
+        goals=(),
+        proved=proved,
+        refuted=refuted,
+        unit=unit,
+        nominal=None,
+        reason=reason,
+        closed=False,
+        seconds=0.0,
+        scene=scene,
+        tolerance={},
+        deviations={},
+        noise={},
+        pieces=(),
+        against=None,
     )
 
 
@@ -420,11 +420,11 @@ def test_the_csv_of_a_sheet_has_each_value_as_the_scene_gives_it():
     """62 mm was 61.99999999999999, 0 mm and the height of a margin of 0 were empty, and 34.5449 g stood beside %."""
     scene = ls.load(OVER_THE_JOINT)
     rows = [
-        entry("part.vertices[2].x", 4.211134, 4.23655332, "mm", 62.0, "mm"),
-        entry("part.vertices[0].x", 2.39729481, None, "mm", 0.0, "mm"),
-        entry("part.mass.points[0].mass", 28.8570625, None, "%", 34.5449, "g"),
-        entry("arm.surface_height", 0.0, 5.9, "mm", -3.8895, "mm"),
-        entry("landing.x", 2.0, None, "mm", None, "mm"),
+        made_up(scene, "part.vertices[2].x", 4.211134, 4.23655332, "mm"),
+        made_up(scene, "part.vertices[0].x", 2.39729481, None, "mm"),
+        made_up(scene, "part.mass.points[0].mass", 28.8570625, None, "%"),
+        made_up(scene, "arm.surface_height", 0.0, 5.9, "mm"),
+        made_up(scene, "landing.x", 2.0, None, "mm"),
     ]
     sheet = ls.robustness(
         "paper-designed", "throw.speed", reading="fixed", width=0.5, leave_out=ALL_BUT_MARGINS
@@ -440,7 +440,7 @@ def test_a_page_tells_the_reason_of_a_margin_of_nothing(tmp_path):
     sheet = ls.robustness(
         "paper-designed", "throw.speed", reading="fixed", width=0.5, leave_out=ALL_BUT_MARGINS
     )
-    denied = entry("arm.surface_height", 0.0, 0.1, "in", -0.397, "in", "the checker does not confirm it")
+    denied = made_up(sheet.scene, "arm.surface_height", 0.0, 0.1, "in", "the checker does not confirm it")
     page = robustness_page(replace(sheet, entries=(*sheet.entries, denied)), {})
     assert "Where the two columns are apart" in page
     assert "the proof ends with: the checker does not confirm it" in page

@@ -69,13 +69,12 @@ def margin(
         margins = run(
             chosen, *(quantity or ()), reading=reading, goal=goal, laid=begins, width=width, progress=tell
         )
-        records = [each.to_json() for each in margins]
         about = About(margins[0].model, scene, chosen)
         if out is not None:
             tell("files", len(margins), len(margins) + 1)
-            margins, records = _write(margins, out, form, about, recheck=not no_recheck)
+            margins = _write(margins, out, form, about, recheck=not no_recheck)
     answer(
-        records,
+        margins,
         json,
         lambda: _text(chosen, margins, out, no_recheck=no_recheck),
         csv=(csv, lambda: joined(margins)),
@@ -103,28 +102,20 @@ def _goal_at(scene: Any, text: str) -> Any:
 
 def _write(
     given: tuple[Margin, ...], out: Path, form: str, about: About, *, recheck: bool
-) -> tuple[tuple[Margin, ...], list[dict[str, Any]]]:
-    """Write the files; return the margins and their JSON, without the claims that the checker denies."""
-    from limitsets.base.errors import AnswerError
+) -> tuple[Margin, ...]:
+    """Write the files; return the margins without the claims that the checker denies."""
     from limitsets.face.plot.margins import tolerance_box, tornado
     from limitsets.face.plot.parts import part
     from limitsets.face.report.writing import laid
     from limitsets.parameters.margins.margin_result import settled
 
-    margins, records = [], []
-    for each in given:
-        try:
-            left, paths = settled(each, out, recheck=recheck)
-        except AnswerError:  # effects: nothing rechecks them, the margin stands
-            left, paths = each, ()
-        margins.append(left)
-        records.append(left.to_json() | {"certificate": [path.name for path in paths] or None})
+    margins = tuple(settled(each, out, recheck=recheck) for each in given)
     single = [each for each in margins if each.reading != "tolerance"]
     drawn = [("part", part(given[0].scene))]
     drawn += [("margins", tornado(single))] if single else []
     drawn += [("joint", tolerance_box(each)) for each in margins if each.reading == "tolerance"]
-    laid(out, drawn, lambda _: {"margins.json": as_json(about.added(records))}, form)
-    return tuple(margins), records
+    laid(out, drawn, lambda _: {"margins.json": as_json(about.added(margins))}, form)
+    return margins
 
 
 def _text(given: SceneOf, margins: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
@@ -255,6 +246,4 @@ def _text_of_sheet(given: SceneOf, sheet: Robustness, files: list[Any]) -> None:
         reason = sheet.left_out.get(part)
         if reason and reason != "it was not asked for":
             typer.echo(f"no {part}: {reason}")
-    if sheet.again:
-        typer.echo(f"found by an earlier run: {sheet.again} of {len(sheet.entries)} margins")
     typer.echo(f"report: {files[0]}")

@@ -222,7 +222,7 @@ def counterexample(
     scene : Scene
         The scene.
     orbit : sequence of mapping
-        States with "x" and "side", as `limitsets.parameters.sheet.entries.Entry` and the JSON of a proof have them.
+        States with "x" and "side", as `Margin.orbit` and the JSON of a proof have them.
     violated : Goal, optional
         The goal that the orbit violates.
     name : str

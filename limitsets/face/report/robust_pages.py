@@ -11,11 +11,10 @@ from limitsets.base.files import as_json
 from limitsets.face import plot
 from limitsets.face.report.pages import in_time, words
 from limitsets.face.report.writing import laid
-from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches
+from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scattering import Gaussian, Law, Uniform
 from limitsets.feeder.scene.quantities import parsed_deviation
-from limitsets.parameters.margins.margin_result import bound, failing, void_of
-from limitsets.parameters.sheet.entries import Entry, in_unit_of, percent_of
+from limitsets.parameters.margins.margin_result import Margin, bound, failing, in_unit_of, percent_of, void_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +68,7 @@ def robustness_page(sheet: Robustness, figures: Mapping[str, str]) -> str:
     """
     first, noise = shown(sheet), sheet.noise
     own = next((goal for goal in sheet.goals if isinstance(goal, OrientedBeyond | Reaches)), None)
-    proofs = [name for entry in sheet.entries for name in (*entry.certificates, entry.against) if name]
+    proofs = [name for margin in sheet.entries for name in margin.files]
     return (
         words(
             "robustness",
@@ -81,7 +80,6 @@ def robustness_page(sheet: Robustness, figures: Mapping[str, str]) -> str:
             none_holds=none_holds,
             first=first,
             states=first and _states(first, sheet),
-            violated_of=violated_of,
             deviation_of=deviation_of,
             parsed_deviation=parsed_deviation,
             own=own,
@@ -92,7 +90,7 @@ def robustness_page(sheet: Robustness, figures: Mapping[str, str]) -> str:
             numbers=noise and _numbers(noise, len(sheet.scene.sides), sheet.scene.world.throw_rate),
             changes=noise and _changes(noise),
             files=list(dict.fromkeys(proofs)),
-            proved_some=any(entry.holds for entry in sheet.entries),
+            proved_some=any(margin.holds for margin in sheet.entries),
         )
         + "\n"
     )
@@ -115,52 +113,53 @@ def _told(sheet: Robustness) -> dict[str, Any]:
     }
 
 
-def tightest(sheet: Robustness) -> Entry | None:
+def tightest(sheet: Robustness) -> Margin | None:
     """Return the smallest margin: in units of its tolerance if two or more quantities have one, else of its value.
 
     A landing place has no value: its margin is compared with the shortest side.
     """
     if _by_tolerance(sheet):
-        return min(sheet.singles, key=lambda entry: _room(entry, sheet))
-    return min(sheet.singles, key=lambda entry: _share(entry, sheet), default=None)
+        return min(sheet.singles, key=lambda margin: _room(margin, sheet))
+    return min(sheet.singles, key=lambda margin: _share(margin, sheet), default=None)
 
 
 def _by_tolerance(sheet: Robustness) -> bool:
     """Whether margins are compared by their tolerances: if two or more quantities have one."""
-    return sum(_room(entry, sheet)[0] == 0 for entry in sheet.singles) > 1
+    return sum(_room(margin, sheet)[0] == 0 for margin in sheet.singles) > 1
 
 
-def _room(entry: Entry, sheet: Robustness) -> tuple[int, float]:
-    text = sheet.tolerance.get(entry.quantity)
+def _room(margin: Margin, sheet: Robustness) -> tuple[int, float]:
+    text = sheet.tolerance.get(margin.quantity)
     # in a tolerance the landing place is noise, all other quantities are fixed but unknown
-    if text is None or (entry.reading == "per-throw") != (entry.quantity == "landing.x"):
+    if text is None or (margin.reading == "per-throw") != (margin.quantity == "landing.x"):
         return 1, math.inf
-    given = parsed_deviation(text, entry.quantity)
-    low = in_unit_of(entry, entry.proved, given.unit)
+    given = parsed_deviation(text, margin.quantity)
+    low = in_unit_of(margin, margin.proved, given.unit)
     return 0, math.inf if low is None else low / float(given.number)
 
 
-def _share(entry: Entry, sheet: Robustness) -> float:
-    share = percent_of(entry, entry.proved)
+def _share(margin: Margin, sheet: Robustness) -> float:
+    share = percent_of(margin, margin.proved)
     if share is None:
-        return 100.0 * entry.proved / float(sheet.scene.sides.length.min())
+        return 100.0 * margin.proved / float(sheet.scene.sides.length.min())
     return share
 
 
 def lines_of(sheet: Robustness) -> list[list[str]]:
     """Give the table, one line per margin of a single quantity; columns as in `HEADS`."""
     rows = []
-    for entry in sheet.singles:
-        value = "-" if entry.nominal is None else f"{entry.nominal:.7g} {entry.nominal_unit}"
-        low, high = (percent_of(entry, size) for size in (entry.proved, entry.refuted))
+    for margin in sheet.singles:
+        nominal, unit = margin.given
+        value = "-" if nominal is None else f"{nominal:.7g} {unit}"
+        low, high = (percent_of(margin, size) for size in (margin.proved, margin.refuted))
         share = "-" if low is None else f"{bound(low)} / {bound(high, up=True)}"
         rows.append(
             [
-                entry.quantity,
+                margin.quantity,
                 value,
-                READINGS[entry.reading],
-                bound(entry.proved, entry.unit),
-                failing(entry.refuted, entry.unit, entry.direction),
+                READINGS[margin.reading],
+                bound(margin.proved, margin.unit),
+                failing(margin.refuted, margin.unit, margin.direction),
                 share,
             ]
         )
@@ -169,45 +168,45 @@ def lines_of(sheet: Robustness) -> list[list[str]]:
 
 def none_holds(sheet: Robustness) -> str:
     """Say in a sentence that all margins are 0, instead of a table of zeros."""
-    count = len({entry.quantity for entry in sheet.singles})
+    count = len({margin.quantity for margin in sheet.singles})
     whose = "1 quantity has" if count == 1 else f"{count} quantities have"
     why = "the goal fails already" if sheet.decided == "refuted" else "the goal is not proved of it"
-    reason = next((entry.reason for entry in sheet.singles if entry.reason), why)
+    reason = next((margin.reason for margin in sheet.singles if margin.reason), why)
     return f"{whose} no margin about the scene as it is: {reason}."
 
 
-def shown(sheet: Robustness) -> Entry | None:
+def shown(sheet: Robustness) -> Margin | None:
     """Return the margin whose orbit is shown: the tightest one, or the first with an orbit."""
     first = tightest(sheet)
     candidates = [] if first is None else [first]
-    return next((entry for entry in [*candidates, *sheet.entries] if entry.counterexample), None)
+    return next((margin for margin in [*candidates, *sheet.entries] if margin.counterexample), None)
 
 
-def deviation_of(entry: Entry) -> str:
+def deviation_of(margin: Margin) -> str:
     """Give the deviation of a quantity at the upper end of its margin, for use within a sentence."""
-    if entry.quantity == "joint":
-        return f"every quantity {bound(entry.refuted, up=True)} times its tolerance off at most"
-    at = bound(entry.refuted, entry.unit, up=True)
-    if entry.reading == "per-throw":
-        return f"{entry.quantity} off by up to {at}, chosen anew at every throw,"
-    return f"{entry.quantity} off by {at}{_value_at(entry)}, the same at every throw,"
+    if margin.quantity == "joint":
+        return f"every quantity {bound(margin.refuted, up=True)} times its tolerance off at most"
+    at = bound(margin.refuted, margin.unit, up=True)
+    if margin.reading == "per-throw":
+        return f"{margin.quantity} off by up to {at}, chosen anew at every throw,"
+    return f"{margin.quantity} off by {at}{_value_at(margin)}, the same at every throw,"
 
 
-def _value_at(entry: Entry) -> str:
+def _value_at(margin: Margin) -> str:
     """Give the value at which the orbit violates the goal, which shows the direction of the deviation."""
-    thrown = (entry.counterexample[0]["parameters"] if entry.counterexample else None) or {}
-    for name, told in ((entry.quantity, "at"), ("throw.kappa", "kappa =")):
+    thrown = (margin.orbit[0]["parameters"] if margin.orbit else None) or {}
+    for name, told in ((margin.quantity, "at"), ("throw.kappa", "kappa =")):
         given = thrown.get(name)
-        if given is not None and (name == entry.quantity or entry.quantity == "throw.speed"):
+        if given is not None and (name == margin.quantity or margin.quantity == "throw.speed"):
             value, unit = (given if isinstance(given, str) else given[0]).split()
             return f" ({told} {float(value):.6g} {unit})"
     return ""
 
 
-def _states(entry: Entry, sheet: Robustness) -> Table:
+def _states(margin: Margin, sheet: Robustness) -> Table:
     """Give the last states of an orbit as a table."""
-    orbit, unit = entry.counterexample, sheet.scene.unit
-    scattered = entry.reading == "per-throw" and entry.quantity != "landing.x"
+    orbit, unit = margin.orbit, sheet.scene.unit
+    scattered = margin.reading == "per-throw" and margin.quantity != "landing.x"
     lands = any("landing.x" in (state["parameters"] or {}) for state in orbit)
     heads = ["throws", f"x [{unit}]", "side"]
     heads += ["kappa of the next throw [%]"] * scattered + [f"it lands off by [{unit}]"] * lands
@@ -324,11 +323,6 @@ def _changes(noise: NoiseStatistics) -> Table:
     return ["with 10 % more noise of", *(NUMBERS[name][0] for name in MOVING)], rows
 
 
-def violated_of(entry: Entry, goals: Sequence[Goal]) -> Goal | None:
-    """Return the goal that the orbit of a margin violates."""
-    return None if entry.violated is None else goals[entry.violated]
-
-
 # ----------------------------------------------------------------
 # Write the tolerance sheet: page, JSON and pictures, all or none; certificates exist already.
 
@@ -336,11 +330,10 @@ def violated_of(entry: Entry, goals: Sequence[Goal]) -> Goal | None:
 def _drawn(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
     """Draw all figures of the sheet."""
     yield "part", plot.part(sheet.scene)
-    single = [each for each in sheet.margins() if each.quantity != "joint"]
-    if sheet.decided == "proved" and single:
-        yield "margins", plot.tornado(single)
+    if sheet.decided == "proved" and sheet.singles:
+        yield "margins", plot.tornado(sheet.singles)
     if sheet.joint is not None and sheet.joint.holds:
-        yield "joint", plot.tolerance_box(sheet.margins()[-1])
+        yield "joint", plot.tolerance_box(sheet.joint)
     if sheet.curve is not None:
         yield "curve", plot.margin_curve(sheet.curve)
     yield from _noise(sheet)
@@ -349,7 +342,7 @@ def _drawn(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
         name = deviation_of(first).rstrip(",") if first.holds else "the scene as it is"
         yield (
             "counterexample",
-            plot.counterexample(sheet.scene, first.counterexample, violated_of(first, sheet.goals), name),
+            plot.counterexample(sheet.scene, first.orbit, first.violated, name),
         )
 
 

@@ -379,7 +379,6 @@ def save(
     folder.mkdir(parents=True, exist_ok=True)
     scene, answer = folder / f"{design.scene.name}.toml", folder / "design.json"
     dump(design.scene, scene)
-    margins = [settled(one, folder, recheck=recheck) for one in design.margins]
-    left = replace(design, margins=tuple(one for one, _ in margins))
+    left = replace(design, margins=tuple(settled(one, folder, recheck=recheck) for one in design.margins))
     answer.write_text(as_json(left.to_json()), encoding="utf-8", newline="\n")
-    return left, (scene, answer, *(path for _, paths in margins for path in paths))
+    return left, (scene, answer, *(folder / name for one in left.margins for name in one.files))

@@ -23,15 +23,13 @@ from limitsets.feeder.scene.facts import Deviation
 from limitsets.feeder.scene.quantities import base_unit, deviation, find, parsed_deviation, text_at, texts
 from limitsets.feeder.scene.units import Quantity, exact_factor, parse
 from limitsets.proofs.prover.numbers import RationalInterval
-from limitsets.proofs.prover.parameters import VARYING, SceneBox
+from limitsets.proofs.prover.parameters import VARYING, SceneBox, decimal
 
 READINGS = ("fixed", "per-throw")
 """Fixed but unknown, or another one at every throw."""
 
 # Digits of a size.
 DIGITS = 9
-
-_WIDE = Context(prec=60)
 
 # Of a piece of a part's quantity, relative to it.
 _WIDEST = Fraction(4, 100)
@@ -44,18 +42,6 @@ _SHARES = (
     "part.sides",
     "gravity.acceleration",
 )
-
-
-def decimal(value: Fraction) -> str:
-    """Write a rational that a decimal of at most 25 places can say.
-
-    Examples
-    --------
-    >>> decimal(Fraction(-397, 1000)), decimal(Fraction(12))
-    ('-0.397', '12')
-    """
-    text = format(_WIDE.divide(Decimal(value.numerator), Decimal(value.denominator)), "f")
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def short(value: Fraction | float, *, up: bool = False) -> Fraction:
@@ -112,6 +98,15 @@ class DeviationScale:
     def nominal(self) -> Fraction:
         """The value of `key`, in the unit in which the scene gives it."""
         return Fraction(self.given.number)
+
+    @property
+    def about(self) -> float | None:
+        """The value about which it deviates; of a length or an angle in the unit of the deviation."""
+        if self.key != self.quantity or self.quantity == "landing.x":
+            return None
+        return float(
+            self.nominal if self.relative else self.nominal * exact_factor(self.given.unit, self.unit)
+        )
 
     @property
     def least(self) -> Fraction:

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints
 from limitsets.base.files import as_table, picked
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.thrower import Throw
@@ -32,8 +32,6 @@ from limitsets.systems.maps.pieces import along
 # search tries thousands of scenes; one set costs about as much as one orbit.  Nothing is proved here:
 # `limitsets.robust` proves the result of a search.
 
-
-Array = NDArray[np.float64]
 
 # Throws of an orbit before it counts, and of those that count.
 BEFORE, COUNTED = 300, 300
@@ -72,7 +70,7 @@ class _Cuts(NamedTuple):
     """Borders between the branches of one side, ascending from a_i to the arm's end, and the branches between."""
 
     borders: Array
-    branches: NDArray[np.int64]
+    branches: Ints
 
 
 def _cuts(params: Throw, side: int) -> _Cuts:
@@ -93,7 +91,7 @@ def _cuts(params: Throw, side: int) -> _Cuts:
     return _Cuts(np.array([a, *borders, end]), branches.astype(np.int64))
 
 
-def _parts(cuts: list[_Cuts], lo: Array, hi: Array) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+def _parts(cuts: list[_Cuts], lo: Array, hi: Array) -> tuple[Array, Ints, Ints]:
     """Cut the stretches at the borders: pairs of ends, their sides and branches."""
     ends: list[float] = []
     sides: list[int] = []

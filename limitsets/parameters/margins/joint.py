@@ -15,8 +15,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
@@ -42,8 +42,6 @@ from limitsets.systems.maps import orbit
 # one) is nearly linear in the quantities.  It is read off one long orbit for each change of one quantity.  Nothing is
 # proved here; it only says in which order to try.
 
-
-Array = NDArray[np.float64]
 
 # Throws of an orbit that is read, after so many that are not.
 LENGTH, BEFORE = 60_000, 2000
@@ -74,7 +72,7 @@ class Sensitivity:
     slack: Array
     fall: Array
     cost: Array
-    two_throws: NDArray[np.bool_]
+    two_throws: Mask
 
     @classmethod
     def none(cls, quantities: int) -> Sensitivity:

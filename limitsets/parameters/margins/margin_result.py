@@ -15,10 +15,11 @@ from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, as_written, by_side
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene.units import exact_factor
 from limitsets.parameters.margins.deviations import nominal_of
 from limitsets.proofs.prover.certificate import DeniedError
-from limitsets.proofs.prover.goals import State, rechecked
-from limitsets.proofs.prover.proof import KINDS, Proof, write_refutation
+from limitsets.proofs.prover.goals import State
+from limitsets.proofs.prover.proof import KINDS, Proof, require_checkable, write_refutation
 from limitsets.proofs.prover.query import Outcome, joined_claims
 
 # ----------------------------------------------------------------
@@ -27,6 +28,9 @@ from limitsets.proofs.prover.query import Outcome, joined_claims
 
 NOT_FOUND = "it was not found"
 """How the reason begins where the search for a margin ends with an error."""
+
+REFUTED = ".refuted.zip"
+"""How the name ends of a file that refutes."""
 
 
 def bound(value: float | None, unit: str = "", *, up: bool = False) -> str:
@@ -135,6 +139,8 @@ class Margin(Tabled):
     direction : str or None
         "more" or "less": whether the value at which it is refuted is greater or smaller than the scene's; None where a
         deviation is no single value, or none is refuted.
+    files : tuple of str
+        Names of the files that prove it, and of the one that refutes it, where they are written.
     """
 
     quantity: str
@@ -154,11 +160,27 @@ class Margin(Tabled):
     pieces: tuple[Outcome, ...] = field(repr=False)
     against: Outcome | None = field(repr=False)
     direction: str | None = None
+    files: tuple[str, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether the goals hold without any deviation."""
+        return self.proved > 0.0
+
+    @property
+    def given(self) -> tuple[float | None, str]:
+        """The value as the scene gives it, and its unit; None for what has none."""
+        return nominal_of(self.scene, self.quantity)
 
     @property
     def counterexample(self) -> tuple[State, ...]:
         """The orbit that violates a goal, every state enclosed; empty if there is none."""
         return () if self.against is None else self.against.counterexample
+
+    @property
+    def violated(self) -> Goal | None:
+        """The goal that the orbit violates."""
+        return None if self.against is None else self.against.refuted
 
     @property
     def model(self) -> Model:
@@ -171,7 +193,7 @@ class Margin(Tabled):
         value = Column("value", show=".6g"), "value_unit"
         columns = ("quantity", "reading", *shown, "unit", *value, "direction", "not simulated")
         unit = self.unit or "times the tolerance"
-        nominal, of = nominal_of(self.scene, self.quantity)
+        nominal, of = self.given
         about = nominal, None if nominal is None else of
         left_out = ", ".join(self.model.left_out) or None
         row = (self.quantity, self.reading, self.proved, self.refuted, unit, *about, self.direction, left_out)
@@ -188,14 +210,16 @@ class Margin(Tabled):
             unit=self.unit or None,
             **picked(self, "nominal", "closed"),
             reason=self.reason or None,
-            counterexample=self._states() or None,
-            certificate=None,
+            counterexample=self.orbit or None,
+            certificate=self.files or None,
             pieces=len(self.pieces),
             model=self.model,
             timings={"margin": self.seconds},
         )
 
-    def _states(self) -> list[dict[str, Any]]:
+    @property
+    def orbit(self) -> list[dict[str, Any]]:
+        """The counterexample as plain tables: x, the interval that holds it, side, parameters of the throw."""
         against = self.against
         if against is None:
             return []
@@ -225,7 +249,8 @@ class Margin(Tabled):
         DeniedError
             The checker does not confirm one: it is kept as NAME.denied.zip.
         """
-        self._require_checkable()
+        effects = [name for name in self.scene.effects.on() if name != "spread"]
+        require_checkable(effects, self.goals, "the margin stands")
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         stem, written = self.stem, []
@@ -238,29 +263,39 @@ class Margin(Tabled):
         if against is not None and against.found is not None and against.refuted is not None:
             states, recurs = against.counterexample, against.answers[0].recurs
             if any(word in recurs for word in KINDS):
-                path = folder / f"{stem}.refuted.zip"
+                path = folder / f"{stem}{REFUTED}"
                 about = against.found, against.refuted, states, recurs, against.within, self.scene
                 write_refutation(path, *about, recheck=recheck)
                 written.append(path)
         return tuple(written)
 
-    def _require_checkable(self) -> None:
-        on = [name for name in self.scene.effects.on() if name != "spread"]
-        if on:
-            raise AnswerError(
-                "the certificate",
-                f"with the effects {', '.join(on)}",
-                "the minimal model, and noise",
-                "nothing rechecks other maps; the margin stands",
-            )
-        for goal in self.goals:
-            if not rechecked(goal):
-                raise AnswerError(
-                    "the certificate",
-                    f"of the goal {goal.kind}",
-                    "goals that the checker knows",
-                    "nothing rechecks others; the margin stands",
-                )
+    def without_cells(self) -> Margin:
+        """Leave out the cells of the proofs: thousands of times as large as all else."""
+        pieces = tuple(replace(piece, found=None, answers=()) for piece in self.pieces)
+        against = None if self.against is None else replace(self.against, found=None, answers=())
+        return replace(self, pieces=pieces, against=against)
+
+
+def percent_of(margin: Margin, size: float | None) -> float | None:
+    """Give a deviation in percent of the value; None where there is no value, or it is 0."""
+    if size is None or margin.unit == "%":
+        return size
+    nominal, unit = margin.given
+    if not nominal or margin.unit == "":
+        return None
+    return 100.0 * size * float(exact_factor(margin.unit, unit)) / abs(nominal)
+
+
+def in_unit_of(margin: Margin, size: float, unit: str) -> float | None:
+    """Give a deviation in another unit, percent included; None where a percentage has no value to be one of."""
+    if margin.unit == unit:
+        return size
+    if unit == "%":
+        return percent_of(margin, size)
+    if margin.unit != "%":
+        return size * float(exact_factor(margin.unit, unit))
+    nominal, of = margin.given
+    return None if nominal is None else 0.01 * size * abs(nominal) * float(exact_factor(of, unit))
 
 
 def goal_table(goal: Goal, unit: str) -> dict[str, Any]:
@@ -277,21 +312,21 @@ def _state(state: State, fixed: dict[str, Any], unit: str) -> dict[str, Any]:
         thrown["throw.kappa"] = f"{state.kappa!r} {unit}"
     if state.landing is not None:
         thrown["landing.x"] = f"{state.landing!r} {unit}"
-    return {
-        "x": 0.5 * (state.lo + state.hi),
-        "between": [state.lo, state.hi],
-        "side": state.side,
-        "parameters": thrown if state.kappa is not None else None,
-    }
+    return state.to_json() | {"parameters": thrown if state.kappa is not None else None}
 
 
-def settled(margin: Margin, folder: Path, *, recheck: bool = True) -> tuple[Margin, tuple[Path, ...]]:
-    """Write a margin's files; the margin without what the checker denies, for that is undecided."""
+def settled(margin: Margin, folder: Path, *, recheck: bool = True) -> Margin:
+    """Write a margin's files; the margin with their names, without what the checker denies, for that is undecided.
+
+    Where effects are on, or a goal is code, nothing rechecks it: the margin stands without files.
+    """
     try:
-        return margin, margin.save(folder, recheck=recheck)
+        return replace(margin, files=tuple(path.name for path in margin.save(folder, recheck=recheck)))
     except DeniedError as error:
         reason = f"{error}"
         left = replace(margin, proved=0.0, pieces=(), closed=False, reason=reason)
         if "refuted" in error.claims:
             left = replace(margin, refuted=None, against=None, closed=False, reason=reason)
         return settled(left, folder, recheck=recheck)
+    except AnswerError:
+        return margin

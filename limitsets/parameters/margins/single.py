@@ -15,19 +15,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.base.arguments import arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, unknown_goal
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.laid import LaidLike, laid_goal, read_laid
-from limitsets.feeder.scene.units import exact_factor
 from limitsets.parameters.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
-from limitsets.parameters.margins.deviations import DeviationScale, deviation_scale, deviation_scales
+from limitsets.parameters.margins.deviations import (
+    DeviationScale,
+    Tolerance,
+    deviation_scale,
+    deviation_scales,
+)
 from limitsets.parameters.margins.joint import joint_margin
 from limitsets.parameters.margins.margin_result import Margin, bound, bound_above, failure
 from limitsets.proofs.prover.query import Outcome, Query
@@ -39,7 +43,6 @@ from limitsets.proofs.prover.query import Outcome, Query
 # an orbit is proved to violate the goal.  Floats only propose both.
 
 
-Progress = Callable[[str, int, int], None]
 GoalLike = Goal | Callable[..., Any]
 
 
@@ -198,7 +201,7 @@ def _single(query: Query, one: DeviationScale, width: Fraction, tell: Callable[[
 def _of_bracket(
     query: Query, one: DeviationScale, bracket: Bracket, width: Fraction, seconds: float
 ) -> Margin:
-    deviations, noise = _texts(one, bracket.proved)
+    alone = Tolerance.alone(one)
     return Margin(
         quantity=one.quantity,
         reading=one.reading,
@@ -206,35 +209,20 @@ def _of_bracket(
         proved=float(bracket.proved),
         refuted=None if bracket.refuted is None else float(bracket.refuted),
         unit=one.unit,
-        nominal=_nominal(one),
+        nominal=one.about,
         reason=bracket.reason,
         closed=bracket.closed(width),
         seconds=seconds,
         scene=query.scene,
         tolerance={},
-        deviations=deviations,
-        noise=noise,
+        deviations=alone.texts(bracket.proved) if bracket.proved else {},
+        noise=alone.noise(bracket.proved) if bracket.proved else {},
         pieces=tuple(bracket.pieces),
         against=bracket.against,
         direction=("more" if bracket.sign > 0 else "less")
         if one.reading == "fixed" and bracket.refuted
         else None,
     )
-
-
-def _texts(one: DeviationScale, size: Fraction) -> tuple[dict[str, str], dict[str, str]]:
-    """Say what is fixed but unknown, and what differs at every throw."""
-    if not size:
-        return {}, {}
-    said = {one.quantity: one.text(size)}
-    return (said, {}) if one.reading == "fixed" else ({}, said)
-
-
-def _nominal(one: DeviationScale) -> float | None:
-    """Give the value; of a length or an angle in the unit of its deviation."""
-    if one.key != one.quantity or one.quantity == "landing.x":
-        return None
-    return float(one.nominal if one.relative else one.nominal * exact_factor(one.given.unit, one.unit))
 
 
 def _of_none(query: Query, nominal: Outcome) -> Bracket:
@@ -277,11 +265,11 @@ class MarginsBeyond(Tabled):
 
     scene: Scene
     side: int
-    x: NDArray[np.float64]
+    x: Array
     names: tuple[str, ...]
     units: tuple[str, ...]
-    proved: NDArray[np.float64]
-    refuted: NDArray[np.float64]
+    proved: Array
+    refuted: Array
     margins: tuple[tuple[Margin, ...], ...]
 
     def tables(self) -> tuple[Table, ...]:
@@ -397,7 +385,7 @@ def _one(
     return answer
 
 
-def places_beyond(scene: Scene, side: int, places: int) -> NDArray[np.float64]:
+def places_beyond(scene: Scene, side: int, places: int) -> Array:
     """Return places between the farthest that the limit set gets on other sides and on this one, as many as asked."""
     extents = Query.of(scene, (OrientedBeyond(0.0, side),)).cells(None, 2).cells.extents()
     highest = {s: max(hi for _, hi in parts) for s, parts in extents.items() if parts}

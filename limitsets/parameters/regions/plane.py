@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Arrays, Ints
 from limitsets.base.errors import AnswerError
+from limitsets.base.progress import Progress
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
@@ -37,7 +39,7 @@ from limitsets.parameters.regions.writing import CellAxis, placed, write
 Extents = Mapping[int, Sequence[tuple[float, float]]]
 
 
-def neighbours(raster: NDArray[np.int64]) -> NDArray[np.int64]:
+def neighbours(raster: Ints) -> Ints:
     """Pairs of numbers that stand side by side in a raster of cell numbers, each once; shape (n, 2)."""
     pairs = [
         np.stack([a.ravel(), b.ravel()], axis=1)
@@ -48,7 +50,7 @@ def neighbours(raster: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.unique(both, axis=0)
 
 
-def regions(records: Sequence[Record], raster: NDArray[np.int64]) -> NDArray[np.int32]:
+def regions(records: Sequence[Record], raster: Ints) -> NDArray[np.int32]:
     """Give each cell the number of its region, from 0 in the order of first cells; -1 without a block."""
     root = list(range(len(records)))
 
@@ -111,7 +113,6 @@ def comes_to(one: Record, other: Record) -> bool:
 CODES = ("undecided", "proved", "refuted")
 """The codes of `Regions.code`, in order."""
 
-Progress = Callable[[str, int, int], None]
 Index = NDArray[np.int32]
 
 
@@ -144,17 +145,17 @@ class Regions(Tabled):
     region: NDArray[np.int32]
 
     @property
-    def area(self) -> NDArray[np.float64]:
+    def area(self) -> Array:
         """Area of each cell in the units of the axes, shape (n,)."""
         sides = []
         for k, axis in enumerate(self.axes):
             at = np.array([float(value) for value in axis.borders])
             sides.append(at[self.index[:, 2 * k + 1]] - at[self.index[:, 2 * k]])
-        product: NDArray[np.float64] = sides[0] * sides[1]
+        product: Array = sides[0] * sides[1]
         return product
 
     @property
-    def blocks(self) -> NDArray[np.int64]:
+    def blocks(self) -> Ints:
         """Number of attracting blocks of each cell, shape (n,): there are at least so many attractors."""
         return np.array([len(record.blocks) for record in self.records], dtype=np.int64)
 
@@ -188,7 +189,7 @@ class Regions(Tabled):
         DeniedError
             The checker does not confirm it: it is kept as NAME.denied.zip.
         """
-        arrays: dict[str, NDArray[Any]] = {"cells": self.index, "goal": self.code, "region": self.region}
+        arrays: Arrays = {"cells": self.index, "goal": self.code, "region": self.region}
         return write(path, self.scene, self.axes, arrays, self.records, recheck=recheck, workers=workers)
 
 

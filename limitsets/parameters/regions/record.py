@@ -15,12 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction, attraction
 from limitsets.proofs.prover.certificate import arrays_of
-from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.cover import cell_ends, cover, met
 from limitsets.proofs.prover.goals import cuts, prove
 from limitsets.proofs.prover.goals.kind import above, throws_to_reach
 from limitsets.proofs.prover.goals.violating_orbits import MORE_THAN_ROUNDING, middle
@@ -34,7 +35,6 @@ from limitsets.systems.maps import Orbit, orbit
 # Jogs per visit: how many throws a part stays on a side of an attracting block, between one flip and the next.
 
 
-Mask = NDArray[np.bool_]
 Ends = NDArray[np.int32]
 
 
@@ -43,16 +43,6 @@ class Visit(NamedTuple):
 
     least: int
     most: int
-
-
-def met(ends: Ends, cells: Mask) -> Mask:
-    """Return the cells that images of some cells meet; `ends` are the first and last of each, -1 where it has none."""
-    some = ends[cells & (ends[:, 0] >= 0)]
-    count = np.zeros(cells.size + 1, dtype=np.int64)
-    np.add.at(count, some[:, 0], 1)
-    np.add.at(count, some[:, 1] + 1, -1)
-    reached: Mask = np.cumsum(count[:-1]) > 0
-    return reached
 
 
 def visit(jog: Ends, flip: Ends, block: Mask, side: Mask) -> Visit | None:
@@ -108,9 +98,6 @@ SURE = 1.0 - 2.0**-4
 # Images hold the next interval with this much to spare, so that other arithmetic can confirm it.
 ROOM = 1e-9
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 
 class Chain(NamedTuple):
     """The intervals, with the side and the branch of each; the first one violates the goal as a whole."""
@@ -154,8 +141,7 @@ def violating_chain(attracting: Attraction, middle_box: ParameterBox, goal: Orie
     path = orbit(map_now, float(start.x[-1]), int(start.side[-1]), SEARCHED)
     if not goal.wrong()(path.x * MORE_THAN_ROUNDING, path.side).any():
         return Violation()
-    bare = box.bare[1]
-    if not (box.bare[0].kappa > np.hypot(bare.a, bare.d) * (1.0 + 1e-12)).all():
+    if not box.concave:
         return Violation(True)  # the impact may not depend continuously on where the throw starts
     chains = (_widened(box, near, above(goal.x)) for near in _returns(path, goal))
     return Violation(True, next((chain for chain in chains if chain is not None), None))
@@ -361,6 +347,7 @@ def certify_cell(
     """
     ends = {name: (Fraction(lo), Fraction(hi)) for name, (lo, hi) in spans.items()}
     piece = SceneBox(scene, {name: RationalInterval(*pair) for name, pair in ends.items()})
+    goal = scene.goal
     try:
         box = parameter_box(scene, tree=piece.tree())
         middle = parameter_box(scene, tree=_middle(piece).tree())
@@ -369,7 +356,9 @@ def certify_cell(
         for number in cells:
             attracting = _finer(coarse, scene, number)
             doubtful = _may_violate(attracting, scene)
-            against = _refuting(attracting, scene, middle) if doubtful and first is None else Violation()
+            against = Violation()
+            if doubtful and first is None and isinstance(goal, OrientedBeyond) and not goal.from_anywhere:
+                against = violating_chain(attracting, middle, goal)
             # if these cells prove nothing, finer cells come before two throws at once, which cost more
             record = _record(
                 attracting, scene, ends, ask=not against.seen and (not doubtful or number == cells[-1])
@@ -460,31 +449,18 @@ def _may_violate(attracting: Attraction, scene: Scene) -> bool:
     )
 
 
-def _refuting(attracting: Attraction, scene: Scene, middle: ParameterBox) -> Violation:
-    """Look for a periodic orbit of all parameters that violates the goal."""
-    goal = scene.goal
-    if not isinstance(goal, OrientedBeyond) or goal.from_anywhere:
-        return Violation()
-    return violating_chain(attracting, middle, goal)
-
-
 # ---------------------------------------------------------------- the blocks
 
 
 def blocks_of(attracting: Attraction) -> tuple[Block, ...]:
     """Say of each attracting component what it is proved to be like."""
     grid, arrays = attracting.cover.grid, arrays_of(attracting, "")
-    jog, flip = arrays["jog"], arrays["flip"]
+    jog, flip, (on, _, _) = arrays["jog"], arrays["flip"], cell_ends(grid)
     blocks = []
     for number in range(int(attracting.component.max(initial=-1)) + 1):
         inside = attracting.component == number
-        sides = []
-        for side in range(grid.sides):
-            own = np.zeros_like(inside)
-            own[grid.of_side(side)] = True
-            sides.append(own)
         extents = CellSet(grid, inside).extents()
-        visits = {side: visit(jog, flip, inside, own) for side, own in enumerate(sides)}
+        visits = {side: visit(jog, flip, inside, on == side) for side in range(grid.sides)}
         jogs = {side: each for side, each in visits.items() if each is not None}
         blocks.append(
             Block(extents, _bands(attracting, inside, extents), jogs, _order(extents, jogs, grid.sides))
@@ -501,16 +477,13 @@ def _order(extents: Mapping[int, Any], jogs: Mapping[int, Visit], sides: int) ->
 
 
 def _bands(
-    attracting: Attraction, inside: NDArray[np.bool_], extents: Mapping[int, list[tuple[float, float]]]
+    attracting: Attraction, inside: Mask, extents: Mapping[int, list[tuple[float, float]]]
 ) -> dict[int, int]:
     """Count the intervals of each side to which every orbit of the block comes."""
-    grid = attracting.cover.grid
-    bands = {}
+    on, low, _ = cell_ends(attracting.cover.grid)
+    bands = dict.fromkeys(extents, 0)
     for side, parts in extents.items():
-        bands[side] = 0
-        low = grid.edges[side][0][:-1]
         for lo, hi in parts:
-            wanted = np.zeros_like(inside)
-            wanted[grid.of_side(side)] = (low >= lo) & (low < hi)
-            bands[side] += not throws_to_reach(attracting, inside, wanted & inside)[1].size
+            wanted = inside & (on == side) & (low >= lo) & (low < hi)
+            bands[side] += not throws_to_reach(attracting, inside, wanted)[1].size
     return bands

@@ -12,19 +12,18 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Arrays
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import NOISE_ONLY, find
 from limitsets.feeder.scene.units import parse
 from limitsets.parameters.regions.record import Record
 from limitsets.proofs.prover.certificate import pack, tidy
-from limitsets.proofs.prover.goals import rechecked
-from limitsets.proofs.prover.parameters import DIGITS
+from limitsets.proofs.prover.parameters import DIGITS, decimal
+from limitsets.proofs.prover.proof import require_checkable
 
 # ----------------------------------------------------------------
 # The two quantities of a plane of parameters, and the borders of its cells: exact decimals, shared by
@@ -84,11 +83,7 @@ class CellAxis:
 
     def text(self, number: int) -> str:
         """Write one border, exactly."""
-        return f"{_decimal(self.borders[number])} {self.unit}"
-
-    def widths(self) -> list[float]:
-        """Width of each cell, in the unit."""
-        return [float(b - a) for a, b in pairwise(self.borders)]
+        return f"{_short_decimal(self.borders[number])} {self.unit}"
 
 
 def evenly(quantity: str, first: str, last: str, cells: int) -> CellAxis:
@@ -104,19 +99,16 @@ def evenly(quantity: str, first: str, last: str, cells: int) -> CellAxis:
     low, high = ends.borders
     scale = 10**12
     borders = [Fraction(round((low + (high - low) * k / cells) * scale), scale) for k in range(1, cells)]
-    return CellAxis.of(quantity, [f"{_decimal(value)} {ends.unit}" for value in (low, *borders, high)])
+    return CellAxis.of(quantity, [f"{_short_decimal(value)} {ends.unit}" for value in (low, *borders, high)])
 
 
-def _decimal(value: Fraction) -> str:
+def _short_decimal(value: Fraction) -> str:
     """Write a decimal exactly; one that is none, or too long for a certificate, is refused."""
-    scaled = value * 10**DIGITS
-    if scaled.denominator != 1:
+    if (value * 10**DIGITS).denominator != 1:
         raise AnswerError(
             "a border", float(value), f"a decimal of at most {DIGITS} places", "halve the cells fewer times"
         )
-    digits = str(abs(scaled.numerator)).rjust(DIGITS + 1, "0")
-    text = f"{digits[:-DIGITS]}.{digits[-DIGITS:]}".rstrip("0").rstrip(".")
-    return f"-{text}" if value < 0 else text
+    return decimal(value)
 
 
 def placed(scene: Scene, axes: Sequence[CellAxis]) -> Scene:
@@ -146,7 +138,6 @@ def placed(scene: Scene, axes: Sequence[CellAxis]) -> Scene:
 STARTS = ("every", "almost-every", "from", "cells")
 """The codes of the array `starts`, in order."""
 
-Arrays = dict[str, NDArray[Any]]
 LAST = np.nextafter(np.float32(2.0 * math.pi), np.float32(0.0))  # within a full turn
 
 
@@ -161,13 +152,7 @@ def write(
     workers: int | None,
 ) -> Path:
     """Write it, replacing an older file whole; `arrays` are those of the plane."""
-    if scene.goal is not None and not rechecked(scene.goal):
-        raise AnswerError(
-            "the certificate",
-            f"of the goal {scene.goal.kind}",
-            "goals that the checker knows",
-            "nothing rechecks others; the records hold what is proved",
-        )
+    require_checkable((), (scene.goal,), "the records hold what is proved")
     model = {"flight": scene.flight, "flip": scene.flip}
     borders = [[axis.text(k) for k in range(len(axis.borders))] for axis in axes]
     section = {

@@ -1,5 +1,4 @@
-"""The tolerance sheet of a scene: all margins, the joint margin, the margin curve and noise, stored as they come.
+"""The tolerance sheet of a scene: all margins, the joint margin, the margin curve and noise, written as they come.
 
-`sheet_run` runs the parts.  `entries` holds single margins and reads those of an earlier run; `summary` holds the whole
-answer, reads the noise and computes the margin curve.
+`sheet_run` runs the parts; `summary` holds the whole answer, reads the noise and computes the margin curve.
 """

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
-from limitsets.base.progress import GOES_ON, shown_in_notebooks
+from limitsets.base.files import as_json, replaced
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, by_side
 from limitsets.feeder.scattering import Scattering
 from limitsets.feeder.scene import Scene, load
@@ -24,10 +25,9 @@ from limitsets.parameters.margins.deviations import (
     Tolerance,
     deviation_scale,
     deviation_scales,
-    nominal_of,
 )
 from limitsets.parameters.margins.joint import joint_margin
-from limitsets.parameters.margins.margin_result import failure, reach_of
+from limitsets.parameters.margins.margin_result import Margin, failure, reach_of, settled
 from limitsets.parameters.margins.single import GoalLike, MarginsBeyond, goals_of, margin
 from limitsets.parameters.noise.statistics import (
     CELLS,
@@ -37,8 +37,7 @@ from limitsets.parameters.noise.statistics import (
     noise_levels,
     noise_statistics,
 )
-from limitsets.parameters.sheet.entries import Checkpoint, Entry, written
-from limitsets.parameters.sheet.summary import PARTS, Robustness, curve, noise_of, still
+from limitsets.parameters.sheet.summary import PARTS, Robustness, curve, noise_of, row_of, still
 from limitsets.proofs.prover.query import Query
 
 if TYPE_CHECKING:
@@ -55,10 +54,11 @@ NO_NOISE = (
 )
 NO_PLACE = "it is asked for goals with an x and a side, oriented_beyond or reaches"
 
+# Files of a report's folder: what is known of the sheet, and what proves it.
+RECORD, CERTIFICATES = "robustness.json", "certificates"
+
 # For the proofs; of what is left the share for the joint margin; how many times as many for the noise.
 SECONDS, FOR_JOINT, FOR_NOISE = 12.0, 0.5, 5.0
-
-Progress = Callable[[str, int, int], None]
 
 
 class _SheetRun:
@@ -70,7 +70,8 @@ class _SheetRun:
         goals: tuple[Goal, ...],
         todo: Sequence[DeviationScale],
         tolerance: dict[str, str],
-        checkpoint: Checkpoint,
+        folder: Path | None,
+        recheck: bool,
         progress: Progress,
         seconds: float,
         executor: Executor | None,
@@ -78,7 +79,8 @@ class _SheetRun:
         self.seconds, self.executor = seconds, executor
         self.end: float | None = None
         self.scene, self.goals, self.todo, self.tolerance = scene, goals, todo, tolerance
-        self.checkpoint, self.progress = checkpoint, progress
+        self.folder, self.recheck, self.progress = folder, recheck, progress
+        self.margins: list[Margin] = []
         self.left_out: dict[str, str] = {}
         self.done, self.steps = 0, 1
 
@@ -99,70 +101,78 @@ class _SheetRun:
             self.end = time.perf_counter() + self.seconds
         return max(self.end - time.perf_counter(), 0.0)
 
-    def singles(self, width: float, verdict: str) -> list[Entry]:
-        """Find the margins of single quantities, those that no earlier run left."""
-        known = [self.checkpoint.find(one.quantity, one.reading, one.unit) for one in self.todo]
-        todo = [one for one, entry in zip(self.todo, known, strict=True) if entry is None]
-        first = next((entry for entry in known if entry is not None), None)
-        answers = iter(self._answers(todo, width, verdict, first))
-        entries: list[Entry] = []
-        for one, entry in zip(self.todo, known, strict=True):
-            with self.step(f"margin of {one.quantity}, {one.reading}"):
-                answer = entry or next(answers)
-                if isinstance(answer, str):
-                    self.left_out[f"margin of {one.quantity}, {one.reading}"] = answer
-                else:
-                    entries.append(entry or self.checkpoint.keep(answer))
-        return entries
+    def keep(self, margin: Margin) -> None:
+        """Take a margin into the sheet, whose files are written."""
+        self.margins.append(margin)
+        self.write()
 
-    def _answers(
-        self, todo: Sequence[DeviationScale], width: float, verdict: str, first: Entry | None
-    ) -> Iterator[Entry | str]:
+    def write(self, places: MarginsBeyond | None = None) -> None:
+        """Write the margins that are known into the folder, so that an interruption loses none of them."""
+        if self.folder is None:
+            return
+        rows = [row_of(margin) for margin in self.margins]
+        record = {"complete": False, "scene": self.scene.as_dict(), "margins": rows, "curve": places}
+        with replaced(self.folder) as draft:
+            (draft / RECORD).write_text(as_json(record), encoding="utf-8", newline="\n")
+
+    def singles(self, width: float, verdict: str) -> None:
+        """Find the margins of single quantities."""
+        answers = self._answers(width, verdict)
+        for one in self.todo:
+            label = f"margin of {one.quantity}, {one.reading}"
+            with self.step(label):
+                answer = next(answers)
+                if isinstance(answer, str):
+                    self.left_out[label] = answer
+                else:
+                    self.keep(answer)
+
+    def _answers(self, width: float, verdict: str) -> Iterator[Margin | str]:
         """Ask for margins, one after the other, or on the executor; it is not handed goals that are code.
 
         A search that ends with an error answers with the text of the error.
         """
-        folder, recheck = self.checkpoint.folder, self.checkpoint.recheck
-        ask = partial(_single, self.scene, self.goals, width, folder, recheck)
+        ask = partial(_single, self.scene, self.goals, width, self.folder, self.recheck)
         tried = partial(_tried, ask)
-        if verdict != "proved" and todo:  # no deviation is small enough, whatever the quantity
-            first = first or ask(todo[0], self.tell)
-            yield from (_same(first, one, self.scene) for one in todo)
+        if verdict != "proved":  # no deviation is small enough, whatever the quantity
+            first = ask(self.todo[0], self.tell)
+            for one in self.todo:
+                own = replace(first, quantity=one.quantity, reading=one.reading, unit=one.unit)
+                yield replace(own, nominal=one.about, seconds=0.0)
         elif (
-            self.executor is None or len(todo) < 2 or any(isinstance(goal, Predicate) for goal in self.goals)
+            self.executor is None
+            or len(self.todo) < 2
+            or any(isinstance(goal, Predicate) for goal in self.goals)
         ):
-            yield from (tried(one, self.tell) for one in todo)
+            yield from (tried(one, self.tell) for one in self.todo)
         else:
-            yield from self.executor.map(tried, todo)
+            yield from self.executor.map(tried, self.todo)
 
-    def joint(self, width: float) -> Entry | None:
+    def joint(self, width: float) -> None:
         """Find the factor on the tolerance."""
         label = "margin of all together"
         with self.step(label):
-            entry = self.checkpoint.find("joint", "tolerance", "")
-            if entry is not None:
-                return entry
             quiet: dict[str, Any] = {"width": width, "tell": lambda share: self.tell(label, share)}
             quiet["seconds"] = FOR_JOINT * self.left()
             try:
-                return self.checkpoint.add(joint_margin(self.scene, self.goals, self.tolerance, **quiet))
+                factor = joint_margin(self.scene, self.goals, self.tolerance, **quiet)
+                self.keep(_written(factor, self.folder, self.recheck))
             except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
                 self.left_out["joint"] = failure(error)
-                return None
 
     def curve(self, side: int) -> MarginsBeyond | None:
         """Find margins against X; None where the part gets farther out on another side."""
-        told: dict[str, Any] = {"tell": self.tell, "keep": self.checkpoint.add_curve, "seconds": self.left()}
+        told: dict[str, Any] = {"tell": self.tell, "keep": self.write, "seconds": self.left()}
         told["executor"] = self.executor
         told["laid"] = {int(on): pairs for on, pairs in by_side(self.goals[0].laid).items()} or None
         with self.step("margins against X"):
             try:
-                margins, left = curve(self.scene, side, self.tolerance, self.checkpoint.curve, **told)
+                margins, left = curve(self.scene, side, self.tolerance, **told)
             except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
                 self.left_out["curve"] = str(error) if isinstance(error, AnswerError) else failure(error)
                 return None
         if left:
-            words = f"there was no time for {left} more places; the same command goes on with them"
+            words = f"there was no time for {left} more places; more seconds take them along"
             self.left_out["rest of the curve"] = words
         return margins
 
@@ -212,31 +222,27 @@ def _single(
     recheck: bool,
     one: DeviationScale,
     tell: Callable[[str], None] | None = None,
-) -> Entry:
+) -> Margin:
     """Find the margin of one quantity and write its files; called in other processes, too."""
     told = None if tell is None else lambda step, _, __: tell(step)
     (answer,) = margin(scene, one.quantity, reading=one.reading, goal=goals, width=width, progress=told)
-    return written(answer, folder, recheck)
+    return _written(answer, folder, recheck)
 
 
-def _tried(ask: Callable[..., Entry], *about: Any) -> Entry | str:
+def _written(margin: Margin, folder: Path | None, recheck: bool) -> Margin:
+    """Write a margin's proof and counterexample into a report's folder, and leave their cells there."""
+    if folder is not None:
+        margin = settled(margin, folder / CERTIFICATES, recheck=recheck)
+        margin = replace(margin, files=tuple(f"{CERTIFICATES}/{name}" for name in margin.files))
+    return margin.without_cells()
+
+
+def _tried(ask: Callable[..., Margin], *about: Any) -> Margin | str:
     """Ask for a margin; where that ends with an error, say which, so that the others are not lost."""
     try:
         return ask(*about)
     except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
         return failure(error)
-
-
-def _same(entry: Entry, one: DeviationScale, scene: Scene) -> Entry:
-    """Return the margin of a quantity where the scene as it is fails or is not proved: that of any other."""
-    nominal, unit = nominal_of(scene, one.quantity)
-    own: dict[str, Any] = {"quantity": one.quantity, "reading": one.reading, "unit": one.unit}
-    return replace(entry, nominal=nominal, nominal_unit=unit, seconds=0.0, **own)
-
-
-def _place(goals: Sequence[Goal]) -> tuple[float, int] | None:
-    """Return x and side of the rests that count as fed."""
-    return next(((goal.x, goal.side) for goal in goals if isinstance(goal, OrientedBeyond | Reaches)), None)
 
 
 def _goals(
@@ -309,7 +315,8 @@ def robustness(
         five times as many: no solution but its first is begun that is likely to end later, and `left_out` says which
         were not.  The margins of single quantities and the audit take what they take.
     folder : str or Path, optional
-        Margins are written there as they are found, with their certificates, and found again by the next run.
+        Margins are written there as they are found, with their certificates, so that an interrupted run leaves them.
+        Another run begins anew and replaces the files.
     recheck : bool
         Whether certificates are checked before they get their names.
     executor : Executor, optional
@@ -350,22 +357,14 @@ def robustness(
     if vector:
         Tolerance.of(query.scene, vector)  # refuses what the scene does not give
     noise, law = noise_of(given, scatter)
-    checkpoint = Checkpoint(
-        None if folder is None else Path(folder),
-        quiet,
-        goals,
-        vector,
-        width,
-        seconds=seconds,
-        recheck=recheck,
-    )
     told = progress or (lambda step, done, of: None)
     sheet = _SheetRun(
         quiet,
         goals,
         todo,
         tolerance=vector,
-        checkpoint=checkpoint,
+        folder=None if folder is None else Path(folder),
+        recheck=recheck,
         progress=told,
         seconds=seconds,
         executor=executor,
@@ -383,7 +382,7 @@ def robustness(
         )
     except KeyboardInterrupt as error:
         if folder is not None:
-            error.add_note(GOES_ON)
+            error.add_note(f"the margins found so far are in {Path(folder) / RECORD}")
         raise
 
 
@@ -398,7 +397,9 @@ def _filled(
     begin: float,
 ) -> Robustness:
     """Compute the sheet part by part; for each part left out, say why."""
-    scene, goals, place = sheet.scene, sheet.goals, _place(sheet.goals)
+    scene, goals = sheet.scene, sheet.goals
+    # x and side of the rests that count as fed
+    place = next(((goal.x, goal.side) for goal in goals if isinstance(goal, OrientedBeyond | Reaches)), None)
     missing = sheet.left_out
     missing |= {part: "it was not asked for" for part in PARTS if part in leave_out}
     if not sheet.tolerance:
@@ -415,9 +416,10 @@ def _filled(
         query = Query.of(scene, goals)
         nominal = query.prove()
         verdict = nominal.verdict if nominal.verdict == "proved" else query.refute().verdict
-    entries = [] if "margins" in missing else sheet.singles(width, verdict)
-    joint = None if "joint" in missing else sheet.joint(width)
-    entries += [] if joint is None else [joint]
+    if "margins" not in missing:
+        sheet.singles(width, verdict)
+    if "joint" not in missing:
+        sheet.joint(width)
     against = None if "curve" in missing or place is None else sheet.curve(place[1])
     statistics, levels = None, None
     if "noise" not in missing and noise is not None and place is not None:
@@ -428,7 +430,7 @@ def _filled(
         goals=goals,
         verdict=verdict if scene == given else f"{verdict} {WITHOUT_SCATTER}",
         reach=reach_of([nominal]) if verdict == "proved" else None,
-        entries=tuple(entries),
+        entries=tuple(sheet.margins),
         tolerance=sheet.tolerance,
         curve=against,
         noise=statistics,
@@ -437,7 +439,5 @@ def _filled(
         audit=flagged,
         left_out=missing,
         width=width,
-        digests=sheet.checkpoint.digests,
-        again=sheet.checkpoint.again,
         seconds=time.perf_counter() - begin,
     )

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -21,40 +20,21 @@ from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.laid import LaidLike
 from limitsets.feeder.scene.left_out import WITHOUT_SCATTER, Model
 from limitsets.feeder.scene.quantities import deviation, find
-from limitsets.feeder.scene.units import exact_factor
-from limitsets.parameters.margins.margin_result import NOT_FOUND, Margin, void_of
+from limitsets.parameters.margins.margin_result import NOT_FOUND, REFUTED, Margin, void_of
 from limitsets.parameters.margins.single import MarginsBeyond, margins_beyond, places_beyond
 from limitsets.parameters.noise.statistics import Levels, NoiseStatistics
-from limitsets.parameters.sheet.entries import Entry
 
 if TYPE_CHECKING:
     from limitsets.proofs.auditing import Audit
 
 
 # ----------------------------------------------------------------
-# The margin curve, place by place: the middle first, as many X as time permits, each stored as soon as it is
+# The margin curve, place by place: the middle first, as many X as time permits, each handed on as soon as it is
 # found.
 
 
 # Places; how close their brackets are; most and least seconds for the proof of one joint margin, and seconds in all.
 PLACES, COARSE, EACH, LEAST, SECONDS = 7, 0.1, 15.0, 1.0, 20.0
-
-
-def curve_read(table: Mapping[str, Any], scene: Scene) -> MarginsBeyond:
-    """Read what `MarginsBeyond.to_json` wrote, without the proofs."""
-    names, units = tuple(table["quantities"]), tuple(table["units"])
-    # null becomes nan
-    x, proved, refuted = (np.array(table[key], dtype=np.float64) for key in ("x", "proved", "refuted"))
-    return MarginsBeyond(
-        scene=scene,
-        side=table["side"],
-        x=x,
-        names=names,
-        units=units,
-        proved=proved,
-        refuted=refuted,
-        margins=(),
-    )
 
 
 def _joined(one: MarginsBeyond | None, other: MarginsBeyond) -> MarginsBeyond:
@@ -90,13 +70,12 @@ def curve(
     scene: Scene,
     side: int,
     tolerance: Mapping[str, str],
-    known: Mapping[str, Any] | None,
     *,
     laid: LaidLike | None = None,
     seconds: float = SECONDS,
     executor: Executor | None = None,
     tell: Callable[[str, float], None],
-    keep: Callable[[dict[str, Any]], None],
+    keep: Callable[[MarginsBeyond], None],
 ) -> tuple[MarginsBeyond, int]:
     """Bracket margins of "beyond X only this side, and almost every orbit comes there" at some X.
 
@@ -108,8 +87,6 @@ def curve(
         The side wanted.
     tolerance : mapping of str to str
         Of the joint margin; if it is empty, the margin is that of throw.speed.
-    known : mapping or None
-        What an earlier run kept.
     laid : mapping of int to sequence of (float, float), optional
         Where parts are laid down; default the whole arm.
     seconds : float
@@ -137,9 +114,7 @@ def curve(
     words = {"tolerance": tolerance, "laid": laid, "width": COARSE}
     places = places_beyond(scene, side, PLACES)
     places = places[np.argsort(np.abs(places - places.mean()), kind="stable")]
-    margins = None if known is None or known["side"] != side else curve_read(known, scene)
-    done = set() if margins is None else {round(x, 9) for x in margins.x.tolist()}
-    waiting = [x for x in places.tolist() if round(x, 9) not in done]
+    waiting, margins = places.tolist(), None
     pool = executor or _Here()
     margin_there = partial(_place, scene, side, names, words)
     # concurrent.futures has no public word for it; of an executor of another kind it is not known
@@ -150,7 +125,7 @@ def curve(
         while waiting and len(begun) < at_once:
             now = time.perf_counter()
             dearest = max([dearest, *(now - since for since in begun.values())])
-            # what would not end in time is left to a later run
+            # what would not end in time is left out
             if (margins is not None or begun) and end - now < dearest:
                 break
             x, each = waiting[0], at_once * (end - now) / len(waiting)
@@ -163,7 +138,7 @@ def curve(
         for one in wait(begun, return_when=FIRST_COMPLETED).done:
             dearest = max(dearest, time.perf_counter() - begun.pop(one))
             margins = _joined(margins, one.result())
-            keep(margins.to_json())
+            keep(margins)
     assert margins is not None
     return margins, len(waiting)
 
@@ -246,6 +221,21 @@ PARTS = ("margins", "joint", "curve", "noise", "audit")
 """What an answer is put together from."""
 
 
+def row_of(margin: Margin) -> dict[str, Any]:
+    """Give a margin as a row of the sheet's JSON: its value as the scene gives it, the goal violated, its files."""
+    nominal, unit = margin.given
+    proofs = [name for name in margin.files if not name.endswith(REFUTED)]
+    row = margin.to_json() | {
+        "nominal": nominal,
+        "nominal_unit": unit,
+        "violated": None if margin.violated is None else margin.goals.index(margin.violated),
+        "certificate": (proofs if len(proofs) > 1 else proofs[0]) if proofs else None,
+        "refutation": next((name for name in margin.files if name.endswith(REFUTED)), None),
+    }
+    del row["model"]  # the sheet names it once
+    return row
+
+
 @dataclass(frozen=True, eq=False)
 class Robustness(Tabled):
     """How far a scene may drift, and what chance does to it.
@@ -261,8 +251,9 @@ class Robustness(Tabled):
         followed by "of the scene without its scatter".
     reach : float or None
         Where the attracting cells end in which the goals are proved of the scene as it is.
-    entries : tuple of Entry
-        One per quantity and reading; the last is joint, where there is a tolerance.  Proved and refuted.
+    entries : tuple of Margin
+        One per quantity and reading, without the cells of their proofs; the last is joint, where there is a tolerance.
+        Proved and refuted.
     tolerance : dict of str to str
         The vector that the joint factor is on.
     curve : MarginsBeyond or None
@@ -279,10 +270,6 @@ class Robustness(Tabled):
         Which of `PARTS`, or which margin, there is nothing of, and why.
     width : float
         How close brackets had to be.
-    digests : dict of str to str
-        Of all that margins depend on, single ones and the joint one.
-    again : int
-        How many margins were found by an earlier run.
     seconds : float
         Time it took.
     """
@@ -291,7 +278,7 @@ class Robustness(Tabled):
     goals: tuple[Goal, ...]
     verdict: str
     reach: float | None
-    entries: tuple[Entry, ...]
+    entries: tuple[Margin, ...]
     tolerance: dict[str, str]
     curve: MarginsBeyond | None
     noise: NoiseStatistics | None
@@ -300,8 +287,6 @@ class Robustness(Tabled):
     audit: Audit | None
     left_out: dict[str, str]
     width: float
-    digests: dict[str, str]
-    again: int
     seconds: float
 
     @property
@@ -319,12 +304,12 @@ class Robustness(Tabled):
         return replace(of, broken=tuple(each.effect for each in broken))
 
     @property
-    def singles(self) -> tuple[Entry, ...]:
+    def singles(self) -> tuple[Margin, ...]:
         """The margins of single quantities."""
         return tuple(entry for entry in self.entries if entry.quantity != "joint")
 
     @property
-    def joint(self) -> Entry | None:
+    def joint(self) -> Margin | None:
         """The factor on the tolerance."""
         return next((entry for entry in self.entries if entry.quantity == "joint"), None)
 
@@ -333,39 +318,9 @@ class Robustness(Tabled):
         """Those of `left_out` whose search ended with an error."""
         return tuple(part for part, why in self.left_out.items() if why.startswith(NOT_FOUND))
 
-    def margins(self) -> tuple[Margin, ...]:
-        """Give the entries as margins without their proofs, as figures take them."""
-        return tuple(self._margin(entry) for entry in self.entries)
-
-    def _margin(self, entry: Entry) -> Margin:
-        joint = entry.quantity == "joint"
-        nominal = entry.nominal
-        # in the unit of the deviation
-        if nominal is not None and entry.unit not in ("%", entry.nominal_unit):
-            nominal = float(Fraction(repr(nominal)) * exact_factor(entry.nominal_unit, entry.unit))
-        return Margin(
-            quantity=entry.quantity,
-            reading=entry.reading,
-            goals=self.goals,
-            proved=entry.proved,
-            refuted=entry.refuted,
-            unit=entry.unit,
-            nominal=nominal,
-            reason=entry.reason,
-            closed=entry.closed,
-            seconds=entry.seconds,
-            scene=self.scene,
-            tolerance=self.tolerance if joint else {},
-            deviations={},
-            noise={},
-            pieces=(),
-            against=None,
-            direction=entry.direction,
-        )
-
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        margins = joined(self.margins()) if self.entries else Table(("quantity",), (), "No margins")
+        margins = joined(self.entries) if self.entries else Table(("quantity",), (), "No margins")
         shown = [margins]
         if self.curve is not None:
             shown += self.curve.tables()
@@ -377,11 +332,10 @@ class Robustness(Tabled):
         """Give it as plain tables for JSON: null, never nan."""
         return as_table(
             complete=True,
-            digests=self.digests,
             scene=self.scene.as_dict(),
             holds={"proved": True, "refuted": False}.get(self.verdict),
             vacuous=bool(void_of(self.goals, self.reach, self.scene.unit)),
-            margins=self.entries,
+            margins=[row_of(margin) for margin in self.entries],
             tolerance=self.tolerance or None,
             curve=self.curve,
             noise=None if self.noise is None else self.noise.to_json() | {"law": self.law},

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.feeder.thrower.assumed_box import Assumed, corner_bounds
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Terms:
         From the worst value to the value of the missing fact at which the assumption breaks; None where none breaks it.
     """
 
-    limit: float | NDArray[np.float64] | None
+    limit: float | Array | None
     scale: float = 1.0
     offset: float = 0.0
     missing: str = ""
@@ -86,10 +86,6 @@ class Assumption:
 
 def _positive(scene: Scene, _: ParameterBox | None) -> Terms:
     return Terms(0.0)
-
-
-def _enough(scene: Scene, _: ParameterBox | None) -> Terms:
-    return Terms(1.0)
 
 
 def _corner(scene: Scene, box: ParameterBox | None) -> Terms:
@@ -237,7 +233,7 @@ ASSUMPTIONS = (
         words="the part lies still once a side has come down",
         value="energy left, in that needed to roll on or back",
         column=Assumed.ROLL,
-        terms=_enough,
+        terms=lambda *_: Terms(1.0),
     ),
     Assumption(
         "drive",

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.base.arguments import arguments_checked
+from limitsets.base.arrays import Array, Mask
 from limitsets.base.errors import LimitsetsError
 from limitsets.base.files import as_table, picked
 from limitsets.base.tables import Column, Table, Tabled
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from limitsets.proofs.prover.parameters import ParameterBox
 
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 Extents = dict[int, list[tuple[float, float]]]
 
 # Throws that are evaluated where only a count is wanted: about a second.
@@ -190,7 +188,7 @@ def _finite(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else value
 
 
-def _shares(broken: Mapping[int, Flags], samples: Mapping[int, Sample]) -> dict[str, Any]:
+def _shares(broken: Mapping[int, Mask], samples: Mapping[int, Sample]) -> dict[str, Any]:
     from limitsets.systems.maps import codes
 
     def count(wanted: int) -> tuple[int, int]:
@@ -207,7 +205,7 @@ def _ranges(
     ranges = {}
     for side, sample in domain.items():
 
-        def broken(x: Array, side: int = side) -> Flags:
+        def broken(x: Array, side: int = side) -> Mask:
             return row.broken(enclosed_at(box, side, x), side)
 
         ranges[side] = where(broken, sample.x, row.broken(enclosures[side], side))

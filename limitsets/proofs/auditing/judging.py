@@ -10,8 +10,8 @@ from operator import or_
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.thrower.assumed_box import assumed
 from limitsets.proofs.auditing.assumptions import Assumption, Terms
 from limitsets.systems.maps import codes, orbit
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 # States at which assumptions are evaluated: cells that hold the limit set, orbits on it, and the whole domain.
 
 
-Array = NDArray[np.float64]
 Cells: TypeAlias = dict[int, tuple[Array, Array]]
 
 # Cells per side for the proof; sampled where the map has effects on.
@@ -50,7 +49,7 @@ class Sample:
     """
 
     x: Array
-    code: NDArray[np.int64]
+    code: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +113,7 @@ def _limit_sets(scene: Scene, box: ParameterBox) -> tuple[list[CellSet], Cells, 
     return [each.cells for each in attractors(graph, throws=1)], domain, False
 
 
-def _throws(scene: Scene, cells: CellSet) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+def _throws(scene: Scene, cells: CellSet) -> tuple[Array, Ints, Ints]:
     """Throws of an orbit from the middle of the middle cell, once it is on the limit set."""
     numbers = cells.numbers()
     middle = int(numbers[numbers.size // 2])
@@ -163,8 +162,6 @@ def places(scene: Scene, box: ParameterBox) -> Places:
 # Decide by enclosures of its number whether an assumption is broken or holds.
 
 
-Flags = NDArray[np.bool_]
-
 # A cell on which an assumption is not proved is halved so many times, while there are no more than so many cells.
 HALVINGS, MOST_CELLS = 10, 200_000
 
@@ -195,7 +192,7 @@ class Row:
         """Give the value that is certainly reached: the end of the enclosure that breaks the limit least."""
         return self.values(enclosed)[:, 0 if self.about.below else 1]
 
-    def broken(self, enclosed: Array, side: int) -> Flags:
+    def broken(self, enclosed: Array, side: int) -> Mask:
         """Whether the assumption is proved to be broken; never where a fact is missing."""
         reached = self.reached(enclosed)
         beyond = reached > self.limit(side) if self.about.below else reached < self.limit(side)
@@ -203,7 +200,7 @@ class Row:
         hopeless = np.isposinf(reached) if self.about.below else np.isneginf(reached)
         return beyond | (hopeless & (self.terms.limit is None))
 
-    def kept(self, enclosed: Array, side: int) -> Flags:
+    def kept(self, enclosed: Array, side: int) -> Mask:
         """Whether the assumption is proved to hold."""
         values = self.values(enclosed)
         return values[:, 1] <= self.limit(side) if self.about.below else values[:, 0] >= self.limit(side)
@@ -246,7 +243,7 @@ def all_hold(box: ParameterBox, cells: Cells, rows: list[Row]) -> list[bool]:
 # Intervals of a side on which a condition holds.
 
 
-def where(true: Callable[[Array], Flags], x: Array, seen: Flags | None = None) -> list[tuple[float, float]]:
+def where(true: Callable[[Array], Mask], x: Array, seen: Mask | None = None) -> list[tuple[float, float]]:
     """Intervals on which a condition holds, seen at samples, their ends bisected down to adjacent floats.
 
     Parameters

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
 from limitsets.base.progress import shown_in_notebooks
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------
 # Brackets of where a noisy chain ends, and when.
 
-
-Array = NDArray[np.float64]
 
 # Any absorbing set or exit.
 ANY = "any"

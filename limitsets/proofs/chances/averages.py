@@ -26,7 +26,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from limitsets.base.arrays import Array, Ints
 
 # ----------------------------------------------------------------
 # Cells of a function that is continuous and affine on each: nodes per side, and those where it may jump.
@@ -35,9 +36,6 @@ from numpy.typing import NDArray
 # that a continuous bound from either side costs nothing.  Beyond the last places a function is constant: one long
 # cell.
 
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 # How near to a jump the next nodes lie, relative to the arm.
 CLOSE = 2.0**-33
@@ -60,7 +58,7 @@ class Nodes:
     """
 
     place: Array
-    first: Index
+    first: Ints
 
     @property
     def width(self) -> Array:
@@ -73,11 +71,11 @@ class Nodes:
         """Return the nodes of a side."""
         return slice(int(self.first[side]), int(self.first[side + 1]))
 
-    def side(self) -> Index:
+    def side(self) -> Ints:
         """Return the side of each node."""
         return np.repeat(np.arange(self.first.size - 1), np.diff(self.first))
 
-    def cell(self, side: Index, x: Array) -> Index:
+    def cell(self, side: Ints, x: Array) -> Ints:
         """Return the cells, named by their left nodes, in which places lie."""
         cells = np.empty(x.shape, dtype=np.int64)
         for k in range(self.first.size - 1):
@@ -157,14 +155,14 @@ def nodes_of(
 class Span(NamedTuple):
     """Cells of the target from `first` to `last`, both of them included; one pair for each entry."""
 
-    first: Index
-    last: Index
+    first: Ints
+    last: Ints
 
 
 class Swings(NamedTuple):
     """To `row` is added `much` times the total variation of V on a span."""
 
-    row: Index
+    row: Ints
     much: Array
     span: Span
 
@@ -175,7 +173,7 @@ class Bends(NamedTuple):
     Where that says less, the deficit grows by `cap` times the total variation of V there instead.
     """
 
-    cell: Index
+    cell: Ints
     lo: Array
     hi: Array
     cap: Array
@@ -185,7 +183,7 @@ class Bends(NamedTuple):
 class Gaps(NamedTuple):
     """To `row` is added `much` times the difference of the largest and the smallest V on two spans together."""
 
-    row: Index
+    row: Ints
     much: Array
     one: Span
     two: Span
@@ -197,7 +195,7 @@ class Kinks(NamedTuple):
     Or `even` times the largest fall of the slope per length, where that is less; and `bow` times the largest slope.
     """
 
-    cell: Index
+    cell: Ints
     much: Array
     even: Array
     bow: Array
@@ -207,7 +205,7 @@ class Kinks(NamedTuple):
 class Curvature(NamedTuple):
     """One way to bound the deficits of some cells by curvature."""
 
-    cells: Index
+    cells: Ints
     bends: tuple[Bends, ...] = ()
     swings: tuple[Swings, ...] = ()
     kinks: tuple[Kinks, ...] = ()
@@ -220,7 +218,7 @@ class Running(NamedTuple):
     total: Array
     off: float
 
-    def between(self, first: Index, last: Index) -> Array:
+    def between(self, first: Ints, last: Ints) -> Array:
         """Bound the sum of the numbers from `first` up to the one before `last` from above."""
         bound: Array = self.total[last] - self.total[first] + self.off
         return bound
@@ -271,7 +269,7 @@ FAR_APART = 1e200
 
 
 def mean_matrix(
-    rows: int, target: Nodes, row: Index, weight: Array, side: Index, one: Array, two: Array
+    rows: int, target: Nodes, row: Ints, weight: Array, side: Ints, one: Array, two: Array
 ) -> Any:
     """Return the matrix from values at nodes to means.
 

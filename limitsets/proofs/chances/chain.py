@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scattering import Scattering, Uniform
 from limitsets.feeder.scene import Scene
@@ -21,7 +21,6 @@ from limitsets.proofs.chances.throws import throw_average
 from limitsets.proofs.prover.certificate import pack, tidy
 from limitsets.proofs.prover.parameters import ParameterBox
 
-Array = NDArray[np.float64]
 Place = tuple[int, float, float]
 
 EXITS = "exits"
@@ -57,8 +56,8 @@ class Chain:
     nodes: Nodes
     throw: Average
     landing: Average | None
-    free: NDArray[np.bool_]
-    absorbs: dict[str, NDArray[np.bool_]]
+    free: Mask
+    absorbs: dict[str, Mask]
     speed: Staircase
     landing_law: Staircase
 
@@ -81,7 +80,7 @@ class Chain:
 
 def _absorbing(
     nodes: Nodes, box: ParameterBox, absorbing: Mapping[str, Sequence[Place]]
-) -> tuple[dict[str, NDArray[np.bool_]], NDArray[np.bool_]]:
+) -> tuple[dict[str, Mask], Mask]:
     lo, hi = box.bare
     side, x = nodes.side(), nodes.place
     absorbs = {EXITS: (x <= hi.a[side]) | (x >= lo.arm_length)}
@@ -225,7 +224,7 @@ def write(
     scatter: Scattering,
     places: tuple[Sequence[Place], Mapping[str, Sequence[Place]]],
     nodes: Nodes,
-    within: Mapping[str, NDArray[np.float64]],
+    within: Mapping[str, Array],
     mean: tuple[float, float],
     *,
     allowance: float,
@@ -245,7 +244,11 @@ def write(
         "quantiles": [],
         "mean": None,
     }
-    claimed = {name: _widened(within[name], allowance) for name in section["names"]}
+    claimed = {
+        name: np.stack([np.maximum(low - allowance, 0.0), np.minimum(high + allowance, 1.0)])
+        for name, (low, high) in within.items()
+        if name in section["names"]
+    }
     for name, pair in claimed.items():
         for share in QUANTILES:
             ends = _quantile(pair, float(share.split()[0]) / 100.0)
@@ -296,7 +299,7 @@ def _places(places: Sequence[Place], unit: str) -> list[list[Any]]:
     ]
 
 
-def _cut(places: NDArray[np.float64], finer: int) -> NDArray[np.float64]:
+def _cut(places: Array, finer: int) -> Array:
     """Cut the cells, but not those where functions jump."""
     width = np.diff(places)
     wide = np.flatnonzero(width > 1e-3 * np.median(width))
@@ -304,11 +307,7 @@ def _cut(places: NDArray[np.float64], finer: int) -> NDArray[np.float64]:
     return np.unique(np.concatenate([places, *more]))
 
 
-def _widened(pair: NDArray[np.float64], allowance: float) -> NDArray[np.float64]:
-    return np.stack([np.maximum(pair[0] - allowance, 0.0), np.minimum(pair[1] + allowance, 1.0)])
-
-
-def _quantile(pair: NDArray[np.float64], share: float) -> tuple[int, int] | None:
+def _quantile(pair: Array, share: float) -> tuple[int, int] | None:
     """Bound the throws within which so many end, by brackets that are claimed; None beyond the throws counted."""
     first, last = np.flatnonzero(pair[1] >= share), np.flatnonzero(pair[0] >= share)
     return (int(first[0]), int(last[0])) if last.size else None

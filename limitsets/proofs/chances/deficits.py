@@ -14,8 +14,8 @@ from math import factorial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scattering import Gaussian, Uniform
 from limitsets.proofs.chances.averages import (
@@ -44,8 +44,6 @@ from limitsets.proofs.prover.numbers import Intervals, RationalInterval, pi, squ
 #
 # The weight beyond six standard deviations may lie anywhere.
 
-
-Array = NDArray[np.float64]
 
 # Standard deviations up to which a normal law is cut into strata.
 SIGMAS = 6
@@ -213,16 +211,13 @@ def landing_average(target: Nodes, source: Nodes, law: Staircase) -> Average:
     )
 
 
-def _span(target: Nodes, side: NDArray[np.int64], lo: Array, hi: Array) -> Span:
+def _span(target: Nodes, side: Ints, lo: Array, hi: Array) -> Span:
     return Span(target.cell(side, lo), target.cell(side, hi))
 
 
 # ----------------------------------------------------------------
 # How far the mean after a throw may lie above its chord on a cell, in three ways.
 
-
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 # Inflates coefficients against the rounding of the few operations that make them.
 MORE = 1.0 + 2.0**-40
@@ -234,12 +229,12 @@ class Rows(NamedTuple):
     """Throws from consecutive nodes of a side."""
 
     side: OneSide
-    number: Index  # of the nodes
+    number: Ints  # of the nodes
     x: Array
     place: Array  # where jogs land, (n, borders)
     phi: Array
     error: Array  # of angles and places, the largest of each node
-    good: Flags
+    good: Mask
 
 
 class _Border(NamedTuple):
@@ -270,23 +265,23 @@ class Deficits:
         self.target, self.law = target, law
         self.ways: list[Curvature] = []
 
-    def landing(self, side: OneSide, flips: Flags, place: Array) -> tuple[Index, Array]:
+    def landing(self, side: OneSide, flips: Mask, place: Array) -> tuple[Ints, Array]:
         """Return the side and the place where throws land, from the places where jogs land."""
         return np.where(flips, side.after, side.number), np.where(flips, place - side.shift, place)
 
-    def span_of(self, side: OneSide, flips: Flags, lo: Array, hi: Array) -> Span:
+    def span_of(self, side: OneSide, flips: Mask, lo: Array, hi: Array) -> Span:
         """Return the cells between two such places."""
         number, low = self.landing(side, flips, lo)
         _, high = self.landing(side, flips, hi)
         return Span(self.target.cell(number, low), self.target.cell(number, high))
 
     def gaps_of(
-        self, cell: Index, much: Array, side: OneSide, flips: Flags, lo: Array, hi: Array, both: Flags
+        self, cell: Ints, much: Array, side: OneSide, flips: Mask, lo: Array, hi: Array, both: Mask
     ) -> Gaps:
         """Return gaps over the cells between two places of jogs, on both branches where `both`."""
         return Gaps(cell, much, self.span_of(side, flips, lo, hi), self.span_of(side, flips ^ both, lo, hi))
 
-    def any_way(self, rows: Rows, branches: Decided, some: Index, lo: Array, hi: Array) -> None:
+    def any_way(self, rows: Rows, branches: Decided, some: Ints, lo: Array, hi: Array) -> None:
         """Bound deficits by the range of V where throws land."""
         cell = rows.number[:-1][some]
         below, above = branches.cell_below[some], branches.cell_above[some]
@@ -304,7 +299,7 @@ class Deficits:
         rows: Rows,
         branches: Decided,
         all_of: Derivatives,
-        some: Index,
+        some: Ints,
         lo: Array,
         hi: Array,
         density: float,
@@ -351,7 +346,7 @@ class Deficits:
         rows: Rows,
         branches: Decided,
         all_of: Derivatives,
-        some: Index,
+        some: Ints,
         lo: Array,
         hi: Array,
         density: float,
@@ -412,7 +407,7 @@ class Deficits:
         self.ways.append(Curvature(cell[some], tuple(bends), tuple(swings), gaps=tuple(gaps)))
 
     def _moving(
-        self, rows: Rows, branches: Decided, some: Index, here: Index, below: Flags, above: Flags
+        self, rows: Rows, branches: Decided, some: Ints, here: Ints, below: Mask, above: Mask
     ) -> list[Bends]:
         """Return the bends at the border between the branches."""
         law, side = self.law, rows.side
@@ -435,7 +430,7 @@ class Deficits:
         other = border._replace(low=-high, high=-low)
         return self._border(rows, some, here, below, border) + self._border(rows, some, here, above, other)
 
-    def _border(self, rows: Rows, some: Index, here: Index, flips: Flags, border: _Border) -> list[Bends]:
+    def _border(self, rows: Rows, some: Ints, here: Ints, flips: Mask, border: _Border) -> list[Bends]:
         """Return the bends by the jump of the density at a border, fixed or moving with x."""
         if not here.size:
             return []

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.thrower import Exact, SmallAngle2
 from limitsets.proofs.prover.numbers import Intervals, Jet
 from limitsets.proofs.prover.two_throws import Formulas, ThrowNumbers, angle, variable
@@ -29,8 +29,6 @@ from limitsets.proofs.prover.two_throws import OneSide as Part
 #
 # so that sin p = p c_0, 1 - cos p = p s_0, and c_k' = -s_(k+1), s_k' = c_(k+1), none above 1/(k + 2) in size.
 
-
-Array = NDArray[np.float64]
 
 # The first term left out is below 1e-22 for p <= 2 pi.
 TERMS = 25
@@ -113,7 +111,7 @@ class Landed(NamedTuple):
     phi_error: Array
     place: Array
     error: Array
-    good: NDArray[np.bool_]
+    good: Mask
 
 
 class Derivatives(NamedTuple):
@@ -266,10 +264,8 @@ def slopes(side: OneSide, phi: Intervals, delta: Intervals) -> Derivatives:
 # of it.  Elsewhere the border may be anywhere.
 
 
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 # For all cells: certain flips, certain jogs, how far the border is open, and the branches below and above the border.
-_Cells = tuple[Flags, Flags, Array, Flags, Flags]
+_Cells = tuple[Mask, Mask, Array, Mask, Mask]
 
 BISECTIONS = 48
 # Places at which critical points are looked for.
@@ -305,10 +301,10 @@ class Decided(NamedTuple):
     """
 
     cut: Array
-    below: NDArray[np.bool_]
-    above: NDArray[np.bool_]
-    cell_below: NDArray[np.bool_]
-    cell_above: NDArray[np.bool_]
+    below: Mask
+    above: Mask
+    cell_below: Mask
+    cell_above: Mask
     beta: Array
 
 
@@ -344,7 +340,7 @@ def _at(side: OneSide, x: Array, delta: Array) -> Intervals:
     return margin(side, Intervals(x, x), phi, Intervals(delta, delta))[0]
 
 
-def _bisected(side: OneSide, x: Array, lo: Array, hi: Array, rising: NDArray[np.bool_]) -> Array:
+def _bisected(side: OneSide, x: Array, lo: Array, hi: Array, rising: Mask) -> Array:
     """Propose the deviation at which F changes its sign between two; one of these two where it keeps its sign."""
     lo, hi = lo.copy(), hi.copy()
     for _ in range(BISECTIONS):
@@ -419,10 +415,10 @@ def decided(side: OneSide, x: Array, pieces: Sequence[Piece]) -> Decided:
 def _by_corners(
     side: OneSide,
     x: Array,
-    open_: Index,
+    open_: Ints,
     by_x: Intervals,
-    rising: Flags,
-    falling: Flags,
+    rising: Mask,
+    falling: Mask,
     bounds: tuple[float, float],
     cells: _Cells,
 ) -> None:
@@ -448,11 +444,11 @@ def _by_corners(
 def _by_border(
     side: OneSide,
     x: Array,
-    open_: Index,
+    open_: Ints,
     by_x: Intervals,
     by_delta: Intervals,
     bounds: tuple[float, float],
-    nodes: tuple[Array, Flags, Flags],
+    nodes: tuple[Array, Mask, Mask],
     cells: _Cells,
 ) -> None:
     """Cut the cells at a chord, and bound how far the border may be from it."""
@@ -505,7 +501,7 @@ def crossings(side: OneSide, lo: float, hi: float, delta: float) -> list[float]:
     return [float(each) for each in 0.5 * (low + high)]
 
 
-def _flips(side: OneSide, x: Array, delta: float) -> NDArray[np.bool_]:
+def _flips(side: OneSide, x: Array, delta: float) -> Mask:
     f = _at(side, x, np.full(x.shape, delta))
     return f.lo + f.hi > 0.0
 

@@ -17,10 +17,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.proofs.chances.averages import Average, Gaps, Nodes, Span, Swings, Windows, mean_matrix
-from limitsets.proofs.chances.deficits import Deficits, Flags, Rows, Staircase
+from limitsets.proofs.chances.deficits import Deficits, Rows, Staircase
 from limitsets.proofs.chances.landings import (
     Decided,
     Derivatives,
@@ -32,9 +32,6 @@ from limitsets.proofs.chances.landings import (
     slopes,
 )
 from limitsets.proofs.prover.numbers import Intervals
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 # Inflates coefficients against the rounding of the few operations that make them.
 MORE = 1.0 + 2.0**-40
@@ -49,7 +46,7 @@ def throw_average(
     source: Nodes,
     target: Nodes,
     law: Staircase,
-    runs: list[Index],
+    runs: list[Ints],
 ) -> Average:
     """Build the average over the speed's deviations.
 
@@ -109,7 +106,7 @@ class _Parts(Deficits):
             ways=tuple(self.ways),
         )
 
-    def add(self, side: OneSide, numbers: Index) -> None:
+    def add(self, side: OneSide, numbers: Ints) -> None:
         """Add the starts of consecutive nodes."""
         law, n = self.law, numbers.size
         x = self.source.place[numbers]
@@ -253,7 +250,7 @@ class _Parts(Deficits):
             self.by_borders(rows, branches, all_of, some=curved, lo=lo, hi=hi, density=density)
 
     def _undecided(
-        self, rows: Rows, branches: Decided, lo: Array, hi: Array, density: float, known: Flags
+        self, rows: Rows, branches: Decided, lo: Array, hi: Array, density: float, known: Mask
     ) -> None:
         """Add gaps where the branch is open or is not that of the node's row, and where no landing place is proved."""
         law, cell = self.law, rows.number[:-1]

@@ -8,16 +8,17 @@ from typing import TypeAlias
 
 import numpy as np
 
+from limitsets.base.arrays import Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.scene import require_rests
-from limitsets.proofs.policies.game import Game, Mask, game_of, image_of
+from limitsets.proofs.policies.game import Game, game_of, image_of
+from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.certifying import spelled_deviations
-from limitsets.proofs.prover.cover import Cover, cover_on
+from limitsets.proofs.prover.cover import Cover, cell_ends, cover_on, cut_at
 from limitsets.proofs.prover.parameters import ParameterBox, joined, parameter_box, scattered
 from limitsets.systems.cells import CellSet, Domain, Grid, grid
-from limitsets.systems.graph.components import attracting_of
 
 Starts: TypeAlias = float | Mapping[int, tuple[float, float]] | None
 Progress: TypeAlias = Callable[[str, int, int], None] | None
@@ -110,9 +111,9 @@ def board_of(
     cells_of = _cells(
         scene, boxes, cells, {x, *cuts, *([starts] if isinstance(starts, float) else [])}, named
     )
-    beyond = np.concatenate([edges[:-1] >= x for (edges,) in cells_of.edges])
-    target = np.zeros(cells_of.n_cells, dtype=bool)
-    target[cells_of.of_side(side)] = beyond[cells_of.of_side(side)]
+    on, lo, _ = cell_ends(cells_of)
+    beyond = lo >= x
+    target = beyond & (on == side)
     covers = {}
     for k, (name, box) in enumerate(boxes.items()):
         if progress is not None:
@@ -149,22 +150,15 @@ def _cells(
     own = scene.domain
     end = min(float(box.bare[0].arm_length) for box in boxes.values())
     plain = grid(Domain(own.lo, np.full_like(own.hi, end), own.anchor), cells=cells, grading="uniform")
-    sides = []
-    for side, (edges,) in enumerate(plain.edges):
-        wanted = [x for x in {*cuts, *starts.get(side, ())} if edges[0] < x < edges[-1]]
-        sides.append((np.union1d(edges, np.array(wanted, dtype=np.float64)),))
-    return Grid(plain.domain, tuple(sides))
+    return cut_at(plain, {side: [*cuts, *starts.get(side, ())] for side in range(plain.sides)})
 
 
 def _starts(scene: Scene, cells: Grid, starts: Starts, noise: dict[str, str]) -> tuple[Mask, str]:
     """Give the cells of the starts, and the words for them."""
     mask = np.zeros(cells.n_cells, dtype=bool)
     if starts is None:
-        graph = cover_on(parameter_box(scene, noise=noise), cells).graph
-        sets = graph.recurrent_components()
-        good = attracting_of(graph.ranges, graph.components(), sets)
-        for each in (part for part, attracts in zip(sets, good, strict=True) if attracts):
-            mask[each] = True
+        component, _ = components_of(cover_on(parameter_box(scene, noise=noise), cells).graph)
+        mask = component >= 0
         if not mask.any():
             remedy = "name the starts"
             raise AnswerError("the limit sets of the scene's own throw", "none on these cells", "one", remedy)

@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Ints, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.ranges import expand
@@ -30,7 +31,7 @@ Bits = NDArray[np.uint64]
 COMPARED = 4096
 
 
-def packed(masks: NDArray[np.bool_]) -> Bits:
+def packed(masks: Mask) -> Bits:
     """Write sets of cells as bits: shape (..., n_cells) to (..., words).
 
     Examples
@@ -44,7 +45,7 @@ def packed(masks: NDArray[np.bool_]) -> Bits:
     return np.ascontiguousarray(whole).view(np.uint64)
 
 
-def cells_of(belief: Bits) -> NDArray[np.int64]:
+def cells_of(belief: Bits) -> Ints:
     """Give the numbers of the cells, ascending."""
     return np.flatnonzero(np.unpackbits(belief.view(np.uint8), bitorder="little"))
 
@@ -83,7 +84,7 @@ class Kept:
         return self._first(some, ~(self.rows[some] & ~belief).any(axis=1))
 
     @staticmethod
-    def _first(some: NDArray[np.int64], met: Any) -> int:
+    def _first(some: Ints, met: Any) -> int:
         return int(some[int(met.argmax())]) if met.any() else -1
 
 
@@ -91,7 +92,6 @@ class Kept:
 # The game of a controller who knows a set of cells that holds the part, and asks one question after every throw.
 
 
-Mask: TypeAlias = NDArray[np.bool_]
 Image: TypeAlias = Callable[[Mask], Mask | None]
 """From cells, shape (n_cells,), to all cells that their image may meet; None where some of it may leave them."""
 

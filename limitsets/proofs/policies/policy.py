@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Ints, Mask
 from limitsets.base.tables import Table, Tabled
-from limitsets.proofs.policies.game import Bits, Game, Kept, Mask, cells_of
+from limitsets.proofs.policies.game import Bits, Game, Kept, cells_of
 
 NONE = -1
 """No throw: stop; or no state: the answer cannot come, or comes of a part that is caught."""
@@ -41,11 +41,11 @@ class Policy(Tabled):
 
     answers: tuple[str, ...]
     throws: tuple[str, ...]
-    first: NDArray[np.int64]
+    first: Ints
     belief: Mask
-    throw: NDArray[np.int64]
-    after: NDArray[np.int64]
-    left: NDArray[np.int64]
+    throw: Ints
+    after: Ints
+    left: Ints
 
     @property
     def states(self) -> int:
@@ -67,7 +67,7 @@ class Policy(Tabled):
     def to_json(self) -> dict[str, Any]:
         """Give what a controller needs, without the beliefs."""
 
-        def by_answer(numbers: NDArray[np.int64]) -> dict[str, int | None]:
+        def by_answer(numbers: Ints) -> dict[str, int | None]:
             return {
                 word or "any": None if number == NONE else number
                 for word, number in zip(self.answers, numbers.tolist(), strict=True)

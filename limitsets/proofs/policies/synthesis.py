@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.base.arguments import arguments_checked
+from limitsets.base.arrays import Arrays
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
 from limitsets.base.progress import shown_in_notebooks
@@ -29,9 +29,6 @@ from limitsets.systems.cells import CellSet, Grid
 #
 # The file is laid out as every certificate (docs/certificates.md).  Its scene names the throws and the sensor; places
 # that cells are cut at stand as the floats that they are, written in full.
-
-
-Arrays = dict[str, NDArray[Any]]
 
 
 def write(

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from limitsets.proofs.prover.basin import ROUNDING, Basin, NearHinge, basin, near_hinge, shares_of
 from limitsets.proofs.prover.cover import Cover
 from limitsets.systems.cells import CellSet
+from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.components import attracting_of
 
 BELOW = "with the arm's surface above the joint, starts nearer to it than the fixed point of the jog go there"
@@ -101,6 +102,18 @@ class Attraction:
         return int(self.basin.rank.max())
 
 
+def components_of(graph: TransitionGraph) -> tuple[NDArray[np.int32], list[NDArray[np.int32]]]:
+    """Return the number of each cell's attracting component, -1 off them; and recurrent cells that do not attract."""
+    sets = graph.recurrent_components()
+    good = attracting_of(
+        graph.ranges, graph.components(), sets
+    )  # a survey's order is quadratic in their number
+    component = np.full(graph.n_cells, -1, dtype=np.int32)
+    for number, cells in enumerate(each for each, attracts in zip(sets, good, strict=True) if attracts):
+        component[cells] = number
+    return component, [cells for cells, attracts in zip(sets, good, strict=True) if not attracts]
+
+
 def attraction(cover: Cover) -> Attraction:
     """Find the attracting cells and prove that everything enters them.
 
@@ -114,13 +127,7 @@ def attraction(cover: Cover) -> Attraction:
     Attraction
         With the reason where it is not proved.
     """
-    graph = cover.graph
-    parts, sets = graph.components(), graph.recurrent_components()
-    good = attracting_of(graph.ranges, parts, sets)  # a survey's order is quadratic in their number
-    component = np.full(graph.n_cells, -1, dtype=np.int32)
-    for number, cells in enumerate(k for k, attracts in zip(sets, good, strict=True) if attracts):
-        component[cells] = number
-    lost = [cells for cells, attracts in zip(sets, good, strict=True) if not attracts]
+    component, lost = components_of(cover.graph)
     unresolved = CellSet.of(cover.grid, np.concatenate([np.zeros(0, np.int64), *lost]))
     joint = near_hinge(cover)
     return Attraction(

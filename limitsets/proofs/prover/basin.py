@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.thrower.flight_box import bracket, sure_bracket, turn_box, turn_point
 from limitsets.feeder.thrower.full_box import full_ways
 from limitsets.feeder.thrower.impact import jog_displacement, margin, strike
@@ -239,9 +240,6 @@ def _beyond(cover: Cover, side: int, x: float) -> NearHinge:
 # The proved basin: starts that are proved to come to the attracting cells and stay there.
 
 
-Mask = NDArray[np.bool_]
-Floats = NDArray[np.float64]
-
 # A goal that is claimed from some x on counts as proved if the starts nearer to the joint, of which nothing is proved,
 # make no more than this share of the arm (docs/certificates.md).
 MOST_UNEXPLAINED = 0.01
@@ -289,8 +287,8 @@ class Basin:
     rank: NDArray[np.int32]
     thinning: int
     near: bool
-    start: Floats
-    explained: Floats
+    start: Array
+    explained: Array
     share: float
     leaves: float
     creeps: float
@@ -344,7 +342,7 @@ def _ends(b: Any, phi: Any) -> Any:
     return (least.lo if grows else shift.lo), (most.hi if grows else shift.hi)
 
 
-def _displacements(cover: Cover, side: int, wanted: NDArray[np.int64]) -> Floats:
+def _displacements(cover: Cover, side: int, wanted: Ints) -> Array:
     """Return what `_shifts` says of some cells of a side, by their numbers there."""
     (edges,) = cover.grid.edges[side]
     out = np.full((wanted.size, 4), np.nan)
@@ -459,7 +457,7 @@ def _below_cells(cover: Cover, joint: Sequence[NearHinge], shut: Mask, *, thin: 
     return True
 
 
-def _start(cover: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool) -> tuple[Floats, Floats]:
+def _start(cover: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool) -> tuple[Array, Array]:
     """On each side, from where on every start is claimed, and up to where the starts are lost or creep."""
     (lo, hi), start, explained = cover.box.bare, [], []
     for side, (each, (edges,)) in enumerate(zip(joint, cover.grid.edges, strict=True)):
@@ -481,7 +479,7 @@ def _start(cover: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool) -> 
 
 
 def shares_of(
-    cover: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool, start: Floats, explained: Floats
+    cover: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool, start: Array, explained: Array
 ) -> tuple[float, float, float, float, bool]:
     """Shares of the arm that are claimed, leave, creep and are open; whether all beyond `start` is claimed.
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base.arguments import arguments_checked
+from limitsets.base.arrays import Array, Arrays
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import replaced
 from limitsets.base.progress import bar, in_notebook
@@ -177,19 +178,19 @@ FORMULAS = [
 ]
 
 
-def brackets(cover: Cover) -> NDArray[np.float64]:
+def brackets(cover: Cover) -> Array:
     """Brackets of the impact angle, shape (n_cells, 2), widened by the slack."""
     phi = np.concatenate([images.witness for images in cover.images], axis=1).T
     slack = SLACK * np.abs(phi)
     return np.stack([phi[:, 0] - slack[:, 0], phi[:, 1] + slack[:, 1]], axis=1)
 
 
-def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
+def arrays_of(proof: Attraction, prefix: str) -> Arrays:
     """Arrays of one box of parameters."""
     cover = proof.cover
     jog, flip = targets(cover, 0), targets(cover, 1)
     jogs, flips = jog[:, 0] >= 0, flip[:, 0] >= 0
-    arrays: dict[str, NDArray[Any]] = {
+    arrays: Arrays = {
         "jog": jog,
         "flip": flip,
         "branch": np.where(jogs & flips, 2, np.where(flips, 1, 0)).astype(np.int8),
@@ -203,7 +204,7 @@ def arrays_of(proof: Attraction, prefix: str) -> dict[str, NDArray[Any]]:
     return {prefix + name: np.ascontiguousarray(value) for name, value in arrays.items()}
 
 
-def _say_nothing(arrays: dict[str, NDArray[Any]], cover: Cover) -> None:
+def _say_nothing(arrays: Arrays, cover: Cover) -> None:
     """Enter the cells whose images are not proved: their starts land within one turn if at all, at any place."""
     offset, sides = cover.grid.offset, cover.grid.sides
     for side, images in enumerate(cover.images):
@@ -286,7 +287,7 @@ def write(
     DeniedError
         The checker does not confirm it: it is kept as NAME.denied.zip.
     """
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: Arrays = {}
     boxes = []
     for number, proof in enumerate(proofs):
         arrays |= arrays_of(proof, f"{number}.")

@@ -12,7 +12,7 @@ from typing import Any, overload
 
 from limitsets.base.arguments import arguments_checked_as
 from limitsets.base.errors import AnswerError, shown
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.laid import LaidLike, laid_goals
 from limitsets.feeder.scene.quantities import deviation, find
@@ -45,8 +45,6 @@ MOST_PIECES, MOST_CELLS = 1024, 4_000_000
 
 # An orbit that refutes the goal is searched for in so many of the widest pieces, and at the corners.
 MOST_SEARCHED = 8
-
-Progress = Callable[[str, int, int], None]
 
 
 def _attracts_all(attractors: Attraction, scene: Scene) -> Claim:

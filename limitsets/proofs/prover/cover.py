@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.thrower import Exact
 from limitsets.feeder.thrower.flight_box import bracket, exact_turn, turn_box, turn_point
@@ -342,7 +343,7 @@ class Cover:
         return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
 
 
-def _widened(enclosed: Enclosures, edges: NDArray[np.float64], landing: float) -> Enclosures:
+def _widened(enclosed: Enclosures, edges: Array, landing: float) -> Enclosures:
     """Widen the images by the slack and by the scatter of the landing place, which no decision depends on."""
     more = np.nextafter(landing + SLACK_OF_IMAGE * np.diff(edges), np.inf)
     hulls = {
@@ -390,11 +391,16 @@ def cover(
     unknown = np.minimum(UNKNOWN * (box.hi.a - box.lo.a), 0.1 * (end - foot)) if not points else 0.0
     lo = np.where(rests, foot + np.maximum(NEAREST * (end - foot), unknown), end)
     plain = grid(Domain(lo[:, None], end[:, None], anchor), cells=cells)
+    return cover_on(box, cut_at(plain, cuts or {}), pieces, points)
+
+
+def cut_at(plain: Grid, cuts: Mapping[int, Sequence[float]]) -> Grid:
+    """Cut the cells of a grid at more places, by side."""
     sides = []
     for side, (edges,) in enumerate(plain.edges):
-        wanted = [x for x in (cuts or {}).get(side, ()) if edges[0] < x < edges[-1]]
+        wanted = [x for x in cuts.get(side, ()) if edges[0] < x < edges[-1]]
         sides.append((np.union1d(edges, wanted),))
-    return cover_on(box, Grid(plain.domain, tuple(sides)), pieces, points)
+    return Grid(plain.domain, tuple(sides))
 
 
 def cover_on(
@@ -406,6 +412,13 @@ def cover_on(
         for side, (edges,) in enumerate(cells.edges)
     )
     return Cover(box, cells, enclosed, _graph(box, cells, enclosed), points)
+
+
+def cell_ends(cells: Grid) -> tuple[Ints, Array, Array]:
+    """Return of every cell its side, its lower and its upper end."""
+    lo = np.concatenate([edges[:-1] for (edges,) in cells.edges])
+    hi = np.concatenate([edges[1:] for (edges,) in cells.edges])
+    return cells.side_of(np.arange(cells.n_cells)), lo, hi
 
 
 def _graph(box: ParameterBox, cells: Grid, enclosed: Sequence[Enclosures]) -> TransitionGraph:
@@ -426,6 +439,14 @@ def _graph(box: ParameterBox, cells: Grid, enclosed: Sequence[Enclosures]) -> Tr
             leaving[cells.of_side(side)] |= np.where(beyond, outward, 0).astype(np.uint8)
     ranges = build(cells, first, joined[0], joined[1], joined[2], leaving)
     return TransitionGraph(box.lo, cells, ranges, "boxes")
+
+
+def met(ends: NDArray[np.int32], cells: Mask) -> Mask:
+    """Return the cells that images of some cells meet; `ends` are the first and last of each, -1 where it has none."""
+    some = ends[cells & (ends[:, 0] >= 0)]
+    begin, past = (np.bincount(at, minlength=cells.size + 1) for at in (some[:, 0], some[:, 1] + 1))
+    reached: Mask = np.cumsum((begin - past)[:-1]) > 0
+    return reached
 
 
 def everywhere(covered: Cover) -> list[NDArray[np.int32]]:

@@ -12,7 +12,7 @@ bracket of a critical point, where no branch is proved, gives nothing.  At rest 
 F(F(B)), ... and, B being part of N, in every F^n(N): **B lies in L.**
 
 This takes the place of an argument by expansion ("every interval grows until it covers the critical point").  An end is
-the image, along the itinerary given with it, of a one-sided limit at a critical point c.  It is reached because B holds
+the image, along some itinerary, of a one-sided limit at a critical point c.  It is reached because B holds
 the proper side of c up to its bracket, and every point of B, on both sides of c and around every other critical point
 that is kept, is again the image of a point of B.  So the proof needs no statement about recurrent orbits or about one
 critical point reaching another, and no slope.  All preimages are decided starts: the value of the map at a critical
@@ -32,14 +32,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.feeder.thrower.params import gather_box
 from limitsets.feeder.thrower.throw_box import BOTH, NOTHING, throw_box
 from limitsets.numbers.interval import Interval
 from limitsets.numbers.jit import proof_kernel
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.orbits import follow
 from limitsets.proofs.prover.parameters import ParameterBox
 from limitsets.systems.maps import codes
 
@@ -58,7 +57,6 @@ from limitsets.systems.maps import codes
 
 Pair = tuple[float, float]
 Intervals = dict[int, list[Pair]]
-Array = NDArray[np.float64]
 
 UNDECIDED = (BOTH, NOTHING)
 
@@ -285,16 +283,6 @@ def at_rest(image: Callable[[Intervals], Intervals], union: Intervals) -> tuple[
 # End points of the limit set, each between two proved numbers, outer and inner.
 
 
-class CriticalBracket(NamedTuple):
-    """Where the decision changes: one branch is proved up to `lo`, another from `hi` on."""
-
-    side: int
-    lo: float
-    hi: float
-    before: int
-    after: int
-
-
 class ProvedEnd(NamedTuple):
     """One end of one interval of the limit set.
 
@@ -304,21 +292,12 @@ class ProvedEnd(NamedTuple):
         Its side, and "lo" or "hi".
     outer, inner : float, float or None
         Nothing of the limit set lies beyond `outer`; all from `inner` to the other end's `inner` belongs to it.
-    critical : CriticalBracket or None
-        Where its orbit begins, None where it is not traced to a critical point.
-    branches : tuple of int
-        The throws from there, the first being the branch of the one-sided limit.
-    orbit : tuple of (lo, hi)
-        Enclosures of the states along them, the bracket first, the end last.
     """
 
     side: int
     which: str
     outer: float
     inner: float | None
-    critical: CriticalBracket | None
-    branches: tuple[int, ...]
-    orbit: tuple[Pair, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,8 +308,6 @@ class ProvedEnds:
     ----------
     ends : tuple of ProvedEnd
         By side, ascending.
-    critical : tuple of CriticalBracket
-        The critical points in the outer set.
     images : (int, int)
         Images taken for the outer and the inner set.
     tiles : dict of int to list of ProvedPiece
@@ -340,7 +317,6 @@ class ProvedEnds:
     """
 
     ends: tuple[ProvedEnd, ...]
-    critical: tuple[CriticalBracket, ...]
     images: tuple[int, int]
     tiles: dict[int, list[ProvedPiece]]
     reason: str
@@ -374,72 +350,6 @@ class ProvedEnds:
                 for piece in row
             ],
         }  # fmt: skip
-
-
-def _critical(tiles: dict[int, list[ProvedPiece]]) -> tuple[CriticalBracket, ...]:
-    """Undecided tiles between decided ones of different branches."""
-    brackets = []
-    for side, row in tiles.items():
-        groups = union_of((piece.lo, piece.hi) for piece in row if piece.branch == BOTH)
-        before = {piece.hi: piece.branch for piece in row if piece.branch in (codes.JOG, codes.FLIP)}
-        after = {piece.lo: piece.branch for piece in row if piece.branch in (codes.JOG, codes.FLIP)}
-        brackets += [
-            CriticalBracket(side, lo, hi, before[lo], after[hi])
-            for lo, hi in groups
-            if lo in before and hi in after and before[lo] != after[hi]
-        ]
-    return tuple(brackets)
-
-
-class _Step(NamedTuple):
-    """The start whose throw gives an end, and the number of the interval of which the start is itself an end."""
-
-    side: int
-    x: float
-    branch: int
-    owner: int
-    which: str
-
-
-def _source(parts: list[PieceImage], outer: Intervals, side: int, x: float) -> _Step:
-    """Of the ends of all images on a side, find where the one nearest to x comes from."""
-    distance = np.inf
-    best = _Step(side, x, -1, -1, "")
-    for part in parts:
-        if part.to != side or part.piece.branch not in (codes.JOG, codes.FLIP):
-            continue
-        interval = outer[part.side][part.owner]
-        for start, image, end, which in (
-            (part.lo, part.at_lo, interval[0], "lo"),
-            (part.hi, part.at_hi, interval[1], "hi"),
-        ):
-            away = abs(0.5 * (image[0] + image[1]) - x)
-            if away < distance:
-                distance = away
-                best = _Step(part.side, start, part.branch, part.owner if start == end else -1, which)
-    return best
-
-
-def _traced(
-    images: UnionImages, outer: Intervals, critical: tuple[CriticalBracket, ...], side: int, x: float
-) -> tuple[CriticalBracket | None, tuple[int, ...], tuple[Pair, ...]]:
-    """Follow an end back to a critical point, and enclose the orbit from there."""
-    parts = images.parts(outer)
-    branches: list[int] = []
-    most = 2 * sum(map(len, outer.values())) + 1
-    at, on = x, side
-    while len(branches) < most:
-        step = _source(parts, outer, on, at)
-        branches.insert(0, step.branch)
-        at, on = step.x, step.side
-        if step.owner < 0:
-            break
-    for one in critical:
-        if one.side == on and at in (one.lo, one.hi):
-            orbit = follow(images.box, one.lo, one.hi, one.side, branches)
-            if orbit.lo.size == len(branches) + 1:
-                return one, tuple(branches), tuple(zip(orbit.lo.tolist(), orbit.hi.tolist(), strict=True))
-    return None, (), ()
 
 
 def _inner_ends(outer: Intervals, inner: Intervals) -> tuple[dict[tuple[int, int], Pair], str]:
@@ -495,19 +405,14 @@ def proved_ends(attraction: Attraction) -> ProvedEnds:
     images = UnionImages(box, tiles)
     cells = {side: union_of((piece.lo, piece.hi) for piece in row) for side, row in tiles.items() if row}
     if not cells:
-        return ProvedEnds((), (), (0, 0), {}, "there are no attracting cells")
+        return ProvedEnds((), (0, 0), {}, "there are no attracting cells")
     outer, taken = at_rest(images.outward, cells)
     inner, then = at_rest(images.inward, outer)
     held, reason = _inner_ends(outer, inner) if then > 0 else ({}, "the inner ends still move")
-    critical = tuple(
-        one
-        for one in _critical(tiles)
-        if any(lo <= one.lo and one.hi <= hi for lo, hi in outer.get(one.side, []))
-    )
-    ends = []
-    for side, intervals in sorted(outer.items()):
-        for owner, pair in enumerate(intervals):
-            within = held.get((side, owner), (None, None))
-            for which, x, inside in zip(("lo", "hi"), pair, within, strict=True):
-                ends.append(ProvedEnd(side, which, x, inside, *_traced(images, outer, critical, side, x)))
-    return ProvedEnds(tuple(ends), critical, (taken, then), tiles, reason)
+    ends = [
+        ProvedEnd(side, which, x, inside)
+        for side, intervals in sorted(outer.items())
+        for owner, pair in enumerate(intervals)
+        for which, x, inside in zip(("lo", "hi"), pair, held.get((side, owner), (None, None)), strict=True)
+    ]
+    return ProvedEnds(tuple(ends), (taken, then), tiles, reason)

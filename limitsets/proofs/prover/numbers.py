@@ -20,7 +20,8 @@ from math import isqrt
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+
+from limitsets.base.arrays import Array, Ints
 
 # ----------------------------------------------------------------
 # Rational intervals: exact arithmetic for the few numbers that a scene's decimals give.
@@ -75,13 +76,10 @@ class RationalInterval:
     __radd__ = __add__
 
     def __sub__(self, other: RationalInterval | int) -> RationalInterval:
-        b = _span(other)
-        if b is None:
-            return NotImplemented
-        return _short(self.lo - b.hi, self.hi - b.lo)
+        return self + (-other)
 
     def __rsub__(self, other: int) -> RationalInterval:
-        return RationalInterval.of(other) - self
+        return -self + other
 
     def __mul__(self, other: RationalInterval | int) -> RationalInterval:
         b = _span(other)
@@ -206,9 +204,6 @@ def angle(y: RationalInterval, x: RationalInterval) -> RationalInterval:
 # comparison with nan is false: a proof accepts on comparisons that are true.
 
 
-Array = NDArray[np.float64]
-
-
 def _outward(lo: Array, hi: Array) -> Intervals:
     return Intervals(np.nextafter(lo, -np.inf), np.nextafter(hi, np.inf))
 
@@ -239,7 +234,7 @@ class Intervals:
         """Return one interval."""
         return cls(np.array([lo], dtype=float), np.array([lo if hi is None else hi], dtype=float))
 
-    def __getitem__(self, chosen: NDArray[np.int64]) -> Intervals:
+    def __getitem__(self, chosen: Ints) -> Intervals:
         return Intervals(self.lo[chosen], self.hi[chosen])
 
     def rows(self, count: int) -> Intervals:

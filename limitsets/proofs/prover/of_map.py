@@ -20,7 +20,7 @@ checker knows the throw only.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add, mul
@@ -30,23 +30,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base.arguments import arguments_checked_as
+from limitsets.base.arrays import Array, Ints
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
 from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled, bands_of
 from limitsets.numbers.interval import guard
+from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.proof import Claim
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph, transitions
-from limitsets.systems.graph.components import attracting_of, ranks
+from limitsets.systems.graph.components import ranks
 from limitsets.systems.maps import coerce, has_slope, kernels, kind_of
 from limitsets.systems.maps.contract import between
 from limitsets.systems.maps.derived import NEVER, SURE, UNKNOWN, branch_boxes
 from limitsets.systems.sets import Cycle, Cycles, cycles, cycles_of
 from limitsets.systems.sets.basin import longest_stays, passing
 
-Floats: TypeAlias = NDArray[np.float64]
 Matrix: TypeAlias = list[list[Intervals]]
 
 # Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
@@ -78,12 +79,12 @@ class CycleOfMap:
         Whether every eigenvalue of it is below 1 in modulus; None where that is open.
     """
 
-    lo: Floats
-    hi: Floats
-    side: NDArray[np.int64]
-    branches: NDArray[np.int64]
-    slope_lo: Floats
-    slope_hi: Floats
+    lo: Array
+    hi: Array
+    side: Ints
+    branches: Ints
+    slope_lo: Array
+    slope_hi: Array
     attracts: bool | None
 
     @property
@@ -224,25 +225,10 @@ def _place(grid: Grid, cell: int) -> str:
     return f"side {side}, x in {spans}" if grid.sides > 1 else f"x in {spans}"
 
 
-def _components(graph: TransitionGraph) -> NDArray[np.int32]:
-    """Attracting component of each cell."""
-    sets = graph.recurrent_components()
-    good = attracting_of(graph.ranges, graph.components(), sets)
-    component = np.full(graph.n_cells, -1, dtype=np.int32)
-    for number, cells in enumerate(k for k, attracts in zip(sets, good, strict=True) if attracts):
-        component[cells] = number
-    return component
-
-
 def _invariant(proof: ProofOfMap) -> Claim:
     if not len(proof.cells):
         return Claim("invariant", "undecided", "there are no attracting cells", {})
     return Claim("invariant", "proved", "", {})
-
-
-def _trapping(proof: ProofOfMap) -> Claim:
-    claim = _invariant(proof)
-    return Claim("trapping", claim.verdict, claim.reason, {})
 
 
 def _attracts_all(proof: ProofOfMap) -> Claim:
@@ -311,7 +297,7 @@ def _expanding(proof: ProofOfMap) -> Claim:
 # ---------------------------------------------------------------- cycles
 
 
-def _stepped(proof: ProofOfMap, lo: Floats, hi: Floats, cycle: Cycle) -> tuple[Intervals, Intervals] | str:
+def _stepped(proof: ProofOfMap, lo: Array, hi: Array, cycle: Cycle) -> tuple[Intervals, Intervals] | str:
     """Enclose images (p, d) and slopes (p, d, d) of boxes around the points of an orbit; or say what is missing."""
     image, slope = np.empty((2, *lo.shape)), np.empty((2, *lo.shape, lo.shape[1]))
     for side, branch in sorted(set(zip(cycle.side.tolist(), cycle.branches.tolist(), strict=True))):
@@ -327,7 +313,7 @@ def _stepped(proof: ProofOfMap, lo: Floats, hi: Floats, cycle: Cycle) -> tuple[I
     return Intervals(*image), Intervals(*slope)
 
 
-def _matrix(lo: Floats, hi: Floats) -> Matrix:
+def _matrix(lo: Array, hi: Array) -> Matrix:
     return [[Intervals.of(a, b) for a, b in zip(*rows, strict=True)] for rows in zip(lo, hi, strict=True)]
 
 
@@ -336,7 +322,7 @@ def _times(a: Matrix, b: Matrix) -> Matrix:
     return [[reduce(add, map(mul, row, column)) for column in columns] for row in a]
 
 
-def _ends(a: Matrix) -> tuple[Floats, Floats]:
+def _ends(a: Matrix) -> tuple[Array, Array]:
     lo, hi = (np.array([[getattr(entry, end)[0] for entry in row] for row in a]) for end in ("lo", "hi"))
     return lo, hi
 
@@ -347,7 +333,7 @@ def _slope(steps: Intervals) -> Matrix:
     return reduce(lambda total, step: _times(step, total), each)
 
 
-def _exactly(x: Floats) -> Intervals:
+def _exactly(x: Array) -> Intervals:
     return Intervals(x, x)
 
 
@@ -356,7 +342,7 @@ def _sum(terms: Intervals) -> Intervals:
     return reduce(add, map(Intervals, np.moveaxis(terms.lo, -1, 0), np.moveaxis(terms.hi, -1, 0)))
 
 
-def _inverse(slope: Intervals) -> Floats:
+def _inverse(slope: Intervals) -> Array:
     """Invert DF in floats; nan, which proves nothing, where it is singular."""
     p, d = slope.lo.shape[:2]
     derivative = np.zeros((p, d, p, d))
@@ -369,7 +355,7 @@ def _inverse(slope: Intervals) -> Floats:
         return np.full((p * d, p * d), np.nan)
 
 
-def _krawczyk(middle: Floats, c: Floats, off: Intervals, slope: Intervals, wide: Intervals) -> Intervals:
+def _krawczyk(middle: Array, c: Array, off: Intervals, slope: Intervals, wide: Intervals) -> Intervals:
     """K(X), from F at the middles, the slopes on X, and X less the middles."""
     p, d = middle.shape
     of_points = c.reshape(p * d, p, d)
@@ -422,24 +408,19 @@ def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
     step = _stepped(proof, at.lo, at.hi, cycle)
     if isinstance(step, str):
         return step
-    points = list(zip(at.lo, at.hi, strict=True))
     if any(
-        _meet(points[0], points[k])
+        ((at.lo[0] <= at.hi[k]) & (at.lo[k] <= at.hi[0])).all()
         for k in range(1, cycle.period)
         if cycle.period % k == 0 and cycle.side[k] == cycle.side[0]
     ):
         return "its period may be smaller"
-    if not _within(proof.cells, *points[0], int(cycle.side[0])):
+    if not _within(proof.cells, at.lo[0], at.hi[0], int(cycle.side[0])):
         return "its box is not in the attracting cells"
     slope = _slope(step[1])
     return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
 
 
-def _meet(one: tuple[Floats, Floats], two: tuple[Floats, Floats]) -> bool:
-    return bool(((one[0] <= two[1]) & (two[0] <= one[1])).all())
-
-
-def _within(cells: CellSet, lo: Floats, hi: Floats, side: int) -> bool:
+def _within(cells: CellSet, lo: Array, hi: Array, side: int) -> bool:
     """Whether the cells cover a box."""
     grid = cells.grid
     corners = grid.index(np.array([lo, hi]), side)
@@ -486,11 +467,11 @@ def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[
 # ---------------------------------------------------------------- all together
 
 
-PROVERS = {
+PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "attracts-all": _attracts_all,
     "expanding": _expanding,
     "invariant": _invariant,
-    "trapping": _trapping,
+    "trapping": lambda proof: replace(_invariant(proof), claim="trapping"),
 }
 CLAIMS_OF_MAP = (*PROVERS, "cycles")
 """What can be claimed of any map."""
@@ -560,7 +541,9 @@ def certify_map(
     if progress is not None:
         progress("transitions", 0, 1)
     graph = transitions(lower, grid, "boxes", upper=upper)
-    proof = ProofOfMap(lower, upper, graph, component=_components(graph), claims=(), cycles=(), seconds=0.0)
+    proof = ProofOfMap(
+        lower, upper, graph, component=components_of(graph)[0], claims=(), cycles=(), seconds=0.0
+    )
     orbits: tuple[CycleOfMap, ...] = ()
     answers = []
     for word in wanted:

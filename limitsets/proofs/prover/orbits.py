@@ -16,8 +16,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.thrower.effects.landing import Landing
 from limitsets.feeder.thrower.effects.roll import Roll
@@ -79,9 +80,9 @@ def replay(
     box: ParameterBox,
     start: tuple[float, float],
     side: int,
-    kappa: NDArray[np.float64],
-    landing: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    kappa: Array,
+    landing: Array,
+) -> tuple[Array, Array, Ints]:
     """Enclose an orbit.
 
     Parameters
@@ -168,10 +169,10 @@ class Followed(NamedTuple):
         Enclosure of the derivative of the last state with respect to the start; nan where the orbit is shorter.
     """
 
-    lo: NDArray[np.float64]
-    hi: NDArray[np.float64]
-    side: NDArray[np.int64]
-    decided: NDArray[np.bool_]
+    lo: Array
+    hi: Array
+    side: Ints
+    decided: Mask
     slope: Pair
 
 
@@ -219,10 +220,10 @@ class ProvedCycle:
         Enclosure of the derivative of F^p on the first interval, and so along the orbit.
     """
 
-    lo: NDArray[np.float64]
-    hi: NDArray[np.float64]
-    side: NDArray[np.int64]
-    branches: NDArray[np.int64]
+    lo: Array
+    hi: Array
+    side: Ints
+    branches: Ints
     multiplier: Pair
 
     @property
@@ -253,7 +254,7 @@ class ProvedCycle:
         return lo - slack, hi + slack
 
 
-def _crosses(box: ParameterBox, lo: float, hi: float, side: int, word: NDArray[np.int64]) -> bool:
+def _crosses(box: ParameterBox, lo: float, hi: float, side: int, word: Ints) -> bool:
     """Whether G(x) - x is proved to have opposite signs at lo and hi."""
     first, last = follow(box, lo, lo, side, word), follow(box, hi, hi, side, word)
     if first.lo.size <= word.size or last.lo.size <= word.size:

@@ -15,8 +15,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from limitsets.base.arrays import Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.geometry.polygon import above_side
@@ -112,8 +112,14 @@ def joined(noise: Mapping[str, str], scatter: Mapping[str, str]) -> dict[str, st
 DIGITS = 25
 
 
-def _decimal(value: Fraction, up: bool) -> str:
-    """Write a rational as a decimal, outward if it has no short one."""
+def decimal(value: Fraction, *, up: bool = False) -> str:
+    """Write a rational as a decimal, rounded down or up if it has no short one.
+
+    Examples
+    --------
+    >>> decimal(Fraction(-397, 1000)), decimal(Fraction(12))
+    ('-0.397', '12')
+    """
     scale = 10**DIGITS
     scaled = value * scale
     whole_part = math.ceil(scaled) if up else math.floor(scaled)
@@ -141,7 +147,7 @@ class SceneBox:
         spelled = {}
         for name, span in self.spans.items():
             unit = parse(text_at(self.scene.text, name), find(name).dimension).unit
-            spelled[name] = [f"{_decimal(span.lo, up=False)} {unit}", f"{_decimal(span.hi, up=True)} {unit}"]
+            spelled[name] = [f"{decimal(span.lo)} {unit}", f"{decimal(span.hi, up=True)} {unit}"]
         return spelled
 
     def tree(self) -> dict[str, Any]:
@@ -262,9 +268,15 @@ class ParameterBox:
         return isinstance(self.lo, FullThrow)
 
     @property
-    def rests(self) -> npt.NDArray[np.bool_]:
+    def rests(self) -> Mask:
         """On which sides the part rests; on the others it tips over, for all parameters."""
         return (self.lo.a > 0) & (self.hi.a < self.lo.length)
+
+    @property
+    def concave(self) -> bool:
+        """Whether heights are concave: what goes one way then depends continuously on its start and on kappa."""
+        lo, hi = self.bare
+        return bool((lo.kappa > np.hypot(hi.a, hi.d) * (1.0 + 1e-12)).all())
 
     @property
     def middle_kappa(self) -> float:

@@ -138,6 +138,28 @@ def write_refutation(
 # What was proved of a scene: the claims, their certificate, and their tables for JSON.
 
 
+def require_checkable(effects: Sequence[str], goals: Iterable[Goal | None], stands: str) -> None:
+    """Refuse what no certificate can hold: effects beyond a spread, and goals that the checker does not know.
+
+    `stands` says where what is proved is to be read instead.
+    """
+    if effects:
+        raise AnswerError(
+            "the certificate",
+            f"with the effects {', '.join(effects)}",
+            "the minimal model, and noise",
+            f"nothing rechecks other maps; {stands}",
+        )
+    for goal in goals:
+        if goal is not None and not rechecked(goal):
+            raise AnswerError(
+                "the certificate",
+                f"of the goal {goal.kind}",
+                "goals that the checker knows",
+                f"nothing rechecks others; {stands}",
+            )
+
+
 SHARES = ("share", "leaves", "creeps", "open")
 
 
@@ -413,21 +435,8 @@ class Proof(Tabled):
         DeniedError
             The checker does not confirm it: it is kept as NAME.denied.zip, and what it denies is undecided.
         """
-        if self.effects:
-            raise AnswerError(
-                "the certificate",
-                f"with the effects {', '.join(self.effects)}",
-                "the minimal model, and noise",
-                "nothing rechecks other maps; the proof stands in .claims and .to_json()",
-            )
-        goal = self.scene.goal
-        if goal is not None and not rechecked(goal) and any(claim.claim == "goal" for claim in self.claims):
-            raise AnswerError(
-                "the certificate",
-                f"of the goal {goal.kind}",
-                "goals that the checker knows",
-                "nothing rechecks others; the proof stands in .claims and .to_json()",
-            )
+        goals = [self.scene.goal for claim in self.claims if claim.claim == "goal"]
+        require_checkable(self.effects, goals, "the proof stands in .claims and .to_json()")
         good = [
             {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}
             for claim in self.claims

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import Goal, Reaches
 from limitsets.feeder.scene import Scene, load
@@ -52,9 +52,6 @@ PLACES, KAPPAS, BACK, LENGTH, KEPT = 120_000, 9, 4, 200_000, 4000
 # Throws of the long orbit before the noise begins: the closed orbit may begin at each of them.
 BEFORE = 12
 
-Array = NDArray[np.float64]
-Sides = NDArray[np.int64]
-
 
 class _Raster:
     """Places evenly over the attracting cells, and the nearest of them to any place."""
@@ -76,7 +73,7 @@ class _Raster:
             count += some.size
         self.x, self.side = np.concatenate(x), np.concatenate(side)
 
-    def nearest(self, x: Array, side: Sides) -> Sides:
+    def nearest(self, x: Array, side: Ints) -> Ints:
         """Return the number of the nearest place; -1 where there is none."""
         nearest = np.full(x.size, -1)
         for s, first in self.first.items():
@@ -87,7 +84,7 @@ class _Raster:
         return nearest
 
 
-def _beside(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _beside(mask: Mask) -> Mask:
     """Add the neighbours."""
     wide = mask.copy()
     wide[1:] |= mask[:-1]
@@ -140,9 +137,9 @@ def _followed(
     attractors: Attraction,
     wrong: Wrong,
     raster: _Raster,
-    levels: list[NDArray[np.bool_]],
+    levels: list[Mask],
     path: Orbit,
-    begin: Sides,
+    begin: Ints,
     options: list[ThrowChoice],
 ) -> Refutation:
     """Throw on from states of the long orbit along the levels, and close and prove what then violates the goal."""

@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.thrower.effects.landing import Landing
 from limitsets.feeder.thrower.flight_box import bracket
 from limitsets.feeder.thrower.motion import FullThrow
@@ -80,7 +81,7 @@ def least_slope(cover: Cover, cells: CellSet) -> tuple[float, str]:
     return least, place
 
 
-def slopes(cover: Cover, cells: CellSet) -> NDArray[np.float64]:
+def slopes(cover: Cover, cells: CellSet) -> Array:
     """Lower bounds of the slope on each of the given cells; nan on the others, -1 where nothing is proved."""
     least = np.full(cover.grid.n_cells, np.nan)
     for side, k, _, out in _pieces(cover, cells):
@@ -110,8 +111,6 @@ def _pieces(cover: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any]]
 # ----------------------------------------------------------------
 # A density bound by the Perron-Frobenius operator: almost every orbit leaves some cells (thinning).
 
-
-Mask = NDArray[np.bool_]
 
 # Throws after which bounds have to be below 1.
 MOST = 4000
@@ -181,7 +180,7 @@ def perron_frobenius_bound(cover: Cover, cells: Mask, group: NDArray[np.int32] |
     return DensityBound(throws, cells & thick[of], reason)
 
 
-def _rounds(cover: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np.int64], thick: Mask) -> int:
+def _rounds(cover: Cover, left: Mask, steep: Array, of: Ints, thick: Mask) -> int:
     """Bound the densities throw by throw; mark the groups that do not thin out, and count the throws of the others."""
     number = np.flatnonzero(left)
     thrown = _Thrown(_stretches(cover, left, number, of), (1.0 + SLACK) / steep[number])
@@ -210,21 +209,19 @@ def _rounds(cover: Cover, left: Mask, steep: NDArray[np.float64], of: NDArray[np
     return last if last else throws
 
 
-def _share(bound: NDArray[np.float64], earlier: NDArray[np.float64]) -> NDArray[np.float64]:
+def _share(bound: Array, earlier: Array) -> Array:
     """Divide bounds by earlier ones: what was 0 and is not has grown without limit."""
     return np.divide(bound, earlier, out=np.where(bound > 0.0, np.inf, 0.0), where=earlier > 0.0)
 
 
-def _ends(
-    largest: NDArray[np.float64], share: NDArray[np.float64], throws: int, since: int
-) -> NDArray[np.float64]:
+def _ends(largest: Array, share: Array, throws: int, since: int) -> Array:
     """Count the throws after which bounds are below 1 that are at most a share of those after throw `since`."""
     with np.errstate(divide="ignore", invalid="ignore"):
         again = np.floor(np.log(largest) / -np.log(share)) + 1.0
     return np.where(share < 1.0, throws + again * (throws - since), np.inf)
 
 
-def _keeping(thrown: _Thrown, bound: NDArray[np.float64], share: NDArray[np.float64]) -> NDArray[np.float64]:
+def _keeping(thrown: _Thrown, bound: Array, share: Array) -> Array:
     """Find bounds that, with 0 for all others, keep a share of themselves after a throw; 0 where none are found."""
     for _ in range(TRIES):
         kept = np.where(thrown(bound) >= share * bound, bound, 0.0)
@@ -247,13 +244,13 @@ class _Stretches(NamedTuple):
         The target of each of these groups, among the cells left.
     """
 
-    first: NDArray[np.int64]
-    last: NDArray[np.int64]
-    begins: NDArray[np.int64]
-    target: NDArray[np.int64]
+    first: Ints
+    last: Ints
+    begins: Ints
+    target: Ints
 
 
-def _stretches(cover: Cover, left: Mask, number: NDArray[np.int64], of: NDArray[np.int64]) -> _Stretches:
+def _stretches(cover: Cover, left: Mask, number: Ints, of: Ints) -> _Stretches:
     """Find the stretches among the cells left, `number`, within their groups.
 
     Images of neighbours overlap, so a stretch is told by its ends: where the image of a cell meets a target and that
@@ -283,9 +280,7 @@ def _stretches(cover: Cover, left: Mask, number: NDArray[np.int64], of: NDArray[
     return _Stretches(first, last, np.flatnonzero(begins), np.searchsorted(number, to[begins]))
 
 
-def _only_here(
-    ends: NDArray[np.int64], apart: Mask, step: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _only_here(ends: Ints, apart: Mask, step: int) -> tuple[Ints, Ints]:
     """Pairs of a cell and a target that its image meets and that of its neighbour, `step` before it, does not."""
     none = ends[:, 0] < 0
     beside = np.roll(ends, step, axis=0)
@@ -312,7 +307,7 @@ class _Largest:
         self.one = level * size + each.first
         self.other = level * size + each.last + 1 - 2**level
 
-    def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, values: Array) -> Array:
         """Return it for values of the cells left."""
         table = self.table
         table[0] = values
@@ -320,17 +315,17 @@ class _Largest:
             half, end = 2 ** (level - 1), values.size - 2**level + 1
             np.maximum(table[level - 1, :end], table[level - 1, half : half + end], out=table[level, :end])
         flat = table.reshape(-1)
-        most: NDArray[np.float64] = np.maximum(flat[self.one], flat[self.other])
+        most: Array = np.maximum(flat[self.one], flat[self.other])
         return most
 
 
 class _Thrown:
     """Bounds of the densities on the cells left, after one more throw."""
 
-    def __init__(self, each: _Stretches, factor: NDArray[np.float64]) -> None:
+    def __init__(self, each: _Stretches, factor: Array) -> None:
         self.each, self.factor, self.largest = each, factor, _Largest(each, factor.size)
 
-    def __call__(self, bound: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, bound: Array) -> Array:
         """Return them for bounds before it."""
         if not self.each.begins.size:
             return np.zeros(bound.size)
@@ -341,11 +336,11 @@ class _Thrown:
 class _LargestOf:
     """The largest of some values in each group."""
 
-    def __init__(self, group: NDArray[np.int64]) -> None:
+    def __init__(self, group: Ints) -> None:
         self.order = np.argsort(group, kind="stable")
         self.begins = np.flatnonzero(np.diff(group[self.order], prepend=-1))
 
-    def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, values: Array) -> Array:
         """Return it for values of the cells left."""
-        most: NDArray[np.float64] = np.maximum.reduceat(values[self.order], self.begins)
+        most: Array = np.maximum.reduceat(values[self.order], self.begins)
         return most

@@ -24,8 +24,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.thrower import Energy, Exact, SmallAngle2
 from limitsets.feeder.thrower.flight_box import turn_box
@@ -166,9 +166,6 @@ PIECES, MOST_BOXES = 12, 1500
 # A parameter as narrow as this, relative to itself, is known but for rounding.
 KNOWN = 1e-9
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 
 class TwoThrows(NamedTuple):
     """Two throws: the side they begin on, their branches."""
@@ -270,7 +267,7 @@ class _Boxes:
             lo, hi = np.concatenate([lo, low], axis=1), np.concatenate([high, hi], axis=1)
         return True
 
-    def _open(self, kind: TwoThrows, lo: Array, hi: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _open(self, kind: TwoThrows, lo: Array, hi: Array) -> tuple[Ints, Ints]:
         """Which boxes are not settled, and along which variable each is to be cut."""
         count, rows = lo.shape
         middle = 0.5 * (lo + hi)
@@ -293,12 +290,12 @@ class _Boxes:
     def _weighed(
         self,
         kind: TwoThrows,
-        left: NDArray[np.int64],
+        left: Ints,
         slopes: list[list[Intervals]],
         weights: list[Intervals],
         ends: tuple[Array, Array, Array],
         half: Array,
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    ) -> tuple[Ints, Ints]:
         """Bound G on the boxes that are left: which fail, and what matters most to each."""
         lo, middle, hi = (each[:, left] for each in ends)
         total = [_sum(parts, weights) for parts in zip(*slopes, strict=True)]

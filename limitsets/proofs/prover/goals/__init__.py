@@ -25,7 +25,15 @@ from limitsets.proofs.prover.goals import (
     stays_on_arm,
 )
 from limitsets.proofs.prover.goals.kind import Answer, Kind, undecided
-from limitsets.proofs.prover.goals.laid_starts import hexed, laid_only, narrowed, prove_laid, starts_in
+from limitsets.proofs.prover.goals.laid_starts import (
+    LITTLE,
+    WHOLE,
+    hexed,
+    laid_only,
+    narrowed,
+    prove_laid,
+    starts_in,
+)
 from limitsets.proofs.prover.goals.reaches import not_null
 from limitsets.proofs.prover.goals.violating_orbits import State
 
@@ -41,11 +49,6 @@ __all__ = [
     "rechecked",
     "sentence",
 ]
-
-# If some starts leave and no more than this share is open, finer cells are not tried.
-LITTLE = 1e-3
-
-WHOLE = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
 
 KINDS: dict[str, Kind] = {
     "attracts_all": attracts_all.KIND,
@@ -163,6 +166,13 @@ def cuts(goals: Sequence[Goal], sides: int) -> dict[int, list[float]]:
     return {side: wanted + [end for on, *ends in laid if on == side for end in ends] for side in range(sides)}
 
 
+COMES = {
+    "every": "Every start on the arm comes to the attracting cells.",
+    "almost-every": "Every start on the arm comes to the attracting cells, but for starts of total length zero.",
+    "cells": "Only some starts are proved to come to the attracting cells.",
+}
+
+
 def sentence(section: Mapping[str, Any]) -> str:
     """Put a proved goal in words for people, from its section of the certificate."""
     said = KINDS[section["kind"]].sentence(section)
@@ -171,12 +181,8 @@ def sentence(section: Mapping[str, Any]) -> str:
         return _of_laid(section, said)
     if section.get("from_anywhere") or starts is None:
         return said
-    if starts == "every":
-        return f"{said} Every start on the arm comes to the attracting cells."
-    if starts == "almost-every":
-        return f"{said} Every start on the arm comes to the attracting cells, but for starts of total length zero."
-    if starts == "cells":
-        return f"{said} Only some starts are proved to come to the attracting cells."
+    if isinstance(starts, str):
+        return f"{said} {COMES[starts]}"
     beyond = ", ".join(f"x > {float.fromhex(x):.6g} on side {side}" for side, x in starts["from"].items())
     but = ", but for starts of total length zero" if "thinning" in section else ""
     return f"{said} Every start with {beyond} comes to the attracting cells{but}."

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from limitsets.feeder.goals import AttractsAll
@@ -45,8 +42,6 @@ def _refute(attraction: Attraction, _: Scene, goal: AttractsAll) -> Answer:
     return once(start_that_leaves(attraction, goal.laid), attraction.missing)
 
 
-def _sentence(_: Mapping[str, Any]) -> str:
-    return "The attracting cells are one component."
-
-
-KIND = Kind(_prove, _refute, _sentence, lambda _: (), rechecked=True)
+KIND = Kind(
+    _prove, _refute, lambda _: "The attracting cells are one component.", lambda _: (), rechecked=True
+)

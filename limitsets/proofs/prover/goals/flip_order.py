@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from limitsets.feeder.goals import FlipOrder
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.cover import targets
+from limitsets.proofs.prover.cover import cell_ends, targets
 from limitsets.proofs.prover.goals.kind import (
     Answer,
     Kind,
@@ -37,9 +37,8 @@ def _prove(attraction: Attraction, _: Scene, goal: FlipOrder) -> Answer:
         return undecided(missing)
     inside = attraction.component >= 0
     if len(goal.order) == 1 and not goal.from_anywhere:
-        here = np.zeros_like(inside)
-        here[attraction.cover.grid.of_side(goal.order[0])] = True
-        if not (inside & ~here).any():
+        on = cell_ends(attraction.cover.grid)[0]
+        if not (inside & (on != goal.order[0])).any():
             return Answer("proved", "", {"kind": goal.kind, "order": list(goal.order), "jogs": 0})
     if not _is_cycle(goal.order, attraction.cover.grid.sides):
         return undecided(AGAINST, final=True)

@@ -14,8 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Ints, Mask
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import BELOW, Attraction
 from limitsets.proofs.prover.cover import everywhere, targets
@@ -23,8 +23,6 @@ from limitsets.proofs.prover.goals.recurrent_orbits import Refutation
 from limitsets.proofs.prover.goals.violating_orbits import State
 from limitsets.systems.graph.components import ranks, reach, strong_components
 from limitsets.systems.graph.ranges import RUN, Ranges, build
-
-Mask = NDArray[np.bool_]
 
 
 class Answer(NamedTuple):
@@ -139,7 +137,7 @@ def above(x: float) -> float:
 
 def throws_to_reach(
     attraction: Attraction, cells: Mask, wanted: Mask, branch: int | None = None
-) -> tuple[int, NDArray[np.int64]]:
+) -> tuple[int, Ints]:
     """Count the throws after which every orbit from the cells has come to those wanted.
 
     Parameters

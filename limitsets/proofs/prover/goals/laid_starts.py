@@ -10,14 +10,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Mask
 from limitsets.feeder.goals import Goal, Laid, by_side
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.basin import NO_STARTS, ROUNDING, leaving_cells
-from limitsets.proofs.prover.cover import everywhere
-from limitsets.proofs.prover.goals.kind import Answer, Kind, Mask, undecided
+from limitsets.proofs.prover.cover import everywhere, met
+from limitsets.proofs.prover.goals.kind import Answer, Kind, undecided
 from limitsets.proofs.prover.goals.reaches import not_null
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph
@@ -26,6 +26,8 @@ from limitsets.systems.graph.ranges import RUN
 
 # If some starts leave and no more than this share is open, finer cells are not tried.
 LITTLE = 1e-3
+
+WHOLE = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
 
 
 def starts_in(attraction: Attraction, laid: Laid) -> tuple[Mask, bool]:
@@ -41,16 +43,11 @@ def starts_in(attraction: Attraction, laid: Laid) -> tuple[Mask, bool]:
 
 def reached_from(attraction: Attraction, cells: Mask) -> Mask:
     """Return the cells to which an orbit from the given ones can come, these included."""
-    met, new, ways = cells.copy(), cells.copy(), everywhere(attraction.cover)
+    reached, new, ways = cells.copy(), cells.copy(), everywhere(attraction.cover)
     while new.any():
-        marks = np.zeros(met.size + 1, dtype=np.int64)
-        for ends in ways:
-            own = ends[new & (ends[:, 0] >= 0)]
-            np.add.at(marks, own[:, 0], 1)
-            np.add.at(marks, own[:, 1] + 1, -1)
-        new = (np.cumsum(marks[:-1]) > 0) & ~met
-        met |= new
-    return met
+        new = np.any([met(ends, new) for ends in ways], axis=0) & ~reached
+        reached |= new
+    return reached
 
 
 def narrowed(attraction: Attraction, cells: Mask) -> Attraction:
@@ -114,14 +111,12 @@ def prove_laid(attraction: Attraction, scene: Scene, goal: Goal, kind: Kind) -> 
     if flat:
         return undecided(flat)
     whole = inside and bool((good == meets).all())
-    spans = by_side(goal.laid)
     section: dict[str, Any] = {**answer.section, "starts": {"within" if whole else "cells": hexed(goal.laid)}}
     if part.basin.thinning and not anywhere:
         section["thinning"] = part.basin.thinning
-    shares = _shares(attraction, good, goal.laid)
     if whole:
-        shares = {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
-        return answer._replace(section=section, starts={"within": spans}, shares=shares)
+        return answer._replace(section=section, starts={"within": by_side(goal.laid)}, shares=WHOLE)
+    shares = _shares(attraction, good, goal.laid)
     # finer cells do not bring back starts that leave
     final = shares["leaves"] + shares["creeps"] > 0.0 and shares["open"] < LITTLE
     return answer._replace(
@@ -166,7 +161,7 @@ def laid_only(answer: Answer, attraction: Attraction, laid: Laid) -> Answer:
     )
     number = answer.recurs.get("component")
     if number is not None:
-        meets: NDArray[np.bool_] = starts_in(attraction, laid)[0]
+        meets: Mask = starts_in(attraction, laid)[0]
         begins |= bool((meets & (attraction.component == number)).any())
     if begins:
         return answer

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Mask
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.cover import cell_ends
 from limitsets.proofs.prover.goals.kind import (
     Answer,
     Kind,
@@ -31,12 +32,10 @@ from limitsets.proofs.prover.two_throws import stays_below
 from limitsets.systems.cells import CellSet
 
 
-def _exceptions(attraction: Attraction, goal: OrientedBeyond) -> NDArray[np.bool_]:
+def _exceptions(attraction: Attraction, goal: OrientedBeyond) -> Mask:
     """Cells that lie, in part, beyond x on another side."""
-    bad = np.zeros(attraction.component.size, dtype=bool)
-    for side, (edges,) in enumerate(attraction.cover.grid.edges):
-        if side != goal.side:
-            bad[attraction.cover.grid.of_side(side)] = edges[1:] > below(goal.x)
+    side, _, hi = cell_ends(attraction.cover.grid)
+    bad: Mask = (side != goal.side) & (hi > below(goal.x))
     return bad
 
 
@@ -88,10 +87,8 @@ def _again(attraction: Attraction, goal: OrientedBeyond) -> dict[str, int]:
     Almost every orbit leaves the cells of the component that do not violate the goal.  Where the slope is positive, a
     throw carries no set of positive length into one of length zero: so almost every orbit leaves them after each throw.
     """
-    bad = np.zeros(attraction.component.size, dtype=bool)
-    for side, (edges,) in enumerate(attraction.cover.grid.edges):
-        if side != goal.side:
-            bad[attraction.cover.grid.of_side(side)] = edges[:-1] >= above(goal.x)
+    side, lo, _ = cell_ends(attraction.cover.grid)
+    bad = (side != goal.side) & (lo >= above(goal.x))
     for number in np.unique(attraction.component[bad & (attraction.component >= 0)]).tolist():
         mine = attraction.component == number
         if (slopes(attraction.cover, CellSet(attraction.cover.grid, mine))[mine] > 0.0).all():
@@ -101,7 +98,7 @@ def _again(attraction: Attraction, goal: OrientedBeyond) -> dict[str, int]:
     return {}
 
 
-def _thrown_there(attraction: Attraction, goal: OrientedBeyond, bad: NDArray[np.bool_]) -> str:
+def _thrown_there(attraction: Attraction, goal: OrientedBeyond, bad: Mask) -> str:
     """Name a throw that may land beyond x on another side; empty if there is none."""
     start = thrown_into(attraction, bad)
     if start:

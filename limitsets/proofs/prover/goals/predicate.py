@@ -6,12 +6,11 @@ predicate if it is false at both ends and in the middle of the enclosure of the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import Predicate
 from limitsets.feeder.scene import Scene
@@ -21,7 +20,7 @@ from limitsets.proofs.prover.goals.recurrent_orbits import recurrent_violation
 from limitsets.proofs.prover.goals.violating_orbits import State, one_throw
 
 
-def _good(goal: Predicate, lo: NDArray[np.float64], hi: NDArray[np.float64], side: int) -> NDArray[np.bool_]:
+def _good(goal: Predicate, lo: Array, hi: Array, side: int) -> Mask:
     """Ask the caller, and refuse what is no answer."""
     said = np.asarray(goal.holds(lo, hi, side))
     if said.dtype != np.bool_ or said.shape != lo.shape:
@@ -32,7 +31,7 @@ def _good(goal: Predicate, lo: NDArray[np.float64], hi: NDArray[np.float64], sid
     return said
 
 
-def _bad_cells(attraction: Attraction, goal: Predicate) -> NDArray[np.bool_]:
+def _bad_cells(attraction: Attraction, goal: Predicate) -> Mask:
     grid = attraction.cover.grid
     parts = [_good(goal, edges[:-1], edges[1:], side) for side, (edges,) in enumerate(grid.edges)]
     return ~np.concatenate(parts)
@@ -64,7 +63,7 @@ def _prove(attraction: Attraction, _: Scene, goal: Predicate) -> Answer:
 
 
 def _refute(attraction: Attraction, scene: Scene, goal: Predicate) -> Answer:
-    def wrong(x: Any, side: Any) -> NDArray[np.bool_]:
+    def wrong(x: Any, side: Any) -> Mask:
         bad = np.zeros(x.shape, dtype=bool)
         for s in np.unique(side).tolist():
             mine = side == s
@@ -82,8 +81,9 @@ def _throughout(goal: Predicate, last: State) -> bool:
     return not _good(goal, x, x, last.side).any()
 
 
-def _sentence(section: Mapping[str, Any]) -> str:
-    return f"In the attracting cells: {section['name']}, as its code says."
-
-
-KIND = Kind(_prove, _refute, _sentence, lambda goal: goal.cuts)
+KIND = Kind(
+    _prove,
+    _refute,
+    lambda section: f"In the attracting cells: {section['name']}, as its code says.",
+    lambda goal: goal.cuts,
+)

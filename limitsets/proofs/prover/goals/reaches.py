@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base.arrays import Mask
 from limitsets.feeder.goals import Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.cover import cell_ends
 from limitsets.proofs.prover.goals.kind import (
     Answer,
     Kind,
-    Mask,
     above,
     against,
     begins,
@@ -31,9 +32,8 @@ from limitsets.systems.cells import CellSet
 
 def _wanted(attraction: Attraction, goal: Reaches) -> Mask:
     """Cells on the side that lie at x or beyond."""
-    wanted = np.zeros(attraction.component.size, dtype=bool)
-    edges = attraction.cover.grid.edges[goal.side][0]
-    wanted[attraction.cover.grid.of_side(goal.side)] = edges[:-1] >= above(goal.x)
+    side, lo, _ = cell_ends(attraction.cover.grid)
+    wanted: Mask = (side == goal.side) & (lo >= above(goal.x))
     return wanted
 
 
@@ -118,9 +118,8 @@ def falls_short(attraction: Attraction, goal: Reaches) -> Answer | None:
     The component is mapped into itself and has an interior, so a set of starts of positive length never gets there.
     The orbit is an illustration; the proof does not need it.
     """
-    edges = attraction.cover.grid.edges[goal.side][0]
-    reach = np.zeros(attraction.component.size, dtype=bool)
-    reach[attraction.cover.grid.of_side(goal.side)] = edges[1:] >= below(goal.x)
+    side, _, hi = cell_ends(attraction.cover.grid)
+    reach = (side == goal.side) & (hi >= below(goal.x))
     for number in range(int(attraction.component.max(initial=-1)) + 1):
         mine = attraction.component == number
         if not (mine & reach).any():

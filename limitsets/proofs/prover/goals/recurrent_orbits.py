@@ -17,8 +17,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints
 from limitsets.feeder.goals import Laid
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
@@ -70,9 +70,6 @@ PLACES, KAPPAS, BACK, CLOSINGS = 20_000, 5, 400, 20
 
 # An exact landing between two values of kappa: so near to it, as shares of the way to the ends of the noise.
 SPANS = (1e-6, 1e-4, 1e-2, 0.1, 0.5, 1.0)
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Refutation(NamedTuple):
@@ -347,7 +344,7 @@ def _loop(cycle: ProvedCycle) -> Loop:
 
 def _enclosed(box: ParameterBox, around: Orbit) -> Loop | None:
     """Prove a periodic orbit of a map with effects: an interval goes one way, and its ends part or come nearer."""
-    if not _continuous(box):
+    if not box.concave:
         return None
     x, side, period = float(around.x[0]), int(around.side[0]), around.code.size
     kappa = np.tile([[box.lo.kappa], [box.hi.kappa]], period)
@@ -369,12 +366,6 @@ def _enclosed(box: ParameterBox, around: Orbit) -> Loop | None:
                 whole[0][:-1], whole[1][:-1], whole[2][:-1].astype(np.int64), branches, bool(inward), {}
             )
     return None
-
-
-def _continuous(box: ParameterBox) -> bool:
-    """Whether heights are concave, so that what goes one way depends continuously on where it starts and on kappa."""
-    bare = box.bare[1]
-    return bool((box.bare[0].kappa > np.hypot(bare.a, bare.d) * (1.0 + 1e-12)).all())
 
 
 def _of(loop: Loop, box: ParameterBox, attraction: Attraction) -> Refutation:
@@ -508,7 +499,7 @@ def _closing(box: ParameterBox, state: State, kappa: float, to: float, on: int) 
         lo, hi, side = _landed(box, state, only)
         near = side == on and max(abs(lo - to), abs(hi - to)) < box.landing * (1.0 - 1e-9)
         return only if near else None
-    if not _continuous(box):
+    if not box.concave:
         return None
     low, high = _ends(box)
     for share in SPANS:

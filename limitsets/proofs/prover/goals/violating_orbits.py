@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.goals import Laid
 from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.cover import cell_ends
 from limitsets.proofs.prover.orbits import replay
 from limitsets.proofs.prover.parameters import ParameterBox
 from limitsets.systems.cells import Grid
@@ -99,11 +100,11 @@ def throw_choices(box: ParameterBox, kappas: int = CHOICES) -> list[ThrowChoice]
 class ThrownStates(NamedTuple):
     """Images of some states: x', side', number of the state, number of the choice, whether it stays on the arm."""
 
-    x: NDArray[np.float64]
-    side: NDArray[np.int64]
-    state: NDArray[np.int64]
-    choice: NDArray[np.int64]
-    stays: NDArray[np.bool_]
+    x: Array
+    side: Ints
+    state: Ints
+    choice: Ints
+    stays: Mask
 
 
 def throws(box: ParameterBox, x: Any, side: Any, options: list[ThrowChoice]) -> ThrownStates:
@@ -124,7 +125,7 @@ def throws(box: ParameterBox, x: Any, side: Any, options: list[ThrowChoice]) -> 
     return ThrownStates(*(np.concatenate(part) for part in zip(*landings, strict=True)))
 
 
-def violation(thrown: ThrownStates, wrong: Wrong) -> NDArray[np.int64]:
+def violation(thrown: ThrownStates, wrong: Wrong) -> Ints:
     """Find the farthest image on the arm that violates the goal by more than rounding: its number, or no number."""
     bad = np.flatnonzero(wrong(thrown.x * MORE_THAN_ROUNDING, thrown.side) & thrown.stays)
     return bad[np.argsort(-thrown.x[bad])[:1]]
@@ -134,18 +135,18 @@ def violation(thrown: ThrownStates, wrong: Wrong) -> NDArray[np.int64]:
 class ReachedStates:
     """States met so far, with where each came from."""
 
-    x: list[NDArray[np.float64]]
-    side: list[NDArray[np.int64]]
-    parent: list[NDArray[np.int64]]
-    choice: list[NDArray[np.int64]]
+    x: list[Array]
+    side: list[Ints]
+    parent: list[Ints]
+    choice: list[Ints]
 
     @classmethod
-    def of(cls, x: NDArray[np.float64], side: NDArray[np.int64]) -> ReachedStates:
+    def of(cls, x: Array, side: Ints) -> ReachedStates:
         """Begin with some starts."""
         none = np.full(x.size, -1)
         return cls([x], [side], [none], [none])
 
-    def add(self, thrown: ThrownStates, keep: NDArray[np.int64]) -> None:
+    def add(self, thrown: ThrownStates, keep: Ints) -> None:
         """Take some images of the states added last."""
         before = sum(part.size for part in self.x[:-1])
         self.x.append(thrown.x[keep])
@@ -153,7 +154,7 @@ class ReachedStates:
         self.parent.append(thrown.state[keep] + before)
         self.choice.append(thrown.choice[keep])
 
-    def plus(self, thrown: ThrownStates, keep: NDArray[np.int64]) -> ReachedStates:
+    def plus(self, thrown: ThrownStates, keep: Ints) -> ReachedStates:
         """Return the same with some more, leaving this as it is."""
         more = ReachedStates([*self.x], [*self.side], [*self.parent], [*self.choice])
         more.add(thrown, keep)
@@ -170,7 +171,7 @@ class ReachedStates:
         return Path(x[order].tolist(), side[order].tolist(), [options[k] for k in choice[order[1:]]])
 
 
-def middle(attraction: Attraction, cells: NDArray[np.int64]) -> tuple[float, int]:
+def middle(attraction: Attraction, cells: Ints) -> tuple[float, int]:
     """Middle of the middle one of some cells, and its side."""
     cell = int(cells[cells.size // 2])
     side = int(attraction.cover.grid.side_of(cell))
@@ -216,7 +217,7 @@ def violating_path(attraction: Attraction, wrong: Wrong) -> Path | None:
     return None
 
 
-def sample_passage(attraction: Attraction, cells: NDArray[np.int64]) -> tuple[State, ...]:
+def sample_passage(attraction: Attraction, cells: Ints) -> tuple[State, ...]:
     """Prove some throws from the middle of some cells, to be shown."""
     box = attraction.cover.box
     choice = ThrowChoice(box.middle_kappa, 0.0)
@@ -265,9 +266,8 @@ def one_throw(
     attraction: Attraction, wrong: Wrong, up_to: float = math.inf, laid: Laid = ()
 ) -> tuple[State, ...]:
     """Find a start, laid down up to some x, whose next landing violates the goal, and prove it; empty if none is."""
-    grid, box = attraction.cover.grid, attraction.cover.box
-    x = np.concatenate([0.5 * (edges[:-1] + edges[1:]) for (edges,) in grid.edges])
-    side = np.repeat(np.arange(grid.sides), [edges.size - 1 for (edges,) in grid.edges])
+    box, (side, lo, hi) = attraction.cover.box, cell_ends(attraction.cover.grid)
+    x = 0.5 * (lo + hi)
     good = (x < up_to) & _lies_in(laid, x, side)
     x, side = x[good], side[good]
     if not x.size:
@@ -307,14 +307,14 @@ def start_that_leaves(attraction: Attraction, laid: Laid = ()) -> tuple[State, .
     return ()
 
 
-def _lies_in(laid: Laid, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _lies_in(laid: Laid, x: Array, side: Ints) -> Mask:
     """Whether starts lie in some ranges; all do where there are none."""
     some = [(side == on) & (lo < x) & (x < hi) for on, lo, hi in laid]
-    inside: NDArray[np.bool_] = np.any(some, axis=0) if some else np.ones_like(x, dtype=bool)
+    inside: Mask = np.any(some, axis=0) if some else np.ones_like(x, dtype=bool)
     return inside
 
 
-def _starts(attraction: Attraction, laid: Laid) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _starts(attraction: Attraction, laid: Laid) -> tuple[Array, Ints]:
     """Choose starts on all of the arm; with scattered landings also one nearer to the joint than these scatter."""
     box, x, side = attraction.cover.box, [], []
     for s, (edges,) in enumerate(attraction.cover.grid.edges):
