@@ -14,17 +14,19 @@ import threading
 import time
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeVar
 
 from limitsets.base.errors import AnswerError, LimitsetsError
-from limitsets.base.files import as_json, as_plain, locked, replaced
-from limitsets.base.progress import GOES_ON
+from limitsets.base.files import as_json, as_plain, code_digest, locked, replaced
+from limitsets.base.progress import GOES_ON, Progress, one_by_one
+
+R = TypeVar("R")
 
 # ----------------------------------------------------------------
 # Where chunks are computed: processes on this machine, a Dask cluster, or an executor that the caller gives.
@@ -284,6 +286,18 @@ def chosen_pool(
         yield Processes(min(workers or present_cores(), chunks))
 
 
+def in_order(
+    step: str,
+    task: Callable[[Any], R],
+    things: Sequence[Any],
+    executor: Executor | None,
+    progress: Progress | None,
+) -> list[R]:
+    """Run a task on things, here or by an executor: the answers in their order, the same wherever it runs."""
+    answers = map(task, things) if executor is None else executor.map(task, things)
+    return list(one_by_one(step, answers, len(things), progress))
+
+
 def imported(module: str) -> Any:
     """Import a library of the extra `atlas`, or say in one line how to get it."""
     from importlib import import_module
@@ -300,8 +314,6 @@ def imported(module: str) -> Any:
 # ----------------------------------------------------------------
 # The driver: hands chunks out in a bounded window, writes what comes back, and starts workers again that died.
 
-
-Progress: TypeAlias = Callable[[str, int, int], None]
 
 # How often a chunk may kill the worker that computes it, alone.
 _MOST_DEATHS = 3
@@ -462,6 +474,8 @@ Row = dict[str, Any]
 class TrialFile:
     """Trials by their numbers, in chunks; without a path they are kept in memory alone.
 
+    What was asked is that of this very code: its digest is part of the question.
+
     Parameters
     ----------
     path : Path or None
@@ -485,7 +499,8 @@ class TrialFile:
     """
 
     def __init__(self, path: Path | None, question: dict[str, Any], trials: int, chunk: int) -> None:
-        self.path, self.question, self.trials, self.chunk = path, as_plain(question), trials, chunk
+        self.path, self.trials, self.chunk = path, trials, chunk
+        self.question = as_plain({"limitsets": code_digest(), **question})
         self.rows: dict[int, Row] = {}
         if path is not None and path.exists():
             self.rows = _read(path, self.question)
@@ -519,39 +534,51 @@ class TrialFile:
         return (self.rows[number] for number in range(self.trials))
 
 
-def complete(
-    kept: TrialFile,
-    made: Callable[..., list[tuple[int, Row]]],
-    given: tuple[Any, ...],
+class Trial(Protocol):
+    """What is asked of trials, as workers are sent it."""
+
+    def question(self) -> dict[str, Any]:
+        """Give what is asked, for the file of the trials: everything but how many they are."""
+        ...
+
+    def row(self, number: int) -> Row:
+        """Make the trial of a number."""
+        ...
+
+
+def finished_trials(
+    trial: Trial,
+    trials: int,
+    chunk: int,
     name: str,
     points: str,
     *,
+    file: str | Path | None = None,
     executor: Executor | None = None,
     cluster: str | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
-) -> None:
-    """Make the trials that are not kept yet: here, or where one of the last arguments says.
+) -> tuple[Row, ...]:
+    """Make the trials that are not in the file yet, here or where one of the arguments says, and give all of them.
 
     Parameters
     ----------
-    kept : TrialFile
-        Where they are kept.
-    made : callable
-        Importable by workers: called with `given` and the number of a chunk, it makes the chunk's trials.
-    given : tuple
-        What it is given before the number.
+    trial : Trial
+        What is asked; workers are sent it.
+    trials, chunk : int
+        How many trials, and how many of them a worker makes at once.
     name, points : str
         What is done, and what is counted, in words.
-    executor, cluster, workers, progress
+    file, executor, cluster, workers, progress
         As in `limitsets.assemble`.
     """
+    kept = TrialFile(None if file is None else Path(file), trial.question(), trials, chunk)
     if len(kept.done) == kept.chunks:
-        return
+        return tuple(kept)
     work = Work(
         kept.chunks,
-        made,
-        given,
+        _made,
+        (trial, trials, chunk),
         size=lambda chunk: len(kept.numbers(chunk)),
         place=lambda chunk: f"{points} {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
         task=f"the {points}",
@@ -562,6 +589,12 @@ def complete(
     alone = nullcontext() if kept.path is None else locked(kept.path)
     with alone, chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as pool:
         drive(work, kept, pool, progress)
+    return tuple(kept)
+
+
+def _made(trial: Trial, trials: int, chunk: int, number: int) -> list[tuple[int, Row]]:
+    """Make the trials of a chunk: what a worker does."""
+    return [(k, trial.row(k)) for k in range(number * chunk, min((number + 1) * chunk, trials))]
 
 
 def _read(path: Path, question: dict[str, Any]) -> dict[int, Row]:

@@ -4,29 +4,26 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from limitsets.base.arguments import arguments_checked
-from limitsets.base.campaign import Row, TrialFile, complete
+from limitsets.base.campaign import Row, finished_trials
 from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, code_digest
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.files import as_table
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.cell.assembly.pairing import Pair, Start, pair_of, require_apart, seats_of
-from limitsets.cell.assembly.trials import pass_through
+from limitsets.cell.assembly.trials import Pushed, Question, pass_through, push
 from limitsets.cell.feeding.falling import FATES
+from limitsets.feeder.engine.member import Recording
 from limitsets.feeder.scattering import Scattering
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.noise.sampling import binomial_interval, require_seed
-
-if TYPE_CHECKING:
-    from limitsets.feeder.engine.member import Recording
-
 
 # ----------------------------------------------------------------
 # Rates with their intervals, the joint law of two fates, and shares of trials in which outlines overlap.
@@ -153,8 +150,6 @@ def joint_of(rows: Sequence[TrialRow]) -> Joint:
 # Trials of assembly, run anywhere and counted: `limitsets.assemble`.
 
 
-Progress = Callable[[str, int, int], None]
-
 OUTCOMES = ("assembled", "ejected", "order", "wrong", "wall", "edge", "left", "never", "unfinished")
 """Both in their places; one came out of the cavity again; both on their sides, but the second below the first; one in a
 wrong orientation; one stuck at the wall; one thrown so near the end that the throw acts beyond it, which is assumed to
@@ -175,51 +170,29 @@ class Series:
     apart: bool
     starts: tuple[Start, Start] | None
     seed: int
-    trials: int
 
     def question(self) -> dict[str, Any]:
         """Give what is asked, for the file of the trials: everything but how many they are."""
-        words = {
-            name: value for name, value in asdict(self).items() if name not in ("scenes", "scatter", "trials")
-        }
         scenes = [json.loads(text) for text in self.scenes]
-        return {"limitsets": code_digest(), "scenes": scenes, "scatter": self.scatter.words(), **words}
-
-    def film(self, number: int, last: int) -> Recording:
-        """Make a trial in contact again, and keep poses from throw `last` on."""
-        from limitsets.cell.assembly.trials import push
-
-        return push(_pair(self), self.seed, number, self._how(), starts=self.starts, last=last)[1]
+        return asdict(self) | {"scenes": scenes, "scatter": self.scatter.words()}
 
     def row(self, number: int) -> Row:
         """Make a trial."""
-        pair = _pair(self)
-        if self.contact is None:
-            passed = pass_through(pair, self.seed, number, apart=self.apart, starts=self.starts)
-            return {"outcome": passed.outcome, **asdict(passed)}
-        from limitsets.cell.assembly.trials import push
+        if self.contact is not None:
+            return asdict(self.pushed(number)[0])
+        pair = _read(self.scenes, self.scatter)
+        passed = pass_through(pair, self.seed, number, apart=self.apart, starts=self.starts)
+        return {"outcome": passed.outcome, **asdict(passed)}
 
-        return asdict(push(pair, self.seed, number, self._how(), starts=self.starts)[0])
-
-    def _how(self) -> Any:
-        from limitsets.cell.assembly.trials import Question
-
-        return Question(self.contact or "hinge", self.carried)
+    def pushed(self, number: int, last: int | None = None) -> tuple[Pushed, Recording]:
+        """Make a trial in contact, and keep poses from throw `last` on."""
+        pair, how = _read(self.scenes, self.scatter), Question(self.contact or "hinge", self.carried)
+        return push(pair, self.seed, number, how, starts=self.starts, last=last)
 
 
 @lru_cache(maxsize=4)
 def _read(scenes: tuple[str, str], scatter: Scattering) -> Pair:
     return pair_of(json.loads(scenes[0]), json.loads(scenes[1]), scatter)
-
-
-def _pair(series: Series) -> Pair:
-    return _read(series.scenes, series.scatter)
-
-
-def made(series: Series, chunk: int, number: int) -> list[tuple[int, Row]]:
-    """Make the trials of a chunk: what a worker does."""
-    numbers = range(number * chunk, min((number + 1) * chunk, series.trials))
-    return [(k, series.row(k)) for k in numbers]
 
 
 # Outcomes for people.
@@ -323,7 +296,7 @@ class Assembly(Tabled):
             raise AnswerError("the film", "of parts without contact", "trials in the engine", remedy)
         if not 0 <= number < len(self.rows):
             raise AnswerError("the trial", number, f"0 to {len(self.rows) - 1}", "name one that was made")
-        return self.series.film(number, max(max(self.rows[number]["throws"]) - throws + 1, 1))
+        return self.series.pushed(number, max(max(self.rows[number]["throws"]) - throws + 1, 1))[1]
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -445,9 +418,17 @@ def assemble(
         apart=side_by_side,
         starts=given,
         seed=seed,
-        trials=trials,
     )
-    kept = TrialFile(None if file is None else Path(file), series.question(), trials, CHUNK)
-    where: dict[str, Any] = {"executor": executor, "cluster": cluster, "workers": workers}
-    complete(kept, made, (series, CHUNK), "assembly", "trials", **where, progress=progress)
-    return Assembly(pair, series, tuple(kept))
+    rows = finished_trials(
+        series,
+        trials,
+        CHUNK,
+        "assembly",
+        "trials",
+        file=file,
+        executor=executor,
+        cluster=cluster,
+        workers=workers,
+        progress=progress,
+    )
+    return Assembly(pair, series, rows)

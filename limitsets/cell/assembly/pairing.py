@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError
 from limitsets.cell.feeding.falling import ArmEnd, arm_end_of
 from limitsets.feeder.engine.crowd import depth_of_overlap
@@ -119,7 +119,7 @@ def _said(scene: Scene, name: str) -> str:
     return f"{value:.9g} {unit}" if isinstance(value, float) else str(value)
 
 
-def seats_of(pair: Pair) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def seats_of(pair: Pair) -> tuple[Array, Array]:
     """Give the corners of both parts in their seats, the second on the first, shapes (n, 2) [length].
 
     Raises
@@ -136,7 +136,7 @@ def outline_at(scene: Scene, x: float, height: float, angle: float) -> list[tupl
     """Give the corners of a part, its centre of mass at (x, height) from the joint, turned from side 0 by an angle."""
     about = scene.vertices - np.asarray(scene.centre)
     cos, sin = math.cos(angle), math.sin(angle)
-    turned: NDArray[np.float64] = about @ np.array([[cos, sin], [-sin, cos]]) + (x, height)
+    turned: Array = about @ np.array([[cos, sin], [-sin, cos]]) + (x, height)
     return [(float(px), float(py)) for px, py in turned]
 
 
@@ -237,7 +237,7 @@ class Draws:
         return speed_of, (one, two)
 
 
-def _drawn(law: Law | None, random: np.random.Generator, shape: tuple[int, int]) -> NDArray[np.float64]:
+def _drawn(law: Law | None, random: np.random.Generator, shape: tuple[int, int]) -> Array:
     if isinstance(law, Gaussian):
         return law.sigma * random.standard_normal(shape)
     if isinstance(law, Uniform):

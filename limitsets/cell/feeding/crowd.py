@@ -9,16 +9,17 @@ from __future__ import annotations
 import functools
 import math
 import time
-from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
+from limitsets.base.campaign import in_order
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table
+from limitsets.base.progress import Progress
 from limitsets.cell.feeding.falling import FATES, ArmEnd
 from limitsets.feeder.engine import Crowd, Rest
 from limitsets.feeder.scattering import Gaussian, Law, Scattering, Uniform
@@ -65,10 +66,10 @@ class CrowdTrials:
     parts: int
     between: bool
     contact: str
-    fates: NDArray[np.int64]
-    throws: NDArray[np.int64]
-    spilled: NDArray[np.int64]
-    met: NDArray[np.bool_]
+    fates: Ints
+    throws: Ints
+    spilled: Ints
+    met: Mask
     thrown: int
     seconds: float
     seed: int
@@ -124,7 +125,7 @@ def run_crowd(
     seed: int = 0,
     step: float = 4e-3,
     executor: Executor | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> CrowdTrials:
     """Throw batches of parts until each part has met its fate.
 
@@ -168,14 +169,7 @@ def run_crowd(
         raise AnswerError("the noise to throw with", scatter.words(), allowed, "take another law")
     how: dict[str, Any] = {"between": between, "contact": contact, "step": step}
     task = functools.partial(_thrown, end, scatter, parts, throws, seed, how)
-    every = range(batches)
-    rows: list[Any] = []
-    for row in map(task, every) if executor is None else executor.map(task, every):
-        if progress is not None:
-            progress(f"{parts} parts at once", len(rows), batches)
-        rows.append(row)
-    if progress is not None:
-        progress(f"{parts} parts at once", batches, batches)
+    rows = in_order(f"{parts} parts at once", task, range(batches), executor, progress)
     fates, made, spilled, met, thrown, seconds = zip(*rows, strict=True)
     return CrowdTrials(
         parts,
@@ -297,7 +291,7 @@ class _Batch:
         return float(self.end.scene.sides.a[side]) if side >= 0 else 0.0
 
 
-def _drawn(random: np.random.Generator, law: Law | None, count: int) -> NDArray[np.float64]:
+def _drawn(random: np.random.Generator, law: Law | None, count: int) -> Array:
     """Draw deviations; the same numbers are used up whatever the law."""
     if isinstance(law, Gaussian):
         return law.sigma * random.standard_normal(count)

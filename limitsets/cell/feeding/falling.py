@@ -13,8 +13,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from limitsets.base.arrays import Array, Ints
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.geometry.polygon import above_side, side_ends
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
@@ -48,8 +49,6 @@ if TYPE_CHECKING:
 #
 # What is assumed stands in docs/feeding.md.
 
-
-Array = NDArray[np.float64]
 
 # Abscissae of the integral, and starts on the arm whose landings are looked at.
 NODES, STARTS = 96, 800
@@ -350,23 +349,23 @@ class ArmEnd:
     x: float
     side: int
     clear: tuple[tuple[float, float], ...]
-    edges: NDArray[np.float64]
-    starts: NDArray[np.float64]
+    edges: Array
+    starts: Array
     laid: Laid = ()
 
     @property
-    def ranges(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    def ranges(self) -> tuple[Array, Array, Ints]:
         """Lower ends, upper ends and sides of the ranges in which random starts lie."""
         whole = [(side, lo, self.x) for side, lo in enumerate(self.starts.tolist())]
         side, lo, hi = zip(*(self.laid or whole), strict=True)
         return np.array(lo), np.array(hi), np.array(side)
 
-    def drawn(self, random: np.random.Generator, count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def drawn(self, random: np.random.Generator, count: int) -> tuple[Array, Ints]:
         """Draw random starts: places and sides."""
         lo, hi, side = self.ranges
         return uniform_starts(random, lo, hi, count, side)
 
-    def fate(self, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.int64]:
+    def fate(self, x: Array, side: Ints) -> Ints:
         """Say what becomes of parts at rest: a number of `FATES`, -1 of those that stay on the arm."""
         beyond = x - self.x
         clears = np.zeros(np.shape(x), dtype=bool)
@@ -417,7 +416,7 @@ def arm_end_of(scene: Scene, side: int | None = None, laid: LaidLike | None = No
     )
 
 
-def _edges(scene: Scene, x: float) -> NDArray[np.float64]:
+def _edges(scene: Scene, x: float) -> Array:
     """Give by side the least place from which a throw acts beyond the end: y + c / y > x, the side over the end."""
     sides = scene.sides
     c = scene.radius_of_gyration**2 + sides.d * (scene.surface_height + sides.d)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -14,7 +14,7 @@ import numpy as np
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.cell.feeding.crowd import BATCHES, CrowdTrials, run_crowd
 from limitsets.cell.feeding.falling import ArmEnd, arm_end_of, clear_beyond, tipping_times
@@ -38,7 +38,6 @@ from limitsets.parameters.noise.sampling import require_seed
 from limitsets.parameters.sheet.summary import still
 from limitsets.proofs.chances.absorption import AbsorptionBrackets
 
-Progress = Callable[[str, int, int], None]
 Verdict = TypeVar("Verdict", Safe, Fed)
 
 # Parts thrown unless it is said how many: fewer where that takes more throws than these.

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from limitsets.base.errors import AnswerError
+from limitsets.base.progress import Progress
 from limitsets.cell.feeding.falling import ArmEnd
 from limitsets.cell.feeding.paths import MOST_SIDES, Fed, Paths, Safe, verdict_of_share
 from limitsets.feeder.goals import OrientedBeyond
@@ -51,7 +52,7 @@ def fate_brackets(
     cells: int,
     *,
     throws: int = THROWS,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> AbsorptionBrackets:
     """Prove brackets of the fates right, wrong, wall, edge and exits ("left") within n throws.
 
@@ -105,8 +106,6 @@ def _places(end: ArmEnd) -> dict[str, Places]:
 # ----------------------------------------------------------------
 # Which sides can be fed, from which starts, under every sequence of the noise; and that every start is fed.
 
-
-Progress = Callable[[str, int, int], None]
 
 # Cells per side, tried in turn until both questions are answered.
 LADDER = (2048, 8192, 32768)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.files import as_table
+from limitsets.base.progress import Progress
 from limitsets.cell.feeding.falling import FATES, ArmEnd
 from limitsets.feeder.scattering import Scattering, still_map
 from limitsets.parameters.noise.sampling import ManyParts, binomial_interval, scattering_map
@@ -46,9 +47,9 @@ class Trials:
         Of starts and noise.
     """
 
-    fate: NDArray[np.int64]
-    throws: NDArray[np.int64]
-    beyond: NDArray[np.bool_]
+    fate: Ints
+    throws: Ints
+    beyond: Mask
     seed: int
 
     @cached_property
@@ -61,7 +62,7 @@ class Trials:
         """Intervals of the probabilities of each fate, 95 %."""
         return {name: binomial_interval(count, self.fate.size) for name, count in self.counts.items()}
 
-    def series(self) -> NDArray[np.int64]:
+    def series(self) -> Ints:
         """Right feeds in each series of 20 trials, in the order of the trials; what is left over is left out."""
         whole = self.fate[: self.fate.size // SERIES * SERIES].reshape(-1, SERIES)
         return np.asarray((whole == 0).sum(axis=1), dtype=np.int64)
@@ -85,7 +86,7 @@ class Trials:
         )
 
 
-def creeping_below(end: ArmEnd, scatter: Scattering) -> NDArray[np.float64]:
+def creeping_below(end: ArmEnd, scatter: Scattering) -> Array:
     """By side the x below which a part creeps to the joint and never comes there; a_i where none does.
 
     With the arm's surface above the joint a start just beyond a_i keeps the share 1 - 2 h/kappa of its distance at
@@ -121,7 +122,7 @@ def run_trials(
     count: int,
     *,
     seed: int = 0,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Trials:
     """Throw parts from random starts until each has met its fate.
 
@@ -161,10 +162,10 @@ def run_trials(
 def _to_their_fates(
     end: ArmEnd,
     many: ManyParts,
-    creeping: NDArray[np.float64],
-    fate: NDArray[np.int64],
-    throws: NDArray[np.int64],
-    beyond: NDArray[np.bool_],
+    creeping: Array,
+    fate: Ints,
+    throws: Ints,
+    beyond: Mask,
 ) -> Iterator[int]:
     """Throw parts until each has met its fate, and fill in what is asked of each; before every throw, how many wait."""
     waiting = np.arange(fate.size)
@@ -190,8 +191,6 @@ def _to_their_fates(
 # ----------------------------------------------------------------
 # Shares of all fates among parts that were thrown, throw by throw; the noise that is too much.
 
-
-Progress = Callable[[str, int, int], None]
 
 # Factors on the noise of the curve; the speed's deviation stays above this share of the speed, backwards.
 FACTORS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
@@ -238,7 +237,7 @@ class FedShares:
         }
 
     @cached_property
-    def by_throw(self) -> NDArray[np.float64]:
+    def by_throw(self) -> Array:
         """Share that meets each fate of `FATES` but the last, at each throw from the first, shape (n, 5)."""
         fates = len(FATES) - 1
         ended = self.trials.fate < fates
@@ -252,12 +251,12 @@ class FedShares:
         return self.shares["never"]
 
     @cached_property
-    def _ended(self) -> NDArray[np.int64]:
+    def _ended(self) -> Ints:
         """How many have ended, by whatever fate, after each number of throws from 0 on."""
         return np.cumsum(np.bincount(self.trials.throws[self.trials.fate < len(FATES) - 1], minlength=1))
 
     @property
-    def ended(self) -> NDArray[np.float64]:
+    def ended(self) -> Array:
         """Share that has ended, by whatever fate, after each number of throws from 0 on."""
         return self._ended / self.trials.fate.size
 
@@ -296,8 +295,8 @@ class Curve:
         noise.
     """
 
-    factors: NDArray[np.float64]
-    right: NDArray[np.float64]
+    factors: Array
+    right: Array
     wanted: float
     level: tuple[float, float] | None
 

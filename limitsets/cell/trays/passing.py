@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from itertools import chain
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints
+from limitsets.base.campaign import in_order
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table
+from limitsets.base.progress import Progress
 from limitsets.feeder.engine.depression import EMPTY, UNFINISHED, Motion, Plate, Pose, Rest, fall_speed
 from limitsets.feeder.engine.member import Mark, Recording
-from limitsets.feeder.scene import Scene
+from limitsets.feeder.scene import Scene, Tray
 from limitsets.feeder.scene.scene import require_rests
 from limitsets.feeder.scene.surroundings import heights_over_sides
 from limitsets.parameters.noise.sampling import binomial_interval
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Tray
 
 
 def random_of(seed: int, *number: int) -> np.random.Generator:
@@ -93,7 +93,7 @@ class Passes:
         """Give what was drawn, and with which contact."""
         plate = self.plate
         return as_table(
-            **{name: getattr(self.tray, name) for name in self.tray.__dataclass_fields__},
+            **vars(self.tray),
             friction=plate.friction,
             restitution=plate.restitution,
             contact="unilateral",
@@ -109,37 +109,34 @@ def passes_of(scene: Scene, side: int | None, step: float) -> Passes:
     AnswerError
         No [tray], no effects.contact, no friction or restitution, or a side the part has not.
     """
-
-    def refuse(thing: str, value: object, allowed: str, remedy: str, key: str) -> AnswerError:
-        return AnswerError(thing, value, allowed, remedy, key=key, file=scene.file)
-
+    refuse = functools.partial(AnswerError, file=scene.file)
     tray = scene.tray
     if tray is None:
         require_rests(scene)
         remedy = "add [tray] with depression_width, depression_depth, pitch, agitation and wash"
-        raise refuse("the scene", "without [tray]", "one with a tray", remedy, "tray")
+        raise refuse("the scene", "without [tray]", "one with a tray", remedy, key="tray")
     if not scene.effects.contact:
         remedy = "a part in a depression touches its walls: write contact = true in [effects]"
-        raise refuse("contact", None, "true", remedy, "effects.contact")
+        raise refuse("contact", None, "true", remedy, key="effects.contact")
     facts = {"friction": scene.world.friction, "restitution": scene.world.restitution}
     for name, given in facts.items():
         if given is None:
             remedy = f"the engine needs it: add {name} to [world]"
-            raise refuse(f"the {name}", None, "a number from 0", remedy, f"world.{name}")
+            raise refuse(f"the {name}", None, "a number from 0", remedy, key=f"world.{name}")
     wanted = getattr(scene.goal, "side", None) if side is None else side
     if wanted is None or not 0 <= wanted < len(scene.sides):
         allowed = f"0 to {len(scene.sides) - 1}"
         remedy = "pass side= (--side), or give the scene a goal with a side"
-        raise refuse("the side wanted", wanted, allowed, remedy, "goal")
+        raise refuse("the side wanted", wanted, allowed, remedy, key="goal")
     if tray.depression_width < scene.sides.length[wanted]:
         allowed = f"at least {scene.sides.length[wanted]:.6g} {scene.unit}, the length of side {wanted}"
         remedy = "the part cannot lie in it: widen it"
-        raise refuse("the width", tray.depression_width, allowed, remedy, "tray.depression_width")
+        raise refuse("the width", tray.depression_width, allowed, remedy, key="tray.depression_width")
     height = heights_over_sides([(float(x), float(y)) for x, y in scene.vertices])[wanted]
     if tray.depression_depth >= height:
         allowed = f"below {height:.6g} {scene.unit}, the height of the part on side {wanted}"
         remedy = "the depression is deeper than the part, and nothing would pop out: make it less deep"
-        raise refuse("the depth", tray.depression_depth, allowed, remedy, "tray.depression_depth")
+        raise refuse("the depth", tray.depression_depth, allowed, remedy, key="tray.depression_depth")
     if not 0.0 < step <= 0.02:
         raise AnswerError("the engine's step", step, "above 0 and at most 0.02", "pass step=4e-3")
     friction, restitution = float(facts["friction"] or 0.0), float(facts["restitution"] or 0.0)
@@ -150,8 +147,6 @@ def passes_of(scene: Scene, side: int | None, step: float) -> Passes:
 # ----------------------------------------------------------------
 # What a depression does with parts that come by and with kicks, counted in the engine.
 
-
-Progress = Callable[[str, int, int], None]
 
 # Trials of one task, and the streams of random numbers: a part that comes by; from here on kicks, by state.
 BLOCK, ARRIVALS, KICKS = 50, 0, 1
@@ -179,8 +174,8 @@ class Counts:
 
     states: tuple[str, ...]
     right: int
-    captured: NDArray[np.int64]
-    kicked: NDArray[np.int64]
+    captured: Ints
+    kicked: Ints
     unfinished: int
     poses: dict[int, Pose]
 
@@ -194,16 +189,19 @@ class Counts:
         names = ["empty", *(self.states[k] for k in self.met)]
         numbers = [EMPTY, *self.met]
 
-        def row(counts: NDArray[np.int64]) -> dict[str, Any]:
-            of_fate, of = (
-                {name: int(counts[k]) for name, k in zip(names, numbers, strict=True)},
-                int(counts.sum()),
-            )
-            intervals = {name: binomial_interval(n, of) if of else (0.0, 1.0) for name, n in of_fate.items()}
+        def row(counts: Ints) -> dict[str, Any]:
+            of_fate = dict(zip(names, counts[numbers].tolist(), strict=True))
+            of = int(counts.sum())
+            intervals = {name: _interval(n, of) for name, n in of_fate.items()}
             return {"counts": of_fate, "of": of, "intervals": intervals}
 
         kicked = {self.states[k]: row(self.kicked[k]) for k in self.met}
         return as_table(arrivals=row(self.captured), kicks=kicked, unfinished=self.unfinished)
+
+
+def _interval(count: int, of: int) -> tuple[float, float]:
+    """Give the interval of a share; all of it where nothing was counted."""
+    return binomial_interval(count, of) if of else (0.0, 1.0)
 
 
 def _arrivals(passes: Passes, seed: int, numbers: Sequence[int]) -> list[Rest]:
@@ -216,35 +214,24 @@ def _kicks(
     passes: Passes, seed: int, state: int, poses: Sequence[Pose], numbers: Sequence[int]
 ) -> list[Rest]:
     """Kick parts that lie in a depression, each as one of those that came to lie so."""
-    rests = []
-    for k in numbers:
-        motion = passes.kick(random_of(seed, KICKS + state, k))
-        rests.append(passes.plate.settle(poses[k % len(poses)], motion))
-    return rests
-
-
-def spread_over(
-    executor: Executor | None, task: Callable[[Any], list[Any]], blocks: Iterable[Any]
-) -> Iterable[Any]:
-    """Run a task on blocks, here or by an executor, and give the answers in the order of the blocks."""
-    return map(task, blocks) if executor is None else executor.map(task, blocks)
+    motions = (passes.kick(random_of(seed, KICKS + state, k)) for k in numbers)
+    return [
+        passes.plate.settle(poses[k % len(poses)], motion) for k, motion in zip(numbers, motions, strict=True)
+    ]
 
 
 def _run(
+    step: str,
     task: Callable[[Any], list[Rest]],
     trials: int,
     executor: Executor | None,
-    advance: Callable[[int], None],
+    progress: Progress | None,
 ) -> list[Rest]:
     blocks = [range(lo, min(lo + BLOCK, trials)) for lo in range(0, trials, BLOCK)]
-    rests: list[Rest] = []
-    for block_rests in spread_over(executor, task, blocks):
-        rests += block_rests
-        advance(len(rests))
-    return rests
+    return [*chain.from_iterable(in_order(step, task, blocks, executor, progress))]
 
 
-def _tally(rests: Sequence[Rest], states: int, which: str) -> NDArray[np.int64]:
+def _tally(rests: Sequence[Rest], states: int, which: str) -> Ints:
     """Count states; without any the chain would have a row of nothing."""
     done = [rest.state for rest in rests if rest.state != UNFINISHED]
     if not done:
@@ -275,11 +262,7 @@ def count(
     if drops < 1 or kicks < 1:
         raise AnswerError("the drops and kicks", (drops, kicks), "1 or more", "let some parts fall")
     states = len(passes.states)
-
-    def reporter(stage: str, of: int) -> Callable[[int], None]:
-        return lambda done: None if progress is None else progress(stage, min(done, of - 1), of)
-
-    rests = _run(functools.partial(_arrivals, passes, seed), drops, executor, reporter("drops", drops))
+    rests = _run("drops", functools.partial(_arrivals, passes, seed), drops, executor, progress)
     captured = _tally(rests, states, "that came by")
     kicked = np.zeros((states, states), dtype=np.int64)
     poses: dict[int, list[Pose]] = {passes.right: []}
@@ -292,7 +275,7 @@ def count(
     while waiting:
         state = waiting.pop(0)
         task = functools.partial(_kicks, passes, seed, state, poses[state])
-        after = _run(task, kicks, executor, reporter(f"kicks, {passes.states[state]}", kicks))
+        after = _run(f"kicks, {passes.states[state]}", task, kicks, executor, progress)
         kicked[state] = _tally(after, states, f"kicked from {passes.states[state]}")
         every += after
         fresh: dict[int, list[Pose]] = {}
@@ -314,8 +297,6 @@ def count(
 FRESH, RETURNING = 10_001, 10_002
 # So many past misses are told apart.
 PAST = 3
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,7 +320,7 @@ class Histories:
     right: int
 
     @property
-    def filled(self) -> NDArray[np.float64]:
+    def filled(self) -> Array:
         """Fraction filled rightly after 0, 1, ... passes, shape (passes + 1,)."""
         return np.concatenate([[0.0], (self.after_pass == self.right).mean(axis=0)])
 
@@ -377,10 +358,7 @@ class Histories:
         """Give the numbers as JSON takes them."""
 
         def table(counts: list[tuple[int, int]]) -> list[dict[str, Any]]:
-            return [
-                {"count": n, "of": of, "interval": binomial_interval(n, of) if of else (0.0, 1.0)}
-                for n, of in counts
-            ]
+            return [{"count": n, "of": of, "interval": _interval(n, of)} for n, of in counts]
 
         return as_table(
             histories=self.after_pass.shape[0],
@@ -448,11 +426,7 @@ def histories(
         As in `limitsets.tray`.
     """
     task = functools.partial(_history, passes, count, seed, returning)
-    rows: list[list[tuple[int, int]]] = []
-    for block in spread_over(executor, task, [[k] for k in range(number)]):
-        if progress is not None:
-            progress("histories", len(rows), number)
-        rows += block
+    rows = in_order("histories", task, [[k] for k in range(number)], executor, progress)
     table = np.array(rows, dtype=np.int64).reshape(number, count, 2)
     return Histories(table[..., 0].copy(), table[..., 1].copy(), returning, passes.right)
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
 from limitsets.feeder.scene import Scene, load
@@ -33,9 +33,6 @@ from limitsets.systems.maps.critical import CriticalPoint, margins
 #
 # In the formulas of `geometry`, which use scalars with ``+ - * /`` and a passed-in ``sqrt``, they give exact
 # derivatives up to rounding, without finite differences.
-
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +304,7 @@ def nearest_miss(scene: Scene, side: int, until: float) -> tuple[float, float] |
     return float(at[k]), float(least[k])
 
 
-def _abs(scene: Scene, x: npt.NDArray[np.float64], side: int) -> npt.NDArray[np.float64]:
+def _abs(scene: Scene, x: Array, side: int) -> Array:
     return np.abs(margins(scene.bare_map, x, side))
 
 

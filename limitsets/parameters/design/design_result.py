@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from limitsets.base.files import as_json, as_table, picked
+from limitsets.base.progress import Progress
 from limitsets.base.tables import Column, Table, Tabled, joined
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scene import Scene, dump
@@ -156,7 +157,7 @@ def front_of(
     own: Option,
     side: int,
     seed: int,
-    tell: Callable[[str, int, int], None],
+    tell: Progress,
 ) -> tuple[Option, ...]:
     """Count the throws of designs of every margin, and keep those that nothing beats.
 
@@ -206,7 +207,7 @@ def _sure(
     searches: Sequence[DesignSearch],
     side: int,
     seed: int,
-    tell: Callable[[str, int, int], None],
+    tell: Progress,
 ) -> tuple[Option, ...]:
     """Rate the designs on the front again on all corners, until all of them are rated so; the first one already is.
 

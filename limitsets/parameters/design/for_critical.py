@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
@@ -49,8 +49,6 @@ from limitsets.systems.sets.end_points import limit_set
 # ----------------------------------------------------------------
 # Design: find quantities of a scene for which its critical points have given values.
 
-
-Progress = Callable[[str, int, int], None]
 
 # Standard deviations of other starts by turns, in the solver's numbers: shares, or sizes of the part.
 SPREADS = (0.15, 0.3)
@@ -379,9 +377,7 @@ Extents = dict[int, list[tuple[float, float]]]
 CELLS = 4096
 
 
-def limit_sets_along(
-    found: Design, progress: Callable[[str, int, int], None] | None = None
-) -> tuple[tuple[Extents, ...], ...]:
+def limit_sets_along(found: Design, progress: Progress | None = None) -> tuple[tuple[Extents, ...], ...]:
     """Compute the limit sets of every scene on a design's path.
 
     Parameters

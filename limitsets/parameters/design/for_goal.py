@@ -20,6 +20,7 @@ import numpy as np
 
 from limitsets.base.errors import AnswerError, SceneError
 from limitsets.base.files import as_table, picked
+from limitsets.base.progress import Progress
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene, load
@@ -32,7 +33,6 @@ from limitsets.parameters.design.search import (
     LOST,
     NO_PART,
     Ends,
-    Tell,
     bounds_of,
     of_the_arm,
     said,
@@ -161,7 +161,9 @@ class GoalDesign(Tabled):
 class _GoalSearch:
     """Rate designs by their room, and count what rules them out."""
 
-    def __init__(self, scene: Scene, bounds: Mapping[str, tuple[float, float]], tell: Tell, of: int) -> None:
+    def __init__(
+        self, scene: Scene, bounds: Mapping[str, tuple[float, float]], tell: Progress, of: int
+    ) -> None:
         assert isinstance(scene.goal, OrientedBeyond | Reaches)
         self.scene, self.bounds, self.tell, self.of = scene, dict(bounds), tell, of
         self.x, self.side, self.laid = scene.goal.x, scene.goal.side, scene.goal.laid
@@ -245,7 +247,7 @@ def design_for_goal(
     laid: LaidLike | None = None,
     evaluations: int = 600,
     seed: int = 0,
-    progress: Tell | None = None,
+    progress: Progress | None = None,
 ) -> GoalDesign:
     """Find a scene that meets its own goal at the X and on the side that it asks for.
 

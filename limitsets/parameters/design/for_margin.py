@@ -16,11 +16,11 @@ from itertools import permutations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.base.arguments import arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.feeder.geometry import triangle
 from limitsets.feeder.goals import Goal, Laid, OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene, load
@@ -32,7 +32,6 @@ from limitsets.parameters.design.search import (
     Candidate,
     DesignSearch,
     Ends,
-    Tell,
     bounds_of,
     counterweight_of,
     said,
@@ -57,7 +56,7 @@ EDGES = (0.02, 0.007, 0.0025)
 class _Best:
     """The best design so far, and the corners at which others failed."""
 
-    def __init__(self, search: DesignSearch, made: Callable[[Scene], Scene], tell: Tell, of: int) -> None:
+    def __init__(self, search: DesignSearch, made: Callable[[Scene], Scene], tell: Progress, of: int) -> None:
         self.search, self.made, self.tell, self.of = search, made, tell, of
         self.hard: list[Signs] = list(search.hard)
         self.unknowns: list[float] = []
@@ -92,7 +91,7 @@ def polished(
     unknowns: Sequence[Sequence[float]],
     made: Callable[[Scene], Scene],
     evaluations: int,
-    tell: Tell,
+    tell: Progress,
 ) -> tuple[Scene, Estimate] | None:
     """Improve the best of a few designs, rated as they would be made and on all corners.
 
@@ -136,7 +135,7 @@ def polished(
     return best.scene, best.estimate
 
 
-def _simplex(corner: Sequence[float], edge: float) -> NDArray[np.float64]:
+def _simplex(corner: Sequence[float], edge: float) -> Array:
     """Give a simplex at a place: a step along each axis, towards the middle of its bounds."""
     place = np.array(corner)
     return np.vstack([place, place + edge * np.diag(np.where(place < 0.5, 1.0, -1.0))])
@@ -214,18 +213,18 @@ def orders_of(scene: Scene) -> list[Scene]:
     return scenes
 
 
-def _edges(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _edges(corners: Array) -> Array:
     """Give the two edges of a triangle from its first corner."""
-    edges: NDArray[np.float64] = corners[1:] - corners[0]
+    edges: Array = corners[1:] - corners[0]
     return edges
 
 
 def _searched(
-    searches: Sequence[DesignSearch], evaluations: int, seed: int, tell: Tell
+    searches: Sequence[DesignSearch], evaluations: int, seed: int, tell: Progress
 ) -> tuple[DesignSearch, list[list[float]]]:
     """Draw in every order, go on in the best, and give the best search with the unknowns of its best design."""
     rng = np.random.default_rng(seed)
-    drawn: list[tuple[float, int, NDArray[np.float64]]] = []
+    drawn: list[tuple[float, int, Array]] = []
     for strict in (False, True):
         if drawn and drawn[0][0] > 0.0:
             break
@@ -308,7 +307,7 @@ def robust_design(
     evaluations: int = 1200,
     seed: int = 0,
     prove: float = SECONDS,
-    progress: Tell | None = None,
+    progress: Progress | None = None,
     keep: Callable[[Scene], None] | None = None,
 ) -> RobustDesign:
     """Choose a part, a throw and an arm for which parts are fed in spite of large deviations.
@@ -368,7 +367,7 @@ def robust_design(
         raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
     ranges = read_laid(start, laid)
     orders, everywhere = orders and not ranges, everywhere and not ranges
-    tell: Tell = progress if progress is not None else lambda what, done, of: None
+    tell: Progress = progress if progress is not None else lambda what, done, of: None
     texts, begin = tolerance_of(start, tolerance), time.perf_counter()
     vector = Tolerance.of(start, texts)
     names, given = (None, vary) if isinstance(vary, Mapping) else (vary, None)
@@ -440,7 +439,7 @@ def robust_design(
 
 
 def _proved(
-    scene: Scene, goals: Sequence[Goal], texts: Mapping[str, str], seconds: float, tell: Tell, whose: str
+    scene: Scene, goals: Sequence[Goal], texts: Mapping[str, str], seconds: float, tell: Progress, whose: str
 ) -> tuple[Margin, ...]:
     """Bracket the joint margin of each goal by itself: one may be proved much farther than the other.
 

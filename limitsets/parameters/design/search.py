@@ -15,9 +15,10 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError, SceneError
+from limitsets.base.progress import Progress
 from limitsets.feeder.geometry import plate_with_points, side_ends
 from limitsets.feeder.geometry.polygon import above_side
 from limitsets.feeder.scene import Scene
@@ -66,7 +67,7 @@ class Counterweight(NamedTuple):
 
 
 def counterweight_for(
-    vertices: NDArray[np.float64], centre: tuple[float, float], radius_of_gyration: float
+    vertices: Array, centre: tuple[float, float], radius_of_gyration: float
 ) -> Counterweight:
     """Find the point mass that moves a plate's centre of mass and sets its radius of gyration.
 
@@ -292,9 +293,6 @@ ASSUMPTION = (
 )
 LEAVES = "lose parts from some starts on the arm"
 
-Tell = Callable[[str, int, int], None]
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -432,7 +430,7 @@ class DesignSearch:
         new = [signs for signs in wrong if signs not in self.hard]
         self.hard[:] = (new[: MOST_HARD // 3] + self.hard)[:MOST_HARD]
 
-    def improved(self, population: Array, evaluations: int, seed: int, tell: Tell) -> tuple[Array, Array]:
+    def improved(self, population: Array, evaluations: int, seed: int, tell: Progress) -> tuple[Array, Array]:
         """Move a population for so many evaluations; the population and its ratings, the best first."""
         from scipy.optimize import differential_evolution
 

@@ -7,14 +7,15 @@ residual; the trust region treats nan as a step too far and shrinks.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from limitsets.base.arrays import Array, Mask
 from limitsets.base.errors import AnswerError, LimitsetsError
+from limitsets.base.progress import Progress
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import find, in_units
 from limitsets.parameters.design.derivatives import (
@@ -33,7 +34,6 @@ from limitsets.parameters.design.derivatives import (
 # well defined.
 
 
-Array = npt.NDArray[np.float64]
 # No search goes farther than by this factor's logarithm.
 FARTHEST = 20.0
 
@@ -60,7 +60,7 @@ class Unknowns:
 
     names: tuple[str, ...]
     start: Array
-    logs: npt.NDArray[np.bool_]
+    logs: Mask
     scale: Array
     lo: Array
     hi: Array
@@ -145,9 +145,6 @@ def _end(scene: Scene, name: str, value: Any, missing: float) -> float:
 
 # ----------------------------------------------------------------
 # The log of a search: each scene is computed once, counted, and stored in order.
-
-
-Progress = Callable[[str, int, int], None]
 
 
 class Trial(NamedTuple):

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
+from limitsets.base.progress import Progress
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene, load
@@ -28,8 +28,6 @@ from limitsets.proofs.prover.query import Query
 
 # A larger share of a value is no tolerance: what is fitted is then not known at all.
 MOST = 0.99
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -277,8 +275,12 @@ def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: Scatter, l
 # Throws scatter without a bound; so many standard deviations are taken for one (1 throw in 370 is outside).
 SIGMAS = 3.0
 
-Progress = Callable[[str, int, int], None]
 WORDS = {"throw.speed": "speed repeats", "landing.x": "landings repeat"}
+ALL_OF_IT = {
+    "proved": "The goal is proved for every machine within these intervals with all of this scatter: safe.",
+    "refuted": "A machine within these intervals with this scatter violates the goal: not safe.",
+    "undecided": "For every machine within these intervals with all of this scatter the goal is not decided.",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,7 +381,7 @@ def enough(found: Fit, *, width: float = 0.02, progress: Progress | None = None)
             )
         together = "undecided" if open_ended else _together(scene, noise, progress)
         verdict = "enough" if together == "proved" else "undecided"
-        sentences.append(_all_of_it(together))
+        sentences.append(ALL_OF_IT[together])
     return Enough(verdict, tuple(sentences), repeats, tuple(margins), together, beyond)
 
 
@@ -408,15 +410,6 @@ def _together(scene: Scene, noise: dict[str, str], progress: Progress | None) ->
     tolerance = {name: text for name, text in tolerance.items() if name != "landing.x"}
     proof = certify(scene, ["goal"], noise=noise, tolerance=tolerance, progress=progress)
     return proof.claims[0].verdict if proof.claims[0].verdict in ("proved", "refuted") else "undecided"
-
-
-def _all_of_it(together: str) -> str:
-    said = {
-        "proved": "The goal is proved for every machine within these intervals with all of this scatter: safe.",
-        "refuted": "A machine within these intervals with this scatter violates the goal: not safe.",
-        "undecided": "For every machine within these intervals with all of this scatter the goal is not decided.",
-    }
-    return said[together]
 
 
 def _beyond(scene: Scene, noise: dict[str, str]) -> float | None:

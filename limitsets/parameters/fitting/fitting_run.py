@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from limitsets.base.arguments import arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError, DataError
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, one_by_one, shown_in_notebooks
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.feeder.scene.quantities import base_unit, find
 from limitsets.parameters.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
 from limitsets.parameters.fitting.likelihood import (
     SCATTERS,
+    SHARPEST,
     Likelihood,
     Question,
     Rows,
@@ -41,15 +42,13 @@ from limitsets.parameters.fitting.searching import (
     units_of_change,
 )
 from limitsets.parameters.fitting.throws import Throws, length_of, read_throws, throws_in
+from limitsets.parameters.noise.sampling import binomial_interval
 from limitsets.systems.maps.pieces import at_points
 
 # Differences of readings of one place from which an error of measurement is taken.
 READ_TWICE = 10
 # A scatter this small beside the end of its interval is none.
 NOTHING = 1e-3
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 
 @shown_in_notebooks
@@ -107,11 +106,7 @@ def fit(
         )
     film, refused = _film(throws, chosen)
     known, errors = _errors(film, error, chosen)
-
-    def tell(step: str, done: int, of: int) -> None:
-        if progress is not None:
-            progress(step, done, of)
-
+    tell = progress or silent
     tell("robust least squares", 0, 3)
     start = None
     if refused is None:
@@ -193,20 +188,12 @@ def _answer(
     speed, landing = scatters
     new = fitted_scene(scene, fitted, speed, landing)
     told = own.told(values[None])
-    loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
-    misses = own.rows.throws.x_after - told.after[0]
-    sizes = np.sqrt(
-        own.rows.error**2 * (1.0 + told.slope[0] ** 2)
-        + (told.per_log_speed[0] * values[-2]) ** 2
-        + loose[0, 0] ** 2
-    )
-    names = tuple(each.name for each in fitted)
+    loose = math.hypot(values[-1], SHARPEST * scene.arm_length)
+    names, throws = tuple(each.name for each in fitted), own.rows.throws
     error = own.rows.error
     if not own.rows.known:  # the gain of further throws is then computed with all scatter as one
         error = np.full(len(error), landing.value / math.sqrt(2.0))
-    throws = own.rows.throws
     asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value), throws.corner)
-    more = further_throws(asked, throws.x_before, own.rows.side, error)
     misread, misread_rate = _misread(own.rows, len(scene.sides))
     return Fit(
         scene=new,
@@ -222,9 +209,9 @@ def _answer(
         misread_rate=misread_rate,
         misfit=misfit_of(scene, start),
         explained=remark,
-        residuals=misses,
-        deviations=sizes,
-        further=more,
+        residuals=throws.x_after - told.after[0],
+        deviations=np.sqrt(told.variance(own.rows.error, values[-2], loose)[0]),
+        further=further_throws(asked, throws.x_before, own.rows.side, error),
         seconds=time.perf_counter() - begin,
         likelihood=own,
         best=best,
@@ -236,22 +223,18 @@ def _misread(
     rows: Rows, sides: int
 ) -> tuple[tuple[tuple[int, str, int, int], ...], tuple[float, float, float]]:
     """Name misrecorded sides, and give their share with its exact interval (Clopper and Pearson)."""
-    from scipy.stats import beta
-
     throws, after = rows.throws, rows.side_after(sides)
+    readings = (
+        ("side_before", throws.side_before, rows.side, rows.misread_before()),
+        ("side_after", throws.side_after, after, rows.misread_after(sides)),
+    )
     lines = [
-        (int(throws.row[k]), "side_before", int(throws.side_before[k]), int(rows.side[k]))
-        for k in np.flatnonzero(rows.misread_before())
-    ]
-    lines += [
-        (int(throws.row[k]), "side_after", int(throws.side_after[k]), int(after[k]))
-        for k in np.flatnonzero(rows.misread_after(sides))
+        (int(throws.row[k]), name, int(recorded[k]), int(fits[k]))
+        for name, recorded, fits, misread in readings
+        for k in np.flatnonzero(misread)
     ]
     wrong, count = rows.misread(sides)
-    tail = 0.5 * (1.0 - LEVEL)
-    lo = float(beta.ppf(tail, wrong, count - wrong + 1)) if wrong else 0.0
-    hi = float(beta.ppf(1.0 - tail, wrong + 1, count - wrong))
-    return tuple(sorted(lines)), (wrong / count, lo, hi)
+    return tuple(sorted(lines)), (wrong / count, *binomial_interval(wrong, count, LEVEL))
 
 
 # ----------------------------------------------------------------
@@ -364,9 +347,7 @@ def bootstrap(found: Fit, count: int = 200, *, seed: int = 0, progress: Progress
     inside = np.clip(read, None, scene.arm_length)
     truth = {name: scene.value(name) for name in own.names}
     covered = dict.fromkeys((each.name for each in found.quantities), 0)
-    for number in range(count):
-        if progress is not None:
-            progress("bootstrap", number, count)
+    for number in one_by_one("bootstrap", range(count), count, progress):
         film = simulated_throws(
             scene,
             inside,

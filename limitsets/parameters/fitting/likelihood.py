@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.parameters.fitting.throws import Throws
@@ -33,8 +33,6 @@ from limitsets.systems.maps.pieces import at_points
 
 
 STEP = 1e-5
-
-Array = NDArray[np.float64]
 
 
 class Predicted(NamedTuple):
@@ -60,15 +58,19 @@ class Predicted(NamedTuple):
     decides: Array
     decides_slope: Array
     decides_per_log_speed: Array
-    possible: NDArray[np.bool_]
+    possible: Mask
+
+    def variance(self, error: Array, speed: Array | float, landing: Array | float) -> Array:
+        """Give that of each landing, by the error of its places and the scatter of the speed and of landings."""
+        return error**2 * (1.0 + self.slope**2) + (self.per_log_speed * speed) ** 2 + landing**2
 
 
 def predicted(
     scene: Scene,
-    values: Mapping[str, Array],
+    values: Mapping[str, Array | float],
     before: Array,
-    side: NDArray[np.int64],
-    branch: NDArray[np.int64],
+    side: Ints,
+    branch: Ints,
     *,
     corner: bool,
 ) -> Predicted:
@@ -77,7 +79,7 @@ def predicted(
     Places are those of the centre of mass, or, with `corner`, of the left corner of the side that the part rests on.
     How far this corner is from the centre of mass is the part's geometry, which varies with the quantities.
     """
-    stack = throw_stack(scene, values)
+    stack = throw_stack(scene, {name: np.atleast_1d(value) for name, value in values.items()})
     params, move = stack.params, STEP * scene.arm_length
     x = before + params.a[:, side] if corner else before
     after, slope, decides = at_points(params, x, side, branch)
@@ -114,8 +116,6 @@ MISREAD, MISLAID = 0.02, 0.0004
 # Critical points are not yet known: to this share of the arm's length.
 CRITICAL = 0.05
 
-Whole = NDArray[np.int64]
-
 
 @dataclass(frozen=True, eq=False)
 class Rows:
@@ -136,25 +136,25 @@ class Rows:
     """
 
     throws: Throws
-    side: Whole
-    branch: Whole
+    side: Ints
+    branch: Ints
     error: Array
     known: bool
 
-    def told(self, scene: Scene, values: Mapping[str, Array]) -> Predicted:
+    def told(self, scene: Scene, values: Mapping[str, Array | float]) -> Predicted:
         """Predict these throws for a scene at m values of its quantities: the places that were read."""
         throws = self.throws
         return predicted(scene, values, throws.x_before, self.side, self.branch, corner=throws.corner)
 
-    def side_after(self, sides: int) -> Whole:
+    def side_after(self, sides: int) -> Ints:
         """Return the side on which each throw ended."""
         return (self.side + self.branch) % sides
 
-    def misread_before(self) -> NDArray[np.bool_]:
+    def misread_before(self) -> Mask:
         """Where the side before is misrecorded, in a reading of its own."""
         return np.asarray((self.side != self.throws.side_before) & ~self.throws.shared)
 
-    def misread_after(self, sides: int) -> NDArray[np.bool_]:
+    def misread_after(self, sides: int) -> Mask:
         """Where the side after is misrecorded."""
         return np.asarray(self.side_after(sides) != self.throws.side_after)
 
@@ -190,7 +190,7 @@ def assigned(rows: Rows, scene: Scene, values: Mapping[str, float], spread: floa
     side, branch = (each.reshape(-1) for each in np.indices((sides, 2)))
     told = predicted(
         scene,
-        {name: np.array([value]) for name, value in values.items()},
+        values,
         np.tile(throws.x_before, side.size),
         np.repeat(side, count),
         np.repeat(branch, count),
@@ -237,13 +237,6 @@ class Whitened(NamedTuple):
     log_variance: Array
 
 
-def _variances(rows: Rows, told: Predicted, speed: Array, landing: Array) -> tuple[Array, Array]:
-    """Variance of each landing, and the covariance with that of the row before; shape (m, n)."""
-    v = rows.error**2 * (1.0 + told.slope**2) + (told.per_log_speed * speed) ** 2 + landing**2
-    before = np.concatenate([[0.0], rows.error[:-1]])
-    return v, np.where(rows.throws.shared, -told.slope * rows.error * before, 0.0)
-
-
 def whitened(
     rows: Rows, told: Predicted, speed: Array, landing: Array, miss: Array | None = None
 ) -> Whitened:
@@ -260,7 +253,10 @@ def whitened(
     miss : ndarray, shape (m, n), optional
         Instead of what was measured less what is predicted [length].
     """
-    variance, covariance = _variances(rows, told, speed, landing)
+    variance = told.variance(rows.error, speed, landing)
+    # with the landing of the row before
+    before = np.concatenate([[0.0], rows.error[:-1]])
+    covariance = np.where(rows.throws.shared, -told.slope * rows.error * before, 0.0)
     residual = rows.throws.x_after - told.after if miss is None else miss
     if covariance.any():
         residual, variance = (each.copy() for each in np.broadcast_arrays(residual, variance))
@@ -306,9 +302,8 @@ class Likelihood:
     def told(self, values: Array) -> Predicted:
         """Return what is predicted at m points."""
         points = dict(zip(self.names, values.T[: len(self.names)], strict=True))
-        if not points:
-            points = {"arm.surface_height": np.full(len(values), self.scene.surface_height)}
-        return self.rows.told(self.scene, points)
+        as_it_is = {"arm.surface_height": np.full(len(values), self.scene.surface_height)}
+        return self.rows.told(self.scene, points or as_it_is)
 
     def decision(self, told: Predicted, speed: Array, landing: Array) -> Array:
         """Return by how many of its standard deviations each decision is on the side where it fell; (m, n)."""
@@ -384,7 +379,7 @@ class Question(NamedTuple):
     corner: bool
 
 
-def information(asked: Question, x: Array, side: NDArray[np.int64], error: Array) -> Array:
+def information(asked: Question, x: Array, side: Ints, error: Array) -> Array:
     """Return the information of single throws about quantities in their units of change; shape (n, p, p)."""
     from scipy.stats import norm
 
@@ -403,15 +398,18 @@ def information(asked: Question, x: Array, side: NDArray[np.int64], error: Array
     total = np.zeros((side.size, p, p))
     for told, share in ((jog, 1.0 - flips), (flip, flips)):
         slope = ((told.after[1 : p + 1] - told.after[p + 1 :]) / (2.0 * STEP_OF_GAIN)).T
-        variance = error**2 * (1.0 + told.slope[0] ** 2) + (told.per_log_speed[0] * speed) ** 2 + landing**2
-        total += (share / variance)[:, None, None] * slope[:, :, None] * slope[:, None, :]
+        total += (
+            (share / told.variance(error, speed, landing)[0])[:, None, None]
+            * slope[:, :, None]
+            * slope[:, None, :]
+        )
     slope = ((z[1 : p + 1] - z[p + 1 :]) / (2.0 * STEP_OF_GAIN)).T
     weight = norm.pdf(z[0]) ** 2 / np.maximum(flips * (1.0 - flips), 1e-30)
     total += weight[:, None, None] * slope[:, :, None] * slope[:, None, :]
     return np.where(np.isfinite(total), total, 0.0)
 
 
-def further_throws(asked: Question, x: Array, side: NDArray[np.int64], error: Array) -> tuple[Further, ...]:
+def further_throws(asked: Question, x: Array, side: Ints, error: Array) -> tuple[Further, ...]:
     """Find the start on each side from which a throw tells most beside those filmed; the most telling first."""
     scene, names = asked.scene, asked.names
     known = information(asked, x, side, error).sum(axis=0)

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints
 from limitsets.base.errors import DataError
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.fitting.likelihood import SCATTERS, Likelihood, Rows, assigned
@@ -34,8 +34,6 @@ LOSSES = ("soft_l1", "cauchy", "huber")
 MEDIAN = 0.6744897501960817
 # Where the landings are first taken apart robustly: what misses by more is treated as an outlier, this share of a side.
 ROUGH = 0.02
-
-Array = NDArray[np.float64]
 
 
 class Start(NamedTuple):
@@ -65,6 +63,11 @@ class Start(NamedTuple):
     undetermined: dict[str, str]
     spread: float
 
+    @property
+    def known(self) -> dict[str, float]:
+        """The values by name."""
+        return dict(zip(self.names, self.values.tolist(), strict=True))
+
 
 def quantities_of(scene: Scene) -> tuple[str, ...]:
     """Name what landings depend on: the speed, or kappa without gravity, and what the scene is written in."""
@@ -92,8 +95,7 @@ def jacobian(scene: Scene, rows: Rows, names: tuple[str, ...], values: Array, un
     # a step to an impossible scene is left out: the difference is one-sided there
     after = np.where(told.possible, told.after, told.after[-1])
     steps = STEP * (told.possible[:count] * 1.0 + told.possible[count:-1])
-    derivatives: Array = ((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T
-    return derivatives
+    return np.asarray(((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T)
 
 
 def _least_squares(
@@ -103,11 +105,9 @@ def _least_squares(
     from scipy.optimize import least_squares
 
     def misses(at: Array) -> Array:
-        points = dict(zip(names, (values + units * at)[:, None], strict=True))
-        told = rows.told(scene, points)
+        told = rows.told(scene, dict(zip(names, values + units * at, strict=True)))
         miss = (rows.throws.x_after - told.after[0]) / scale
-        refused = np.full(miss.size, 1e6)
-        return np.where(np.isfinite(miss), miss, 1e6) if told.possible[0, 0] else refused
+        return np.where(np.isfinite(miss) & told.possible[0], miss, 1e6)
 
     def slopes(at: Array) -> Array:
         slope = -jacobian(scene, rows, names, values + units * at, units) / scale
@@ -136,7 +136,7 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
         for loss in LOSSES:
             values = _least_squares(scene, rows, names, values=values, units=units, scale=spread, loss=loss)
             here = dict(zip(names, values.tolist(), strict=True))
-            told = rows.told(scene, {k: np.array([v]) for k, v in here.items()})
+            told = rows.told(scene, here)
             spread = max(spread_of(rows.throws.x_after - told.after[0]), 1e-9 * scene.arm_length)
             if loss != LOSSES[0]:  # a machine that is not yet near explains nothing
                 rows = assigned(rows, scene, here, spread)
@@ -163,8 +163,7 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
         values = np.array([scene.value(name) for name in names])
     covariance = np.linalg.inv(slopes.T @ slopes / spread**2)
     errors = np.sqrt(np.diag(covariance))
-    known = scene.with_values(dict(zip(names, values.tolist(), strict=True)))
-    undetermined = _undetermined(known, rows, names, together, slopes, errors)
+    undetermined = _undetermined(scene.with_values(here), rows, names, together, slopes, errors)
     return Start(
         rows=rows,
         names=names,
@@ -254,7 +253,7 @@ class Maximum(NamedTuple):
     hessian: Array
 
 
-def _expanded(f: Function, at: Array, free: NDArray[np.int64]) -> tuple[float, Array, Array]:
+def _expanded(f: Function, at: Array, free: Ints) -> tuple[float, Array, Array]:
     """Value, gradient and Hessian with respect to the free numbers."""
     p = free.size
     one = np.zeros((p, at.size))
@@ -421,8 +420,7 @@ def largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     for _ in range(ROUNDS):
         best_values = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
         again = assigned(own.rows, scene, best_values, start.spread)
-        same = (again.side == own.rows.side).all() and (again.branch == own.rows.branch).all()
-        if same:
+        if (again.side == own.rows.side).all() and (again.branch == own.rows.branch).all():
             break
         own = replace(own, rows=again)
         best = maximised(own, _best_radius(own, best.at))

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import GridError
 from limitsets.base.files import as_table, picked
-from limitsets.parameters.noise.cell_images import Array, BoxcarOperator, cells_met
+from limitsets.parameters.noise.cell_images import BoxcarOperator, cells_met
 from limitsets.parameters.noise.ulam import SubOperator, Transfer
 from limitsets.systems.cells import CellSet, Domain, Grid, grid
 from limitsets.systems.graph.components import Components, strong_components
@@ -30,8 +31,6 @@ from limitsets.systems.maps import kind_of
 # its classes or fail.  The strong components of its graph therefore come first, and each eigenproblem is that of one
 # component. Source of quasi-stationary distributions: Darroch and Seneta, J. Appl. Prob. 2, 1965.
 
-
-Cells = NDArray[np.int64]
 
 # Escapes per step from which a class is not worth a name.
 SLOW = 0.02
@@ -111,7 +110,7 @@ def graph_of(chain: Transfer) -> Ranges:
     return _ranges(chain, *(np.concatenate(column)[order] for column in (rows, starts, runs)))
 
 
-def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Cells, Cells]:
+def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Ints, Ints]:
     """First and last cell of a side that boxcars and the noise of the landing place after them can reach."""
     first, last = cells_met(block.lo, block.hi)
     if chain.landing is None:
@@ -124,7 +123,7 @@ def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Cell
     return first, np.where(inside, last, first - 1)
 
 
-def _ranges(chain: Transfer, source: Cells, start: Cells, run: Cells) -> Ranges:
+def _ranges(chain: Transfer, source: Ints, start: Ints, run: Ints) -> Ranges:
     counts = np.bincount(source, minlength=chain.n_cells)
     bits = (chain.sinks > 0.0) @ (1 << np.arange(chain.sinks.shape[1]))
     return Ranges(
@@ -137,13 +136,13 @@ def _ranges(chain: Transfer, source: Cells, start: Cells, run: Cells) -> Ranges:
     )
 
 
-def _members(parts: Components) -> list[Cells]:
-    """Cells of each recurrent component."""
+def _members(parts: Components) -> list[Ints]:
+    """Ints of each recurrent component."""
     cells = np.split(parts.order.astype(np.int64), np.cumsum(parts.size)[:-1])
     return [np.sort(each) for each, again in zip(cells, parts.recurrent, strict=True) if again]
 
 
-def _without(r: Ranges, cells: NDArray[np.bool_]) -> Ranges:
+def _without(r: Ranges, cells: Mask) -> Ranges:
     """Return the graph in which the marked cells lead nowhere."""
     counts = np.where(cells, 0, np.diff(r.first))
     kept = np.repeat(~cells, np.diff(r.first))
@@ -152,8 +151,8 @@ def _without(r: Ranges, cells: NDArray[np.bool_]) -> Ranges:
 
 
 def recurrent_classes(
-    chain: Transfer, graph: Ranges, absorbing: NDArray[np.bool_] | None = None
-) -> tuple[list[Cells], list[Cells]]:
+    chain: Transfer, graph: Ranges, absorbing: Mask | None = None
+) -> tuple[list[Ints], list[Ints]]:
     """Recurrent components: those that no step leaves, and the others; marked cells are taken out as absorbing."""
     gone = np.zeros(chain.n_cells, dtype=bool) if absorbing is None else absorbing
     sets = _members(strong_components(graph if absorbing is None else _without(graph, gone)))
@@ -201,7 +200,7 @@ def _arnoldi(part: _Counted) -> Array | None:
     return vector / total if total > 0.0 else None
 
 
-def distribution(chain: Transfer, cells: Cells) -> tuple[Array, float, int]:
+def distribution(chain: Transfer, cells: Ints) -> tuple[Array, float, int]:
     """Stationary or quasi-stationary distribution of one component: weights of its cells, residual, products.
 
     Arnoldi's method finds it; steps that stay with probability 1/2, which no period survives, finish it.
@@ -224,7 +223,7 @@ def distribution(chain: Transfer, cells: Cells) -> tuple[Array, float, int]:
     return weight, residual, part.products
 
 
-def _described(chain: Transfer, cells: Cells, closed: bool) -> NoisyClass:
+def _described(chain: Transfer, cells: Ints, closed: bool) -> NoisyClass:
     part, residual, steps = distribution(chain, cells)
     weight = np.zeros(chain.n_cells)
     weight[cells] = part
@@ -250,7 +249,7 @@ def _described(chain: Transfer, cells: Cells, closed: bool) -> NoisyClass:
     )
 
 
-def _may_be_slow(chain: Transfer, cells: Cells) -> bool:
+def _may_be_slow(chain: Transfer, cells: Ints) -> bool:
     """Whether some cell keeps nearly all its mass in the class: the rate of escape is no less than the least loss."""
     inside = np.zeros(chain.n_cells)
     inside[cells] = 1.0
@@ -307,17 +306,17 @@ class Absorption:
     mean : ndarray, shape (n_cells,)
         Mean number of steps to the goal, of those that come to it; 0 on the goal, nan where none does.
     goal : ndarray of bool, shape (n_cells,)
-        Cells of the goal.
+        Ints of the goal.
     classes : tuple of ndarray
-        Cells of the closed classes outside the goal.
+        Ints of the closed classes outside the goal.
     residual : float
         What the equations are short of, at worst.
     """
 
     probability: dict[str, Array]
     mean: Array
-    goal: NDArray[np.bool_]
-    classes: tuple[NDArray[np.int64], ...]
+    goal: Mask
+    classes: tuple[Ints, ...]
     residual: float
 
 
@@ -337,7 +336,7 @@ def _triangle(matrix: Any) -> Any:
 class _Equations:
     """(I - Q) y = b on the cells where nothing is decided yet."""
 
-    def __init__(self, chain: Transfer, open_: NDArray[np.bool_], label: NDArray[np.int32]) -> None:
+    def __init__(self, chain: Transfer, open_: Mask, label: NDArray[np.int32]) -> None:
         cells = np.flatnonzero(open_)
         if chain.written_out:
             # In the order of the graph's components an edge leads back, or stays in its component: a triangle holds
@@ -374,10 +373,10 @@ class _Equations:
 
 def absorption(
     chain: Transfer,
-    goal: NDArray[np.bool_],
+    goal: Mask,
     *,
-    other: NDArray[np.bool_] | None = None,
-    classes: Sequence[NDArray[np.int64]] | None = None,
+    other: Mask | None = None,
+    classes: Sequence[Ints] | None = None,
 ) -> Absorption:
     """Find where the chain ends, and after how many steps it is at the goal.
 
@@ -386,11 +385,11 @@ def absorption(
     chain : Transfer
         The operator.
     goal : ndarray of bool, shape (n_cells,)
-        Cells that absorb.
+        Ints that absorb.
     other : ndarray of bool, shape (n_cells,), optional
-        Cells that absorb too and are counted apart from the goal, as "other".
+        Ints that absorb too and are counted apart from the goal, as "other".
     classes : sequence of ndarray of int, optional
-        Cells of classes that absorb, instead of the closed classes: those too that are left so rarely that the time
+        Ints of classes that absorb, instead of the closed classes: those too that are left so rarely that the time
         until then does not matter, and the equations could not be solved.
 
     Returns
@@ -495,7 +494,7 @@ def cells_for_noise(domain: Domain, cells: int) -> Grid:
     domain : Domain
         What to cover.
     cells : int
-        Cells of equal width per side; half as many graded ones are laid over them, so far as they are narrower.
+        Ints of equal width per side; half as many graded ones are laid over them, so far as they are narrower.
 
     Returns
     -------
@@ -533,7 +532,7 @@ def with_border(grid: Grid, x: float) -> Grid:
     return Grid(grid.domain, tuple(sides))
 
 
-def random_starts(grid: Grid, lo: NDArray[np.float64], hi: float) -> Array:
+def random_starts(grid: Grid, lo: Array, hi: float) -> Array:
     """Masses of starts that lie anywhere from `lo[side]` to `hi`, equally likely per length on all sides."""
     parts = []
     for side, (edges,) in enumerate(grid.edges):

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints
 from limitsets.systems.cells import Domain, Grid
 from limitsets.systems.maps import along, has_slope, images, kind_of, monotone_pieces
 from limitsets.systems.sets.measure import sample_points
@@ -30,8 +31,6 @@ from limitsets.systems.sets.measure import sample_points
 # A boxcar has the mean and the variance of the convolution of two uniform densities, the image of the cell and the
 # effect of the stratum: their widths add as squares.
 
-
-Array = NDArray[np.float64]
 
 # Share of a cell that is the least width of a boxcar: the image of a fixed or a turning point may have none.
 NARROWEST = 1e-4
@@ -113,7 +112,7 @@ def _running(values: Array) -> Array:
     return running
 
 
-def cells_met(lo: Array, hi: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def cells_met(lo: Array, hi: Array) -> tuple[Ints, Ints]:
     """First and last cell that intervals of positions meet."""
     first = lo.astype(np.int64)
     return first, np.maximum(np.ceil(hi).astype(np.int64) - 1, first)
@@ -142,7 +141,7 @@ def laid(boxcars: Boxcars, edges: Array) -> tuple[BoxcarBlock, Array, Array]:
     )
 
 
-def mass_rows(block: BoxcarBlock, edges: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+def mass_rows(block: BoxcarBlock, edges: Array) -> tuple[Ints, Ints, Array]:
     """Write the entries of a sheet out: source, cell of the target side, mass."""
     lo, hi = block.lo, np.minimum(block.hi, edges.size - 1.0)
     first, last = cells_met(lo, hi)
@@ -155,7 +154,7 @@ def mass_rows(block: BoxcarBlock, edges: Array) -> tuple[NDArray[np.int64], NDAr
     return owner + block.first, cell, mass
 
 
-def first_cells(edges: tuple[Array, ...]) -> NDArray[np.int64]:
+def first_cells(edges: tuple[Array, ...]) -> Ints:
     """Return the number of the first cell of each side, and last that of all."""
     return np.cumulative_sum([each.size - 1 for each in edges], include_initial=True)
 
@@ -283,7 +282,7 @@ class InterpolatedPieces:
         Values that will be asked for.
     """
 
-    def __init__(self, map_of: Callable[[float], Any], domain: Domain, values: NDArray[np.float64]) -> None:
+    def __init__(self, map_of: Callable[[float], Any], domain: Domain, values: Array) -> None:
         self.map_of, self.domain = map_of, domain
         self.nodes = np.empty(0)
         lo, hi = float(values.min()), float(values.max())

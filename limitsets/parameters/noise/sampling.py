@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scattering import Gaussian, Scattering, Uniform, still_map
 from limitsets.systems.maps import advance, kind_of
@@ -78,9 +78,9 @@ class SampledStatistics:
     throws: int
     numbers: dict[str, float]
     errors: dict[str, float]
-    density: tuple[NDArray[np.float64], ...]
-    bins: tuple[NDArray[np.float64], ...]
-    arrived: NDArray[np.int64]
+    density: tuple[Array, ...]
+    bins: tuple[Array, ...]
+    arrived: Ints
     parts: int
 
 
@@ -123,16 +123,16 @@ def _scale(law: Any) -> float:
 class ManyParts:
     """Parts under way; every throw of every part draws numbers of its own, the first the one after `drawn` others."""
 
-    def __init__(self, params: Any, x: NDArray[np.float64], side: NDArray[np.int64], drawn: int = 0) -> None:
+    def __init__(self, params: Any, x: Array, side: Ints, drawn: int = 0) -> None:
         self.params, self.x, self.side, self.drawn = params, x, side, drawn
 
-    def throw(self) -> NDArray[np.int64]:
+    def throw(self) -> Ints:
         """Throw each once; what happened to them."""
         self.x, self.side, code, _ = advance(self.params, self.x, self.side, 1, first=self.drawn)
         self.drawn += self.x.size
         return code
 
-    def keep(self, some: NDArray[np.bool_]) -> None:
+    def keep(self, some: Mask) -> None:
         """Go on with some of them."""
         self.x, self.side = self.x[some], self.side[some]
 
@@ -141,7 +141,7 @@ def throw_many(
     scene: Scene,
     scatter: Scattering,
     goal: tuple[float, int],
-    starts_from: NDArray[np.float64],
+    starts_from: Array,
     *,
     throws: int = 10_000_000,
     parts: int = 20_000,
@@ -194,11 +194,11 @@ def throw_many(
 
 def uniform_starts(
     random: np.random.Generator,
-    lo: NDArray[np.float64],
-    hi: float | NDArray[np.float64],
+    lo: Array,
+    hi: float | Array,
     count: int,
-    sides: NDArray[np.int64] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    sides: Ints | None = None,
+) -> tuple[Array, Ints]:
     """Draw starts from ranges `lo` to `hi` on some sides, by default one on each, equally likely per length."""
     length = np.maximum(hi - lo, 0.0)
     drawn = random.choice(lo.size, size=count, p=length / length.sum())
@@ -206,12 +206,12 @@ def uniform_starts(
     return random.uniform(lo[drawn], np.broadcast_to(hi, lo.shape)[drawn]), side.astype(np.int64)
 
 
-def _mean(per_part: NDArray[np.float64]) -> tuple[float, float]:
+def _mean(per_part: Array) -> tuple[float, float]:
     """Mean over parts and its standard error."""
     return float(per_part.mean()), float(per_part.std(ddof=1)) / math.sqrt(per_part.size)
 
 
-def _ratio(over: NDArray[np.float64], under: NDArray[np.float64]) -> tuple[float, float]:
+def _ratio(over: Array, under: Array) -> tuple[float, float]:
     """Ratio of two means over parts and its standard error, to first order."""
     if not under.sum() > 0.0:
         return float("nan"), float("nan")
@@ -261,7 +261,7 @@ def _share(count: int, parts: int) -> tuple[float, float]:
     return share, math.sqrt(max(share * (1.0 - share), 1.0 / parts) / parts)
 
 
-def _to_goal(many: ManyParts, goal: tuple[float, int]) -> tuple[Answers, NDArray[np.int64]]:
+def _to_goal(many: ManyParts, goal: tuple[float, int]) -> tuple[Answers, Ints]:
     """Throw until all are at the goal or gone: shares, throws that it takes, and those of each part."""
     parts = many.x.size
     arrived, first_wrong, first_far = [], 0, 0

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.base.arguments import arguments_checked
+from limitsets.base.arrays import Array, Mask
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled, how_found
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scattering import (
@@ -78,7 +78,7 @@ class ChainProblem:
 
     scene: Scene
     goal: tuple[float, int]
-    starts: NDArray[np.float64]
+    starts: Array
     cells: int
     strata: int
     # By range of the factor on kappa: found once, used at every solution.
@@ -161,8 +161,8 @@ def _long_run(
     chain: Transfer,
     parts: Sequence[NoisyClass],
     settles: dict[str, float],
-    beyond: NDArray[np.bool_],
-    goal: NDArray[np.bool_],
+    beyond: Mask,
+    goal: Mask,
 ) -> dict[str, float]:
     main = _main(parts, settles)
     if main is None:
@@ -249,8 +249,6 @@ FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)
 # What the derivatives by one quantity take: four solutions on all cells, two on half as many.
 OF_SLOPES = 5.0
 
-Progress = Callable[[str, int, int], None]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NoiseStatistics(ChainSolution, Tabled):
@@ -306,7 +304,7 @@ class NoiseStatistics(ChainSolution, Tabled):
     unit: str
     scatter: Scattering
     goal: tuple[float, int]
-    starts: NDArray[np.float64]
+    starts: Array
     strata: int
     errors: dict[str, float]
     sensitivity: dict[str, dict[str, LevelSensitivity]]
@@ -349,8 +347,8 @@ class Levels:
         By name.
     """
 
-    factors: NDArray[np.float64]
-    numbers: dict[str, NDArray[np.float64]]
+    factors: Array
+    numbers: dict[str, Array]
 
 
 @shown_in_notebooks

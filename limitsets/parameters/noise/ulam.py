@@ -17,12 +17,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scattering import Law, Strata, certain
 from limitsets.parameters.noise.cell_images import (
-    Array,
     BoxcarBlock,
     BoxcarOperator,
     Boxcars,
@@ -145,7 +144,7 @@ def from_points(
 
 def _landed(
     grid: Grid, edges: tuple[Array, ...], target: int, x: Array, width: Array, share: Array
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array, Array]:
+) -> tuple[Ints, Ints, Array, Array, Array]:
     """Entries of points that land on one side: which point, cell of that side, mass; and masses below and above."""
     if edges:
         boxcars = Boxcars(0, target, 0, x - 0.5 * width, x + 0.5 * width, share)
@@ -289,7 +288,7 @@ class SubOperator:
         The cells, in the order in which values and masses are given.
     """
 
-    def __init__(self, chain: Transfer, cells: NDArray[np.int64]) -> None:
+    def __init__(self, chain: Transfer, cells: Ints) -> None:
         self.chain, self.cells = chain, cells
 
     @cached_property

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
+from limitsets.base.progress import Progress
 from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
 from limitsets.proofs.policies.policy import NONE
 from limitsets.proofs.policies.synthesis import Synthesis
@@ -56,11 +57,11 @@ class Impossible:
 class _Parts:
     """Where the starts are now: brackets of x, and the side of each."""
 
-    lo: NDArray[np.float64]
-    hi: NDArray[np.float64]
-    side: NDArray[np.int64]
+    lo: Array
+    hi: Array
+    side: Ints
 
-    def some(self, which: NDArray[np.bool_]) -> _Parts:
+    def some(self, which: Mask) -> _Parts:
         return _Parts(self.lo[which], self.hi[which], self.side[which])
 
 
@@ -72,9 +73,9 @@ class _Enclosed:
     def __init__(self, synthesis: Synthesis, boxes: Sequence[ParameterBox], until: float) -> None:
         self.synthesis, self.boxes, self.until, self.seen = synthesis, boxes, until, 0
 
-    def may_be_won(self, parts: _Parts) -> NDArray[np.bool_]:
+    def may_be_won(self, parts: _Parts) -> Mask:
         x, side = self.synthesis.goal
-        won: NDArray[np.bool_] = (parts.hi >= x) & (parts.side == side)
+        won: Mask = (parts.hi >= x) & (parts.side == side)
         return won
 
     def thrown(self, parts: _Parts, box: ParameterBox) -> _Parts | None:
@@ -146,7 +147,7 @@ def not_within(
     throws: int | None = None,
     *,
     seconds: float = 60.0,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Impossible:
     """Show that no policy of so many throws serves some starts; without noise, which makes it no easier.
 
@@ -199,8 +200,6 @@ def not_within(
 # A policy thrown many times: random starts, noise anywhere in its bounds and at them, errors of the sensor too.
 
 
-Floats = NDArray[np.float64]
-
 # Kappas drawn for each throw, the two ends of its noise among them.
 KAPPAS = 16
 
@@ -224,7 +223,7 @@ class Simulated:
     parts: int
     reached: int
     failures: dict[str, int]
-    throws: NDArray[np.int64]
+    throws: Ints
 
     @property
     def mean(self) -> float:
@@ -292,7 +291,7 @@ def simulate(synthesis: Synthesis, parts: int = 10_000, seed: int = 0) -> Simula
     )
 
 
-def _drawn(synthesis: Synthesis, parts: int, random: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
+def _drawn(synthesis: Synthesis, parts: int, random: np.random.Generator) -> tuple[Array, Ints]:
     """Draw starts, equally likely per length."""
     spans = [(side, lo, hi) for side, pairs in synthesis.starts.extents().items() for lo, hi in pairs]
     length = np.array([hi - lo for _, lo, hi in spans])
@@ -302,12 +301,12 @@ def _drawn(synthesis: Synthesis, parts: int, random: np.random.Generator) -> tup
     return random.uniform(at[:, 0], at[:, 1]), side.astype(np.int64)
 
 
-def _inside(synthesis: Synthesis, x: Floats, side: NDArray[np.int64]) -> NDArray[np.bool_]:
-    inside: NDArray[np.bool_] = (x >= synthesis.goal[0]) & (side == synthesis.goal[1])
+def _inside(synthesis: Synthesis, x: Array, side: Ints) -> Mask:
+    inside: Mask = (x >= synthesis.goal[0]) & (side == synthesis.goal[1])
     return inside
 
 
-def _heard(synthesis: Synthesis, x: Floats, side: NDArray[np.int64], random: np.random.Generator) -> Any:
+def _heard(synthesis: Synthesis, x: Array, side: Ints, random: np.random.Generator) -> Any:
     """Read the sensor: the numbers of the answers."""
     if synthesis.sensor is None:
         return np.zeros(x.size, np.int64)
@@ -316,9 +315,7 @@ def _heard(synthesis: Synthesis, x: Floats, side: NDArray[np.int64], random: np.
     return np.where(yes, words.index("yes"), words.index("no"))
 
 
-def _thrown(
-    box: Any, x: Floats, side: NDArray[np.int64], random: np.random.Generator
-) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+def _thrown(box: Any, x: Array, side: Ints, random: np.random.Generator) -> tuple[Array, Ints, Ints]:
     """Throw parts, each with a kappa of the box; where they come to rest, and the codes."""
     low, high = box.bare[0].kappa, box.bare[1].kappa
     kappas: Sequence[float] = [box.middle_kappa]

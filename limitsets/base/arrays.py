@@ -1,0 +1,8 @@
+"""Names of the arrays that rooms hand to each other."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
