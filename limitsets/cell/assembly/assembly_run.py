@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
@@ -27,9 +28,6 @@ from limitsets.parameters.noise.sampling import binomial_interval, require_seed
 
 # ----------------------------------------------------------------
 # Rates with their intervals, the joint law of two fates, and shares of trials in which outlines overlap.
-
-
-TrialRow = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -79,14 +77,6 @@ class Overlaps:
     in_flight: Rate
 
 
-def overlaps_of(rows: Sequence[TrialRow]) -> Overlaps:
-    """Count trials with overlaps."""
-    names = ("overlap_at_start", "overlap_at_rest", "overlap_in_flight")
-    counts = [sum(bool(row[name]) for row in rows) for name in names]
-    ever = sum(any(row[name] for name in names) for row in rows)
-    return Overlaps(*(rate_of(count, len(rows)) for count in (ever, *counts)))
-
-
 @dataclass(frozen=True)
 class Joint:
     """The joint law of both parts' fates.
@@ -119,7 +109,7 @@ class Joint:
     serial: tuple[float, float]
 
 
-def joint_of(rows: Sequence[TrialRow]) -> Joint:
+def joint_of(rows: Sequence[Mapping[str, Any]]) -> Joint:
     """Count pairs of fates."""
     of = len(rows)
     pairs = [tuple(row["fates"]) for row in rows]
@@ -149,11 +139,6 @@ def joint_of(rows: Sequence[TrialRow]) -> Joint:
 # ----------------------------------------------------------------
 # Trials of assembly, run anywhere and counted: `limitsets.assemble`.
 
-
-OUTCOMES = ("assembled", "ejected", "order", "wrong", "wall", "edge", "left", "never", "unfinished")
-"""Both in their places; one came out of the cavity again; both on their sides, but the second below the first; one in a
-wrong orientation; one stuck at the wall; one thrown so near the end that the throw acts beyond it, which is assumed to
-be no feed; one left the arm otherwise; one is still on the arm; one still moves."""
 
 TRIALS, CHUNK = 2000, 10
 SERIES = 20
@@ -195,7 +180,6 @@ def _read(scenes: tuple[str, str], scatter: Scattering) -> Pair:
     return pair_of(json.loads(scenes[0]), json.loads(scenes[1]), scatter)
 
 
-# Outcomes for people.
 ENDED = {
     "assembled": "assembled",
     "ejected": "a part came out of the cavity again",
@@ -207,6 +191,8 @@ ENDED = {
     "never": "a part stays on the arm",
     "unfinished": "still in motion",
 }
+"""Outcomes, and what they are for people."""
+OUTCOMES = tuple(ENDED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,8 +222,7 @@ class Assembly(Tabled):
     @property
     def counts(self) -> dict[str, int]:
         """How many trials ended in each way."""
-        words = [row["outcome"] for row in self.rows]
-        return {name: words.count(name) for name in OUTCOMES}
+        return dict.fromkeys(OUTCOMES, 0) | Counter(row["outcome"] for row in self.rows)
 
     @property
     def assembled(self) -> Rate:
@@ -253,7 +238,12 @@ class Assembly(Tabled):
     @property
     def overlaps(self) -> Overlaps | None:
         """Shares of the trials in which the outlines overlap; None with contact."""
-        return overlaps_of(self.rows) if self.series.contact is None else None
+        if self.series.contact is not None:
+            return None
+        names = ("overlap_at_start", "overlap_at_rest", "overlap_in_flight")
+        seen = [[bool(row[name]) for name in names] for row in self.rows]
+        counts = (sum(map(any, seen)), *map(sum, zip(*seen, strict=True)))
+        return Overlaps(*(rate_of(count, len(seen)) for count in counts))
 
     @property
     def joint(self) -> Joint | None:

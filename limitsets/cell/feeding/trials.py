@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.files import as_table
-from limitsets.base.progress import Progress
+from limitsets.base.progress import Progress, silent
 from limitsets.cell.feeding.falling import FATES, ArmEnd
 from limitsets.feeder.scattering import Scattering, still_map
 from limitsets.parameters.noise.sampling import ManyParts, binomial_interval, scattering_map
@@ -103,9 +103,8 @@ def creeping_below(end: ArmEnd, scatter: Scattering) -> Array:
     True
     """
     scene, a = end.scene, end.scene.sides.a
-    minimal = not hasattr(still_map(scene), "bare")
-    creeps = minimal and scatter.landing is None and 0.0 < 2.0 * scene.surface_height < scene.kappa
-    return a * (1.0 + AT_JOINT) if creeps else a
+    creeps = scatter.landing is None and 0.0 < 2.0 * scene.surface_height < scene.kappa
+    return a * (1.0 + AT_JOINT) if creeps and not hasattr(still_map(scene), "bare") else a
 
 
 def trials_within(end: ArmEnd, scatter: Scattering, most: int, throws: float, *, seed: int = 0) -> int:
@@ -149,43 +148,29 @@ def run_trials(
     throws = np.full(count, MOST_THROWS, dtype=np.int64)
     beyond = np.zeros(count, dtype=bool)
     drawn = 0
+    a, right = end.scene.sides.a, end.scene.sides.right
     for first in range(0, count, BLOCK):
-        here = slice(first, min(first + BLOCK, count))
-        many = ManyParts(params, *end.drawn(random, here.stop - first), drawn)
-        for waiting in _to_their_fates(end, many, creeping, fate[here], throws[here], beyond[here]):
-            if progress is not None:
-                progress("trials", here.stop - waiting, count)
+        last = min(first + BLOCK, count)
+        waiting = np.arange(first, last)
+        many = ManyParts(params, *end.drawn(random, waiting.size), drawn)
+        for number in range(1, MOST_THROWS + 1):
+            (progress or silent)("trials", last - waiting.size, count)
+            edge = end.at_edge(many.x, many.side)
+            code = many.throw()
+            # a jog lands on the left corner of its side, a flip on the right corner of the next one
+            corner = many.x + np.where(code == 0, -a[many.side], right[many.side])
+            beyond[waiting] |= ((code == 0) | (code == 1)) & (corner > end.x) & ~edge
+            met = np.where(code < 0, FATES.index("left"), end.fate(many.x, many.side))
+            met = np.where((met < 0) & (many.x < creeping[many.side]), NEVER, met)
+            met[edge] = FATES.index("edge")
+            done = met >= 0
+            fate[waiting[done]], throws[waiting[done]] = met[done], number
+            many.keep(~done)
+            waiting = waiting[~done]
+            if not waiting.size:
+                break
         drawn = many.drawn
     return Trials(fate, throws, beyond, seed)
-
-
-def _to_their_fates(
-    end: ArmEnd,
-    many: ManyParts,
-    creeping: Array,
-    fate: Ints,
-    throws: Ints,
-    beyond: Mask,
-) -> Iterator[int]:
-    """Throw parts until each has met its fate, and fill in what is asked of each; before every throw, how many wait."""
-    waiting = np.arange(fate.size)
-    a, right = end.scene.sides.a, end.scene.sides.right
-    for number in range(1, MOST_THROWS + 1):
-        yield waiting.size
-        edge = end.at_edge(many.x, many.side)
-        code = many.throw()
-        # a jog lands on the left corner of its side, a flip on the right corner of the next one
-        corner = many.x + np.where(code == 0, -a[many.side], right[many.side])
-        beyond[waiting] |= ((code == 0) | (code == 1)) & (corner > end.x) & ~edge
-        met = np.where(code < 0, FATES.index("left"), end.fate(many.x, many.side))
-        met = np.where((met < 0) & (many.x < creeping[many.side]), NEVER, met)
-        met[edge] = FATES.index("edge")
-        done = met >= 0
-        fate[waiting[done]], throws[waiting[done]] = met[done], number
-        many.keep(~done)
-        waiting = waiting[~done]
-        if not waiting.size:
-            break
 
 
 # ----------------------------------------------------------------
@@ -345,10 +330,9 @@ def success_curve(
     """
     reach = 0.0 if scatter.speed is None else scatter.speed.strata(2).lo
     possible = [factor for factor in factors if factor * reach > BACKWARDS]
-    tell = progress or (lambda stage, done, of: None)
 
     def right(factor: float, of: float = 1.0) -> float:
-        tell("noise levels", len(known), len(possible) + 2 * HALVINGS)
+        (progress or silent)("noise levels", len(known), len(possible) + 2 * HALVINGS)
         noise = scatter.scaled(factor)
         count = trials_within(end, noise, max(int(of * parts), 1), of * THROWS, seed=seed)
         made = run_trials(end, noise, count, seed=seed).counts

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.arrays import Array
 from limitsets.base.errors import AnswerError, DataError
-from limitsets.base.progress import Progress, one_by_one, shown_in_notebooks
+from limitsets.base.progress import Progress, one_by_one, shown_in_notebooks, silent
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.feeder.scene.quantities import base_unit, find
