@@ -19,11 +19,10 @@ from limitsets.base.arrays import Array, Ints
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.geometry.polygon import above_side, side_ends
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
-from limitsets.feeder.scattering import starts_from
+from limitsets.feeder.scattering import starts_from, uniform_starts
 from limitsets.feeder.scene.laid import LaidLike, read_laid
 from limitsets.feeder.scene.scene import require_rests
 from limitsets.feeder.thrower import fly
-from limitsets.parameters.noise.sampling import uniform_starts
 from limitsets.systems.maps import codes, images
 
 if TYPE_CHECKING:

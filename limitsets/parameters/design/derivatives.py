@@ -133,10 +133,11 @@ SMALL = 0.5
 
 
 class SideNumbers(NamedTuple):
-    """One side of a part, as `limitsets.parameters.design.derivatives.Seeded` holds it; named as in `params.Side`."""
+    """One side of a part, in the scene's unit; named as in `params.Side`."""
 
     a: MultiDual
     d: MultiDual
+    length: MultiDual
     rho: MultiDual
     kappa: MultiDual
     h: MultiDual
@@ -189,15 +190,13 @@ def decided(flight: str, flip: str, part: SideNumbers, x: MultiDual, phi: float)
     phi : float
         The impact angle to rounding [rad]; not used at small angles.
     """
-    steepness = -1.0
-    at = None
+    steepness, at = -1.0, None
     if flight == "exact":
         angle, steepness = _angle(part, x, phi)
         at = Turned(angle, sine(angle), 1.0 - cosine(angle), None)
     omega, barrier = strike(FLIGHTS[flight](), part, x, at)
-    decides: MultiDual = margin(FLIPS[flip](), part.inertia, omega, barrier)
-    kinetic = 0.5 * part.inertia.value * omega.value**2
-    return DecidingNumber(decides, kinetic + abs(barrier.value), steepness)
+    size = 0.5 * part.inertia.value * omega.value**2 + abs(barrier.value)
+    return DecidingNumber(margin(FLIPS[flip](), part.inertia, omega, barrier), size, steepness)
 
 
 def _short_of_arc(phi: float) -> float:
@@ -287,7 +286,11 @@ def nearest_miss(scene: Scene, side: int, until: float) -> tuple[float, float] |
     share = np.linspace(0.0, 1.0, BELOW)
     even, graded = lo + (until - lo) * share, a + (lo - a) * ((until - a) / (lo - a)) ** share
     x = np.unique(np.clip(np.concatenate([even, graded]), lo, until))
-    values = _abs(scene, x, side)
+
+    def undrawn(at: Array) -> Array:
+        return np.abs(margins(scene.bare_map, at, side))
+
+    values = undrawn(x)
     here, higher = values[1:-1], np.maximum(values[:-2], values[2:])
     # a parabola through the three falls below the lowest by less than the highest stands above it
     dips = 1 + np.flatnonzero((here < values[:-2]) & (here <= values[2:]) & (here <= higher - here))
@@ -296,16 +299,12 @@ def nearest_miss(scene: Scene, side: int, until: float) -> tuple[float, float] |
     left, right = x[dips - 1], x[dips + 1]
     for _ in range(NARROWINGS):
         c, d = right - GOLDEN * (right - left), left + GOLDEN * (right - left)
-        lower = _abs(scene, c, side) < _abs(scene, d, side)
+        lower = undrawn(c) < undrawn(d)
         left, right = np.where(lower, left, c), np.where(lower, d, right)
     at = 0.5 * (left + right)
-    least = _abs(scene, at, side)
+    least = undrawn(at)
     k = int(least.argmin())
     return float(at[k]), float(least[k])
-
-
-def _abs(scene: Scene, x: Array, side: int) -> Array:
-    return np.abs(margins(scene.bare_map, x, side))
 
 
 # ----------------------------------------------------------------
@@ -316,25 +315,6 @@ def _abs(scene: Scene, x: Array, side: int) -> Array:
 
 
 SPEED, KAPPA = "throw.speed", "throw.kappa"
-
-
-class Seeded(NamedTuple):
-    """What the throw map depends on, in the scene's unit.
-
-    Parameters
-    ----------
-    a, d, length : list of MultiDual
-        Per side, in flip order (`limitsets.geometry.RestingSides`).
-    rho, kappa, h : MultiDual
-        Radius of gyration, gravity over squared speed, signed height of the arm's surface.
-    """
-
-    a: list[MultiDual]
-    d: list[MultiDual]
-    length: list[MultiDual]
-    rho: MultiDual
-    kappa: MultiDual
-    h: MultiDual
 
 
 def present(scene: Scene, name: str) -> float:
@@ -358,8 +338,8 @@ def _speed_is_open(scene: Scene, name: str) -> bool:
     return name == SPEED and scene.gravity is None
 
 
-def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Seeded:
-    """Read a scene's numbers with their derivatives.
+def sides_of(scene: Scene, names: Sequence[str], before: int = 0) -> list[SideNumbers]:
+    """Read the numbers of a scene's sides, in flip order, with their derivatives.
 
     Parameters
     ----------
@@ -372,7 +352,7 @@ def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Seeded:
 
     Returns
     -------
-    Seeded
+    list of SideNumbers
 
     Raises
     ------
@@ -380,10 +360,11 @@ def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Seeded:
         An unknown quantity, one that this scene does not give, or two that exclude each other.
     """
     reader = _Duals(scene, names, before)
-    # the throw does not depend on the corners
-    a, d, length, *_ = zip(*reader.sides(lambda y, _x: y), strict=True)
     rho, h = reader.shape.radius_of_gyration, reader.number("arm.surface_height")
-    return Seeded(list(a), list(d), list(length), rho, reader.kappa, h)
+    # the throw does not depend on the corners
+    return [
+        SideNumbers(a, d, length, rho, reader.kappa, h) for a, d, length, *_ in reader.sides(lambda y, _x: y)
+    ]
 
 
 class _Duals(Numbers):
@@ -476,8 +457,10 @@ class CriticalJacobian:
     @property
     def determinant(self) -> float | None:
         """Determinant of `scaled`, None where it is not square or not known."""
-        whole = self.matrix.shape[0] == self.matrix.shape[1] and bool(np.isfinite(self.matrix).all())
-        return float(np.linalg.det(self.scaled)) if whole else None
+        rows, columns = self.matrix.shape
+        return (
+            float(np.linalg.det(self.scaled)) if rows == columns and np.isfinite(self.matrix).all() else None
+        )
 
     @property
     def condition(self) -> float | None:
@@ -510,11 +493,10 @@ def is_share(name: str) -> bool:
 
 def require_minimal(scene: Scene) -> None:
     """Refuse a scene with effects: their decision has no derivatives here."""
-    on = scene.effects.on()
-    if on:
+    if scene.effects.on():
         raise AnswerError(
             "the scene's effects",
-            ", ".join(on),
+            ", ".join(scene.effects.on()),
             "the minimal model",
             "leave [effects] out: critical points are differentiated and designed in the minimal model",
         )
@@ -553,9 +535,10 @@ def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
     require_minimal(chosen)
     if len(set(names)) != len(names):
         raise AnswerError("the quantities", ", ".join(names), "each named once", "leave the repetition out")
-    numbers = numbers_of(chosen, names, before=1)
-    rows = [_Row(chosen, numbers, side, point) for side, point in enumerate(first_points(chosen))]
-    slack = [number for side in zip(*_slacks(numbers), strict=True) for number in side]
+    sides = sides_of(chosen, names, before=1)
+    points = enumerate(zip(sides, first_points(chosen), strict=True))
+    rows = [_Row(chosen, part, side, point) for side, (part, point) in points]
+    slack = [number for part in sides for number in (part.a, part.length - part.a, part.d)]
     return CriticalJacobian(
         scene=chosen,
         names=names,
@@ -569,18 +552,12 @@ def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
     )
 
 
-def _slacks(numbers: Seeded) -> tuple[Sequence[MultiDual], ...]:
-    right = [length - a for length, a in zip(numbers.length, numbers.a, strict=True)]
-    return numbers.a, right, numbers.d
-
-
 class _Row:
     """One side: its first critical point, derivatives, or why there are none."""
 
-    def __init__(self, scene: Scene, numbers: Seeded, side: int, point: CriticalPoint | None) -> None:
-        self.scene, self.side = scene, side
-        self.part = SideNumbers(numbers.a[side], numbers.d[side], numbers.rho, numbers.kappa, numbers.h)
-        self.slope = np.full(numbers.h.slope.size - 1, np.nan)
+    def __init__(self, scene: Scene, part: SideNumbers, side: int, point: CriticalPoint | None) -> None:
+        self.scene, self.part, self.side = scene, part, side
+        self.slope = np.full(part.h.slope.size - 1, np.nan)
         self.x: float = np.nan if point is None else point.x
         self.kind: str | None = None if point is None else point.kind
         self.reason = "every throw is decided alike" if point is None else self._differentiate(point.x)

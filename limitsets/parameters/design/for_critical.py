@@ -11,7 +11,7 @@ import numpy as np
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress, shown_in_notebooks
+from limitsets.base.progress import Progress, one_by_one, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
@@ -25,6 +25,7 @@ from limitsets.parameters.design.derivatives import (
     require_minimal,
     with_present,
 )
+from limitsets.parameters.design.search import design_name
 from limitsets.parameters.design.solving import (
     KEPT,
     REACHED,
@@ -219,22 +220,17 @@ def design(
     chosen = load(scene)
     require_minimal(chosen)
     targets = _targets(chosen, critical_points)
-    unknowns = unknowns_of(chosen, _names(vary), bounds)
+    names = [vary] if isinstance(vary, str) else list(vary)
+    if not names or len(set(names)) != len(names):
+        said = ", ".join(map(str, names))
+        raise AnswerError("the quantities to vary", said, "one or more, each once", "name them")
+    unknowns = unknowns_of(chosen, names, bounds)
     with_present(
         chosen, dict(zip(unknowns.names, unknowns.start.tolist(), strict=True))
     )  # refuses what cannot be set
     search = TrialLog(chosen, unknowns, targets, progress)
     outcome, how = _searched(search, unknowns, starts, stages, seed)
     return _answer(search, targets, outcome, how)
-
-
-def _names(vary: Sequence[str]) -> list[str]:
-    names = [vary] if isinstance(vary, str) else list(vary)
-    if not names or len(set(names)) != len(names):
-        raise AnswerError(
-            "the quantities to vary", ", ".join(map(str, names)), "one or more, each once", "name them"
-        )
-    return names
 
 
 def _targets(scene: Scene, wanted: Sequence[float | str | None]) -> tuple[float | None, ...]:
@@ -308,11 +304,14 @@ def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Soluti
         None if target is None or not np.isfinite(x) else float(x - target)
         for target, x in zip(targets, after.x.tolist(), strict=True)
     )
-    scene = _named(after.scene, search.scene) if outcome.trial is not None else search.scene
+    scene, start = search.scene, search.scene
+    if outcome.trial is not None:  # files are named after it
+        changed = [name for name, text in texts(after.scene.text) if text != text_at(start.text, name)]
+        scene = load(in_units_of(after.scene, start, changed).as_dict() | {"name": design_name(start)})
     scenes = [scene if trial is outcome.trial else trial.jacobian.scene for trial in outcome.path]
     return Design(
         scene=scene,
-        start=search.scene,
+        start=start,
         targets=targets,
         reached=outcome.reached,
         residual=residual,
@@ -323,13 +322,6 @@ def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Soluti
         how=how,
         message=_message(search, outcome, residual),
     )
-
-
-def _named(scene: Scene, start: Scene) -> Scene:
-    """Give the scene found a name of its own: files are named after it."""
-    name = start.name if start.name.endswith("-design") else f"{start.name}-design"
-    changed = [one for one, text in texts(scene.text) if text != text_at(start.text, one)]
-    return load(in_units_of(scene, start, changed).as_dict() | {"name": name})
 
 
 def _message(search: TrialLog, outcome: Solution, residual: tuple[float | None, ...]) -> str:
@@ -402,18 +394,10 @@ def limit_sets_along(found: Design, progress: Progress | None = None) -> tuple[t
     >>> [round(last[0][2][0][end], 3) for end in (0, 1)]
     [8.914, 23.383]
     """
-    sets = []
-    for number, scene in enumerate(found.path):
-        if progress is not None:
-            progress("limit sets", number, len(found.path))
-        sets.append(_limit_sets(scene))
-    return tuple(sets)
+    return tuple(map(_limit_sets, one_by_one("limit sets", found.path, len(found.path), progress)))
 
 
 def _limit_sets(scene: Scene) -> tuple[Extents, ...]:
     graph = transitions(scene.map, grid(scene.domain, cells=CELLS))
-    extents = []
-    for attractor in attractors(graph):
-        limit = limit_set(graph, attractor)
-        extents.append(limit.extents if limit.converged else attractor.extents)
-    return tuple(extents)
+    limits = [(attractor, limit_set(graph, attractor)) for attractor in attractors(graph)]
+    return tuple(limit.extents if limit.converged else attractor.extents for attractor, limit in limits)

@@ -20,7 +20,7 @@ from limitsets.base.files import as_table, picked
 from limitsets.parameters.noise.cell_images import BoxcarOperator, cells_met
 from limitsets.parameters.noise.ulam import SubOperator, Transfer
 from limitsets.systems.cells import CellSet, Domain, Grid, grid
-from limitsets.systems.graph.components import Components, strong_components
+from limitsets.systems.graph.components import strong_components
 from limitsets.systems.graph.ranges import RUN, START, Ranges, one_run
 from limitsets.systems.maps import kind_of
 
@@ -96,18 +96,15 @@ def graph_of(chain: Transfer) -> Ranges:
         side = chain.grid.side_of(matrix.indices)
         new[1:] = (np.diff(source) != 0) | (np.diff(matrix.indices) != 1) | (np.diff(side) != 0)
         begin = np.flatnonzero(new)
-        run = np.diff(np.append(begin, source.size))
+        run = np.diff(begin, append=source.size)
         return _ranges(chain, source[begin], matrix.indices[begin].astype(np.int64), run)
-    rows, starts, runs = [], [], []
+    columns: list[Ints] = []
     for block in chain.throw.blocks:
-        some = block.mass > 0.0
         first, last = _cells_hit(chain, block, chain.throw)
-        some &= last >= first
-        rows.append((block.first + np.arange(some.size))[some])
-        starts.append(first[some] + int(chain.grid.offset[block.target]))
-        runs.append((last - first + 1)[some])
-    order = np.argsort(np.concatenate(rows), kind="stable")
-    return _ranges(chain, *(np.concatenate(column)[order] for column in (rows, starts, runs)))
+        source, start = block.first + np.arange(first.size), first + int(chain.grid.offset[block.target])
+        columns.append(np.stack([source, start, last - first + 1])[:, (block.mass > 0.0) & (last >= first)])
+    table = np.concatenate(columns, axis=1)
+    return _ranges(chain, *table[:, np.argsort(table[0], kind="stable")])
 
 
 def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Ints, Ints]:
@@ -136,26 +133,20 @@ def _ranges(chain: Transfer, source: Ints, start: Ints, run: Ints) -> Ranges:
     )
 
 
-def _members(parts: Components) -> list[Ints]:
-    """Ints of each recurrent component."""
-    cells = np.split(parts.order.astype(np.int64), np.cumsum(parts.size)[:-1])
-    return [np.sort(each) for each, again in zip(cells, parts.recurrent, strict=True) if again]
-
-
 def _without(r: Ranges, cells: Mask) -> Ranges:
     """Return the graph in which the marked cells lead nowhere."""
-    counts = np.where(cells, 0, np.diff(r.first))
-    kept = np.repeat(~cells, np.diff(r.first))
-    first = np.cumulative_sum(counts, include_initial=True)
-    return r._replace(first=first, box=r.box[kept], single=False)
+    counts = np.diff(r.first)
+    first = np.cumulative_sum(np.where(cells, 0, counts), include_initial=True)
+    return r._replace(first=first, box=r.box[np.repeat(~cells, counts)], single=False)
 
 
 def recurrent_classes(
     chain: Transfer, graph: Ranges, absorbing: Mask | None = None
 ) -> tuple[list[Ints], list[Ints]]:
     """Recurrent components: those that no step leaves, and the others; marked cells are taken out as absorbing."""
-    gone = np.zeros(chain.n_cells, dtype=bool) if absorbing is None else absorbing
-    sets = _members(strong_components(graph if absorbing is None else _without(graph, gone)))
+    parts = strong_components(graph if absorbing is None else _without(graph, absorbing))
+    cells_of = np.split(parts.order.astype(np.int64), np.cumsum(parts.size)[:-1])
+    sets = [np.sort(cells) for cells, again in zip(cells_of, parts.recurrent, strict=True) if again]
     source = np.repeat(np.arange(chain.n_cells), np.diff(graph.first))
     label = np.full(chain.n_cells, -1)
     for number, cells in enumerate(sets):
@@ -172,17 +163,7 @@ def recurrent_classes(
     return [cells for cells in sets if not leaves[cells].any()], open_
 
 
-class _Counted(SubOperator):
-    """The operator on one component, whose products are counted."""
-
-    products = 0
-
-    def adjoint(self, masses: Array) -> Array:
-        self.products += 1
-        return super().adjoint(masses)
-
-
-def _arnoldi(part: _Counted) -> Array | None:
+def _arnoldi(part: SubOperator) -> Array | None:
     """Leading left eigenvector by Arnoldi's method; None where it does not come out."""
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
@@ -194,10 +175,8 @@ def _arnoldi(part: _Counted) -> Array | None:
         _, vectors = eigs(operator, k=1, which="LR", v0=np.ones(n), tol=1e-12, maxiter=200)
     except ArpackError:
         return None
-    vector = vectors[:, 0].real
-    vector = np.maximum(vector * np.sign(vector.sum()), 0.0)
-    total = float(vector.sum())
-    return vector / total if total > 0.0 else None
+    vector = np.maximum(vectors[:, 0].real * np.sign(vectors[:, 0].real.sum()), 0.0)
+    return vector / vector.sum() if vector.sum() > 0.0 else None
 
 
 def distribution(chain: Transfer, cells: Ints) -> tuple[Array, float, int]:
@@ -205,7 +184,7 @@ def distribution(chain: Transfer, cells: Ints) -> tuple[Array, float, int]:
 
     Arnoldi's method finds it; steps that stay with probability 1/2, which no period survives, finish it.
     """
-    part = _Counted(chain, cells)
+    part = SubOperator(chain, cells)
     even = chain.grid.measure[cells] / chain.grid.measure[cells].sum()
     eigenvector = _arnoldi(part)
     weight = even if eigenvector is None else eigenvector
@@ -225,13 +204,10 @@ def distribution(chain: Transfer, cells: Ints) -> tuple[Array, float, int]:
 
 def _described(chain: Transfer, cells: Ints, closed: bool) -> NoisyClass:
     part, residual, steps = distribution(chain, cells)
-    weight = np.zeros(chain.n_cells)
-    weight[cells] = part
+    weight = chain.marked(cells, part)
     lost = part @ chain.sinks[cells]
     leads_to = {name: float(rate) for name, rate in zip(chain.exits, lost, strict=True)}
-    outside = np.ones(chain.n_cells)
-    outside[cells] = 0.0
-    leads_to["other cells"] = float(part @ np.maximum(chain.apply(outside), 0.0)[cells])
+    leads_to["other cells"] = float(part @ np.maximum(chain.apply(1.0 - chain.marked(cells)), 0.0)[cells])
     sides = {side: float(weight[chain.grid.of_side(side)].sum()) for side in range(chain.grid.sides)}
     names = kind_of(chain.map).branches
     shares = part @ chain.branches[cells]
@@ -247,13 +223,6 @@ def _described(chain: Transfer, cells: Ints, closed: bool) -> NoisyClass:
         residual=residual,
         steps=steps,
     )
-
-
-def _may_be_slow(chain: Transfer, cells: Ints) -> bool:
-    """Whether some cell keeps nearly all its mass in the class: the rate of escape is no less than the least loss."""
-    inside = np.zeros(chain.n_cells)
-    inside[cells] = 1.0
-    return bool(chain.apply(inside)[cells].max() > 1.0 - SLOW)
 
 
 def classes(chain: Transfer) -> tuple[NoisyClass, ...]:
@@ -279,7 +248,9 @@ def classes(chain: Transfer) -> tuple[NoisyClass, ...]:
     """
     closed, open_ = recurrent_classes(chain, graph_of(chain))
     closed_classes = [_described(chain, cells, closed=True) for cells in closed]
-    large = sorted((cells for cells in open_ if _may_be_slow(chain, cells)), key=len, reverse=True)
+    # some cell keeps nearly all its mass in a slow class: the rate of escape is no less than the least loss
+    slow = (cells for cells in open_ if chain.apply(chain.marked(cells))[cells].max() > 1.0 - SLOW)
+    large = sorted(slow, key=len, reverse=True)
     left = [_described(chain, cells, closed=False) for cells in large[:MOST_LEFT]]
     return (
         *closed_classes,
@@ -306,9 +277,9 @@ class Absorption:
     mean : ndarray, shape (n_cells,)
         Mean number of steps to the goal, of those that come to it; 0 on the goal, nan where none does.
     goal : ndarray of bool, shape (n_cells,)
-        Ints of the goal.
+        Cells of the goal.
     classes : tuple of ndarray
-        Ints of the closed classes outside the goal.
+        Cells of the closed classes outside the goal.
     residual : float
         What the equations are short of, at worst.
     """
@@ -352,14 +323,12 @@ class _Equations:
         """Solve for a right side that is given on all cells; 0 elsewhere."""
         from scipy.sparse.linalg import LinearOperator, gmres
 
-        cells, answer = self.part.cells, np.zeros(self.part.chain.n_cells)
-        b = right[cells]
+        b = right[self.part.cells]
         size = float(np.abs(b).max(initial=0.0))
         if size == 0.0:
-            return answer
-        n = cells.size
+            return np.zeros_like(right)
+        n, solution = b.size, np.zeros_like(b)
         operator = LinearOperator((n, n), matvec=self._product, dtype=np.float64)
-        solution = np.zeros(n)
         for _ in range(4):  # once more on what is left over: refines small answers
             rest = b - self._product(solution)
             if np.abs(rest).max() <= RESIDUAL * size:
@@ -367,8 +336,7 @@ class _Equations:
             step, _ = gmres(operator, rest, rtol=1e-12, restart=min(150, n), maxiter=20, M=self.inverse)
             solution = solution + step
         self.worst = max(self.worst, float(np.abs(b - self._product(solution)).max()) / size)
-        answer[cells] = solution
-        return answer
+        return self.part.chain.marked(self.part.cells, solution)
 
 
 def absorption(
@@ -385,11 +353,11 @@ def absorption(
     chain : Transfer
         The operator.
     goal : ndarray of bool, shape (n_cells,)
-        Ints that absorb.
+        Cells that absorb.
     other : ndarray of bool, shape (n_cells,), optional
-        Ints that absorb too and are counted apart from the goal, as "other".
+        Cells that absorb too and are counted apart from the goal, as "other".
     classes : sequence of ndarray of int, optional
-        Ints of classes that absorb, instead of the closed classes: those too that are left so rarely that the time
+        Cells of classes that absorb, instead of the closed classes: those too that are left so rarely that the time
         until then does not matter, and the equations could not be solved.
 
     Returns
@@ -421,8 +389,7 @@ def absorption(
     ends.update({f"class {number}": cells for number, cells in enumerate(closed)})
     probability = {}
     for name, cells in ends.items():
-        mark = np.zeros(chain.n_cells)
-        mark[cells] = 1.0
+        mark = chain.marked(cells)
         probability[name] = np.clip(mark + equations.solve(np.maximum(chain.apply(mark), 0.0)), 0.0, 1.0)
     for number, name in enumerate(chain.exits):
         probability[name] = np.clip(equations.solve(chain.sinks[:, number]), 0.0, 1.0)
@@ -494,7 +461,7 @@ def cells_for_noise(domain: Domain, cells: int) -> Grid:
     domain : Domain
         What to cover.
     cells : int
-        Ints of equal width per side; half as many graded ones are laid over them, so far as they are narrower.
+        Cells of equal width per side; half as many graded ones are laid over them, so far as they are narrower.
 
     Returns
     -------
@@ -534,11 +501,11 @@ def with_border(grid: Grid, x: float) -> Grid:
 
 def random_starts(grid: Grid, lo: Array, hi: float) -> Array:
     """Masses of starts that lie anywhere from `lo[side]` to `hi`, equally likely per length on all sides."""
-    parts = []
-    for side, (edges,) in enumerate(grid.edges):
-        overlap = np.minimum(edges[1:], hi) - np.maximum(edges[:-1], lo[side])
-        parts.append(np.maximum(overlap, 0.0))
-    masses = np.concatenate(parts)
+    overlaps = (
+        np.minimum(edges[1:], hi) - np.maximum(edges[:-1], start)
+        for start, (edges,) in zip(lo, grid.edges, strict=True)
+    )
+    masses = np.maximum(np.concatenate([*overlaps]), 0.0)
     if not masses.sum() > 0.0:
         raise GridError("the range of the starts", (lo.tolist(), hi), "places on the arm", "move its ends")
     return masses / masses.sum()  # type: ignore[no-any-return]  # numpy types a quotient as Any

@@ -88,8 +88,7 @@ def _position(edges: Array, x: Array) -> Array:
     """Where x lies, counted in cells; at the nearer end if beyond all edges."""
     k = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
     base = edges[k]
-    share: Array = np.clip((x - base) / (edges[k + 1] - base), 0.0, 1.0)
-    return k + share
+    return np.asarray(k + np.clip((x - base) / (edges[k + 1] - base), 0.0, 1.0))
 
 
 def _over(pieces: Array, running: Array, lo: Array, hi: Array) -> Array:
@@ -103,13 +102,11 @@ def _over(pieces: Array, running: Array, lo: Array, hi: Array) -> Array:
     between = (
         (first + 1 - lo) * pieces[first] + (hi - last) * pieces[last] + (running[last] - running[first + 1])
     )
-    value: Array = np.where(first == last, (hi - lo) * pieces[first], between)
-    return value
+    return np.where(first == last, (hi - lo) * pieces[first], between)
 
 
 def _running(values: Array) -> Array:
-    running: Array = np.cumulative_sum(values, include_initial=True)
-    return running
+    return np.asarray(np.cumulative_sum(values, include_initial=True))
 
 
 def cells_met(lo: Array, hi: Array) -> tuple[Ints, Ints]:
@@ -120,8 +117,8 @@ def cells_met(lo: Array, hi: Array) -> tuple[Ints, Ints]:
 
 def laid(boxcars: Boxcars, edges: Array) -> tuple[BoxcarBlock, Array, Array]:
     """Lay boxcars on the edges of their target: the sheet, and the mass that lands below and above all edges."""
-    lo, hi = boxcars.lo, boxcars.hi
-    least = NARROWEST * float(np.min(np.diff(edges)))
+    lo, hi, extent = boxcars.lo, boxcars.hi, np.diff(edges)
+    least = NARROWEST * float(extent.min())
     middle, half = 0.5 * (lo + hi), 0.5 * np.maximum(hi - lo, least)
     lo, hi = np.where(hi - lo < least, middle - half, lo), np.where(hi - lo < least, middle + half, hi)
     per_width = boxcars.weight / (hi - lo)
@@ -130,7 +127,6 @@ def laid(boxcars: Boxcars, edges: Array) -> tuple[BoxcarBlock, Array, Array]:
     mass = np.maximum(boxcars.weight - below - above, 0.0)
     at_lo, at_hi = _position(edges, lo), _position(edges, hi)
     # The length as the operator will find it: the rows then add up to the mass exactly.
-    extent = np.diff(edges)
     length = _over(extent, _running(extent), at_lo, at_hi)
     some = length > 0.0
     per_length = np.where(some, mass / np.where(some, length, 1.0), 0.0)
@@ -214,16 +210,13 @@ class BoxcarOperator:
         from scipy.sparse import coo_array
 
         offset = first_cells(self.edges)
-        rows, columns, masses = [], [], []
+        entries = []
         for block in self.blocks:
             source, cell, mass = mass_rows(block, self.edges[block.target])
-            some = mass > 0.0
-            rows.append(source[some].astype(np.int32))
-            columns.append((cell[some] + offset[block.target]).astype(np.int32))
-            masses.append(mass[some])
-        place = (np.concatenate(rows), np.concatenate(columns))
-        whole = coo_array((np.concatenate(masses), place), shape=(self.rows, int(offset[-1])))
-        return whole.tocsr()
+            some, column = mass > 0.0, cell + offset[block.target]
+            entries.append((source[some].astype(np.int32), column[some].astype(np.int32), mass[some]))
+        rows, columns, masses = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+        return coo_array((masses, (rows, columns)), shape=(self.rows, int(offset[-1]))).tocsr()
 
 
 # ----------------------------------------------------------------
@@ -253,15 +246,10 @@ Pieces = dict[int, tuple[BranchInterval, ...]]
 def _cut(params: Any, domain: Domain) -> Pieces:
     by_side = {}
     for side, pieces in monotone_pieces(params, domain).items():
-        ends = [*(piece.lo for piece in pieces[1:]), np.inf]
         # The last float of a piece and the first of the next are neighbours: the gap between them is nothing.
-        tops = [
-            end if np.nextafter(piece.hi, np.inf) == end else piece.hi
-            for piece, end in zip(pieces, ends, strict=True)
-        ]
-        by_side[side] = tuple(
-            BranchInterval(p.lo, float(top), p.branch) for p, top in zip(pieces, tops, strict=True)
-        )
+        ends = zip(pieces, [*(piece.lo for piece in pieces[1:]), np.inf], strict=True)
+        tops = ((p, end if np.nextafter(p.hi, np.inf) == end else p.hi) for p, end in ends)
+        by_side[side] = tuple(BranchInterval(p.lo, float(top), p.branch) for p, top in tops)
     return by_side
 
 

@@ -9,18 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
-from limitsets.feeder.scattering import Gaussian, Scattering, Uniform, still_map
+from limitsets.feeder.scattering import Gaussian, Scattering, Uniform, still_map, uniform_starts
+from limitsets.feeder.scene import Scene
 from limitsets.systems.maps import advance, kind_of
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-
 
 # ----------------------------------------------------------------
 # The interval of a probability that was counted: successes of independent trials.
@@ -101,23 +98,18 @@ def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:
     from limitsets.feeder.thrower.effects.spread import Even, Normal, Spread
     from limitsets.feeder.thrower.full import with_effects
 
-    laws = [getattr(scatter, name) for name in scatter.given()]
-    alike = {type(law) for law in laws}
-    if not laws:
+    alike = {type(getattr(scatter, name)) for name in scatter.given()}
+    if not alike:
         return still_map(scene)
-    if len(alike) != 1 or not alike <= {Gaussian, Uniform} or scatter.tilt is not None:
+    if alike not in ({Gaussian}, {Uniform}) or scatter.tilt is not None:
         allowed = "Gaussian or Uniform of speed and landing, both of one kind"
         raise AnswerError("the noise to throw with", scatter.words(), allowed, "use the operator for others")
-    scale = {name: _scale(getattr(scatter, name)) for name in ("speed", "landing")}
+    law, size = (Even(), "bound") if alike == {Uniform} else (Normal(), "sigma")
+    speed, landing = (float(getattr(each, size, 0.0)) for each in (scatter.speed, scatter.landing))
     plain = still_map(scene)
     full = plain if hasattr(plain, "bare") else with_effects(plain, {}, None)
-    law = Even() if alike == {Uniform} else Normal()
-    spread = Spread(law, scale["speed"], scale["landing"], float(seed))
+    spread = Spread(law, speed, landing, float(seed))
     return full._replace(effects=(*full.effects, spread))
-
-
-def _scale(law: Any) -> float:
-    return 0.0 if law is None else float(law.sigma if isinstance(law, Gaussian) else law.bound)
 
 
 class ManyParts:
@@ -190,20 +182,6 @@ def throw_many(
         arrived=arrived,
         parts=parts,
     )
-
-
-def uniform_starts(
-    random: np.random.Generator,
-    lo: Array,
-    hi: float | Array,
-    count: int,
-    sides: Ints | None = None,
-) -> tuple[Array, Ints]:
-    """Draw starts from ranges `lo` to `hi` on some sides, by default one on each, equally likely per length."""
-    length = np.maximum(hi - lo, 0.0)
-    drawn = random.choice(lo.size, size=count, p=length / length.sum())
-    side = drawn if sides is None else sides[drawn]
-    return random.uniform(lo[drawn], np.broadcast_to(hi, lo.shape)[drawn]), side.astype(np.int64)
 
 
 def _mean(per_part: Array) -> tuple[float, float]:

@@ -102,8 +102,7 @@ def _ways_out(params: Any, grid: Grid, exits: tuple[int, ...], otherwise: int) -
         for column, value in enumerate(exits):
             met[:, column] += np.bincount(source[code == value], minlength=grid.n_cells)
     met[met.sum(axis=1) == 0, otherwise] = 1.0
-    shares: Array = met / met.sum(axis=1, keepdims=True)
-    return shares
+    return np.asarray(met / met.sum(axis=1, keepdims=True))
 
 
 def from_points(
@@ -256,6 +255,12 @@ class Transfer:
     def _transposed(self) -> Any:
         return self.matrix.T.tocsr()
 
+    def marked(self, cells: Ints, values: Array | float = 1.0) -> Array:
+        """Give a function that has values on some cells, and is 0 on all others."""
+        function = np.zeros(self.n_cells)
+        function[cells] = values
+        return function
+
     @property
     def written_out(self) -> bool:
         """Whether products use the matrix written out."""
@@ -289,7 +294,7 @@ class SubOperator:
     """
 
     def __init__(self, chain: Transfer, cells: Ints) -> None:
-        self.chain, self.cells = chain, cells
+        self.chain, self.cells, self.products = chain, cells, 0
 
     @cached_property
     def matrix(self) -> Any:
@@ -300,22 +305,18 @@ class SubOperator:
     def _transposed(self) -> Any:
         return self.matrix.T.tocsr()
 
-    def _whole(self, some: Array) -> Array:
-        whole = np.zeros(self.chain.n_cells)
-        whole[self.cells] = some
-        return whole
-
     def apply(self, values: Array) -> Array:
         """Return a function's expected value one step later; it is 0 on all other cells."""
         if self.matrix is not None:
             return self.matrix @ values  # type: ignore[no-any-return]  # scipy is untyped
-        return self.chain.apply(self._whole(values))[self.cells]
+        return self.chain.apply(self.chain.marked(self.cells, values))[self.cells]
 
     def adjoint(self, masses: Array) -> Array:
-        """Where masses on the cells are one step later."""
+        """Where masses on the cells are one step later; how often that was asked is counted."""
+        self.products += 1
         if self.matrix is not None:
             return self._transposed @ masses  # type: ignore[no-any-return]  # scipy is untyped
-        return self.chain.adjoint(self._whole(masses))[self.cells]
+        return self.chain.adjoint(self.chain.marked(self.cells, masses))[self.cells]
 
 
 def transfer(
@@ -380,15 +381,11 @@ def transfer(
         throw, sinks, branches = from_pieces(at, grid, pieces, edges, cutter)
     else:
         throw, sinks, branches = from_points(at, grid, pieces, edges)
-    cut = pieces.cut
-    second = None
+    cut, second = pieces.cut, None
     if added is not None:
         second, late = landing_stage(grid, edges, added, kind.exits)
-        columns = [
-            throw.apply(column) if isinstance(throw, BoxcarOperator) else throw @ column for column in late.T
-        ]
-        sinks = sinks + np.stack(columns, axis=1)
-        cut += added.cut
+        after = throw.apply if isinstance(throw, BoxcarOperator) else throw.__matmul__
+        sinks, cut = sinks + np.stack([after(column) for column in late.T], axis=1), cut + added.cut
     return Transfer(
         map=params,
         grid=grid,
