@@ -145,9 +145,7 @@ class Processes(Executor):
         for thread in self._threads if wait else ():
             thread.join()
 
-    def end(self) -> None:
-        """End the processes, which have nothing left to do."""
-        self.shutdown()
+    end = shutdown
 
     def abandon(self) -> None:
         """End the processes at once, whatever they do."""
@@ -173,11 +171,9 @@ class Processes(Executor):
             except (EOFError, OSError):
                 self._ended(process, pipe)
                 process = pipe = None
-                allowed, remedy = (
-                    "one that lives until it answers",
-                    "give it more memory, or ask for fewer workers",
-                )
-                future.set_exception(WorkerDiedError("a worker process", "dead", allowed, remedy))
+                remedy = "give it more memory, or ask for fewer workers"
+                died = WorkerDiedError("a worker process", "dead", "one that lives until it answers", remedy)
+                future.set_exception(died)
             except Exception as error:  # noqa: BLE001 - what cannot be sent: whoever asks for the result gets it
                 future.set_exception(error)
             else:
@@ -375,10 +371,8 @@ class _Pace:
 
     def tell(self) -> None:
         """Say it."""
-        if self.progress is None:
-            return
         done, of = len(self.store.done), self.work.chunks
-        if done == of:
+        if self.progress is None or done == of:
             return
         seconds = time.monotonic() - self.began
         words = f"{self.work.name} (a first run compiles: up to two minutes)"

@@ -64,6 +64,10 @@ class Column:
         unit = f" [{self.unit}]" if self.unit else ""
         return [f"{self.head} low{unit}", f"{self.head} high{unit}"]
 
+    def cells(self, value: Any) -> Iterable[Any]:
+        """Give a value as a spreadsheet has it: the ends of an interval in two cells."""
+        return ((None, None) if value is None else value) if self.ends else (value,)
+
     def text(self, value: Any) -> str:
         """Write a value for people."""
         if self.ends and value is not None:
@@ -151,12 +155,10 @@ class Table:
     def flat(self) -> tuple[list[str], list[list[Any]]]:
         """Give heads and rows of single values, as spreadsheets have them."""
         heads = [title for column in self._columns for title in column.titles]
-        rows = []
-        for row in self.rows:
-            cells: list[Any] = []
-            for column, value in zip(self._columns, row, strict=True):
-                cells += ([None, None] if value is None else list(value)) if column.ends else [value]
-            rows.append(cells)
+        rows = [
+            [cell for column, value in zip(self._columns, row, strict=True) for cell in column.cells(value)]
+            for row in self.rows
+        ]
         return heads, rows
 
     @property
@@ -180,9 +182,7 @@ class Table:
         """Write it as CSV: units in the heads, numbers in full."""
         heads, rows = self.flat()
         stream = io.StringIO()
-        lines = csv.writer(stream, lineterminator="\n")
-        lines.writerow(heads)
-        lines.writerows([_cell(value) for value in row] for row in rows)
+        csv.writer(stream, lineterminator="\n").writerows([heads, *(map(_cell, row) for row in rows)])
         return stream.getvalue()
 
     def html(self) -> str:
