@@ -32,44 +32,14 @@ R = TypeVar("R")
 # Where chunks are computed: processes on this machine, a Dask cluster, or an executor that the caller gives.
 
 
-# Chunks that wait beside those that are computed: enough that no worker ever waits for the driver.
-_WAITING = 2
+# Chunks that wait beside those that are computed: enough that no worker ever waits for the driver; and chunks that an
+# executor is given at once whose workers nobody has counted.
+_WAITING, _GIVEN = 2, 32
 
 
 def present_cores() -> int:
     """Count the cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-class Given:
-    """An executor that somebody else starts and ends.
-
-    Parameters
-    ----------
-    executor : concurrent.futures.Executor
-        It computes the chunks.
-    window : int
-        How many chunks it is given at once.
-    """
-
-    def __init__(self, executor: Executor, window: int = 32) -> None:
-        self.executor, self.window = executor, window
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Begin to compute something."""
-        return self.executor.submit(function, *arguments)
-
-    def restart(self) -> None:
-        """Refuse to go on with an executor that broke: it is not ours to start again."""
-        raise LimitsetsError(
-            "the executor", "broken: one of its workers died", "one whose workers live",
-            "start a new one; the same call goes on with what is left",
-        )  # fmt: skip
-
-    def end(self) -> None:
-        """Leave it as it is."""
-
-    abandon = end
 
 
 class Here(Executor):
@@ -110,7 +80,6 @@ class Processes(Executor):
 
     def __init__(self, workers: int) -> None:
         self._max_workers = workers  # under the name that pools of the standard library have for it
-        self.window = _WAITING * workers
         self._tasks: queue.SimpleQueue[tuple[Future[Any], tuple[Any, ...]] | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._running: set[Any] = set()
@@ -130,9 +99,6 @@ class Processes(Executor):
             self._threads.append(threading.Thread(target=self._serve, daemon=True))
             self._threads[-1].start()
         return future
-
-    def restart(self) -> None:
-        """Do nothing: in place of a process that died another one is started when there is work for it."""
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes when they have done what they were given; what has not begun can be cancelled."""
@@ -242,8 +208,8 @@ def _listen(pipe: Any, calls: queue.SimpleQueue[bytes]) -> None:
 
 
 @contextmanager
-def on_cluster(address: str) -> Iterator[Given]:
-    """Use a Dask cluster, by the address of its scheduler."""
+def on_cluster(address: str) -> Iterator[tuple[Executor, int]]:
+    """Use a Dask cluster, by the address of its scheduler: its executor, and how many chunks it is given at once."""
     distributed = imported("distributed")
     try:
         client = distributed.Client(address, timeout=10, set_as_default=False)
@@ -252,15 +218,14 @@ def on_cluster(address: str) -> Iterator[Given]:
             "the cluster", address, "the address of a Dask scheduler, like tcp://10.0.0.1:8786", f"{error}"
         ) from None
     with client:
-        threads = sum(client.nthreads().values())
-        yield Given(client.get_executor(pure=False), _WAITING * max(threads, 1))
+        yield client.get_executor(pure=False), _WAITING * max(sum(client.nthreads().values()), 1)
 
 
 @contextmanager
 def chosen_pool(
     chunks: int, executor: Executor | None, cluster: str | None, workers: int | None
-) -> Iterator[Given | Processes]:
-    """Choose where so many chunks are computed.
+) -> Iterator[tuple[Executor, int]]:
+    """Choose where so many chunks are computed: an executor, and how many it is given at once.
 
     Raises
     ------
@@ -272,14 +237,16 @@ def chosen_pool(
     if workers is not None and workers < 1:
         raise LimitsetsError("the number of workers", workers, "1 or more", "correct it")
     if executor is not None:
-        yield Given(executor)
+        yield executor, _GIVEN
     elif cluster is not None:
         with on_cluster(cluster) as pool:
             yield pool
     elif chunks == 1 and workers is None:  # to start a process takes longer than most single chunks
-        yield Given(Here(), 1)
+        yield Here(), 1
     else:
-        yield Processes(min(workers or present_cores(), chunks))
+        count = min(workers or present_cores(), chunks)
+        with Processes(count) as processes:
+            yield processes, _WAITING * count
 
 
 def in_order(
@@ -390,10 +357,13 @@ def _in_words(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress | None = None) -> None:
-    """Compute the chunks that a store does not hold yet.
+def drive(
+    work: Work, store: Kept, pool: Executor, window: int = _GIVEN, progress: Progress | None = None
+) -> None:
+    """Compute the chunks that a store does not hold yet, of which the pool is given so many at once.
 
-    A chunk whose worker died is computed again alone, so that nothing else can have ended its worker.
+    A chunk whose worker died is computed again alone, so that nothing else can have ended its worker: in its place
+    another process is started when there is work for it.  An executor that somebody else started is not started again.
 
     Raises
     ------
@@ -413,14 +383,18 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
                 "a worker", f"killed {_MOST_DEATHS} times by one chunk", "a chunk that a worker survives",
                 f"it is the one at {work.place(number)}; look at its memory and at the task there",
             )  # fmt: skip
+        if not isinstance(pool, Processes):
+            raise LimitsetsError(
+                "the executor", "broken: one of its workers died", "one whose workers live",
+                "start a new one; the same call goes on with what is left",
+            )  # fmt: skip
         again.append(number)
-        pool.restart()
 
     try:
         while todo or again or flight:
             pace.tell()
             alone = again or any(k in deaths for k in flight.values())
-            while (todo or again) and len(flight) < (1 if alone else pool.window):
+            while (todo or again) and len(flight) < (1 if alone else window):
                 number = (again or todo).popleft()
                 try:
                     flight[pool.submit(work.function, *work.given, number)] = number
@@ -433,11 +407,11 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
     except BaseException as error:
         for future in flight:
             future.cancel()
-        pool.abandon()
+        if isinstance(pool, Processes):
+            pool.abandon()
         if isinstance(error, KeyboardInterrupt) and store.path is not None:
             error.add_note(GOES_ON)
         raise
-    pool.end()
 
 
 def _kept(work: Work, store: Kept, future: Future[Any], number: int, pace: _Pace) -> bool:
@@ -581,8 +555,8 @@ def finished_trials(
     )
     here = executor is None and cluster is None and workers is None
     alone = nullcontext() if kept.path is None else locked(kept.path)
-    with alone, chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as pool:
-        drive(work, kept, pool, progress)
+    with alone, chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as (pool, window):
+        drive(work, kept, pool, window, progress)
     return tuple(kept)
 
 

@@ -80,8 +80,7 @@ class Column:
             return "-"
         if callable(self.show):
             return self.show(value)
-        if isinstance(value, bool) or hasattr(value, "dtype"):
-            value = _plain(value)
+        value = _plain(value)
         if isinstance(value, bool):
             return "yes" if value else "no"
         return format(value, self.show) if self.show and not isinstance(value, str) else str(value)
@@ -215,8 +214,9 @@ def pandas() -> Any:
     except ModuleNotFoundError:
         from limitsets.base.errors import AnswerError
 
-        remedy = "pip install 'limitsets[atlas]'"
-        raise AnswerError("the package pandas", "missing", "an installed one", remedy) from None
+        raise AnswerError(
+            "the package pandas", "missing", "an installed one", "pip install 'limitsets[atlas]'"
+        ) from None
     return pd
 
 
@@ -243,8 +243,7 @@ class Tabled:
         words = [f"{name}={_in_short(getattr(self, name))}" for name in names]
         ends = accumulate(len(word) + 2 for word in words)
         kept = [word for word, end in zip(words, ends, strict=True) if end <= SHORT]
-        more = ["..."] if len(kept) < len(words) else []
-        return f"{type(self).__name__}({', '.join([*kept, *more])})"
+        return f"{type(self).__name__}({', '.join([*kept, *(['...'] if len(kept) < len(words) else [])])})"
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -278,8 +277,7 @@ def _in_short(value: Any) -> str:
     """Write a value as it is where it is short, else its kind and size."""
     text = "" if isinstance(value, Tabled) else repr(value)
     if not text or len(text) > SHORT // 4 or "\n" in text:
-        size = f" of {len(value)}" if isinstance(value, Sized) else ""
-        return f"<{type(value).__name__}{size}>"
+        return f"<{type(value).__name__}{(f' of {len(value)}' if isinstance(value, Sized) else '')}>"
     return text
 
 

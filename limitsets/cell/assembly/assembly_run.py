@@ -124,7 +124,6 @@ def joint_of(rows: Sequence[Mapping[str, Any]]) -> Joint:
     error = product - both.share
     # each marginal at 97.5 %, so that both hold at 95 %
     ends = [binomial_interval(rate.count, of, 0.975) for rate in (first, second)]
-    serial = ends[0][0] * ends[1][0], ends[0][1] * ends[1][1]
     return Joint(
         table,
         (first, second),
@@ -132,7 +131,7 @@ def joint_of(rows: Sequence[Mapping[str, Any]]) -> Joint:
         product=product,
         error=error,
         error_interval=(error - spread, error + spread),
-        serial=serial,
+        serial=(ends[0][0] * ends[1][0], ends[0][1] * ends[1][1]),
     )
 
 
@@ -262,12 +261,9 @@ class Assembly(Tabled):
     @property
     def survived(self) -> dict[str, Rate]:
         """Assembled pairs that are whole after one more throw: with a standing cavity, and with one that is thrown."""
-        rates = {}
-        for name in ("standing", "carried"):
-            known = [row[f"survives_{name}"] for row in self.rows if row.get(f"survives_{name}") is not None]
-            if known:
-                rates[name] = rate_of(sum(known), len(known))
-        return rates
+        whole = {name: [row.get(f"survives_{name}") for row in self.rows] for name in ("standing", "carried")}
+        known = {name: [each for each in thrown if each is not None] for name, thrown in whole.items()}
+        return {name: rate_of(sum(thrown), len(thrown)) for name, thrown in known.items() if thrown}
 
     def example(self, outcome: str) -> int | None:
         """Give the number of the first trial that ended so."""
@@ -399,13 +395,12 @@ def assemble(
         raise AnswerError("the starts", "overlapping", "parts that do not overlap", "leave apart out")
     given = None if starts is None else require_apart(pair, starts)
     one, two = (json.dumps(each.as_dict()) for each in pair.scenes)
-    side_by_side = bool(how if apart is None else apart)
     series = Series(
         (one, two),
         pair.scatter,
         how,
         carried=carried and pair.contact,
-        apart=side_by_side,
+        apart=bool(how if apart is None else apart),
         starts=given,
         seed=seed,
     )

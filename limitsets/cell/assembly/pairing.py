@@ -135,8 +135,7 @@ def outline_at(scene: Scene, x: float, height: float, angle: float) -> list[tupl
     """Give the corners of a part, its centre of mass at (x, height) from the joint, turned from side 0 by an angle."""
     about = scene.vertices - np.asarray(scene.centre)
     cos, sin = math.cos(angle), math.sin(angle)
-    turned = about @ np.array([[cos, sin], [-sin, cos]]) + (x, height)
-    return [(float(px), float(py)) for px, py in turned]
+    return [(float(px), float(py)) for px, py in (about @ np.array([[cos, sin], [-sin, cos]]) + (x, height))]
 
 
 def angle_on(scene: Scene, side: int) -> float:
@@ -225,8 +224,7 @@ class Draws:
         if not self.rows:
             scatter, shape = self.pair.scatter, (AT_ONCE, 1)
             speed = _drawn(scatter.speed, self.random, shape)
-            landing = _drawn(scatter.landing, self.random, (AT_ONCE, 2))
-            self.rows = np.hstack([speed, landing])[::-1].tolist()
+            self.rows = np.hstack([speed, _drawn(scatter.landing, self.random, (AT_ONCE, 2))])[::-1].tolist()
         speed_of, one, two = self.rows.pop()
         return speed_of, (one, two)
 
@@ -358,7 +356,6 @@ def way_of(scene: Scene, params: Any, start: Start, side: int) -> Way:
     sides = (side - before) % count
     turned = sum(float(scene.sides.corner[(before + k) % count]) for k in range(sides))
     turns, fastest = _turned(turned - phi, rate, (right, above), inertia, kappa)
-    in_flight = math.hypot(height, max(abs(x), abs(x - kappa * phi))) + reach
     return Way(
         scene,
         start,
@@ -366,7 +363,7 @@ def way_of(scene: Scene, params: Any, start: Start, side: int) -> Way:
         phi=phi,
         struck=struck,
         turns=turns,
-        in_flight=in_flight,
+        in_flight=(math.hypot(height, max(abs(x), abs(x - kappa * phi))) + reach),
         turning=2.0 * reach * fastest,
     )
 

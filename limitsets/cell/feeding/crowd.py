@@ -155,8 +155,7 @@ def run_crowd(
     AnswerError
         Contact is off in the scene, no parts, laws that throws cannot draw from, or no pymunk.
     """
-    scene = end.scene
-    if not scene.effects.contact:
+    if not end.scene.effects.contact:
         remedy = "add contact = true to [effects]: parts that pass through each other are those of trials"
         raise AnswerError("effects.contact", False, "true where parts are thrown together", remedy)
     if parts < 1 or batches < 1 or throws < 1:

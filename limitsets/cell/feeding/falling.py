@@ -248,10 +248,8 @@ def farthest_clear(scene: Scene, cavity: Cavity, side: int) -> float:
     for corner in corners:
         along, above, _ = above_side(corners[left], corners[right], corner)
         q = max(above, 0.0)  # on the side itself, to rounding
-        if q <= cavity.width * sin:
-            wall = math.sqrt(cavity.width**2 - q**2)
-        else:
-            wall = (cavity.width - q * sin) / cos
+        near = q <= cavity.width * sin
+        wall = math.sqrt(cavity.width**2 - q**2) if near else (cavity.width - q * sin) / cos
         floor = (cavity.depth + q * cos) / sin
         most = min(most, min(wall, floor) - (along - float(scene.sides.a[side])))
     return most
@@ -370,8 +368,7 @@ class ArmEnd:
         clears = np.zeros(np.shape(x), dtype=bool)
         for lo, hi in self.clear:
             clears |= (beyond >= lo) & (beyond <= hi)
-        fed = np.where(side == self.side, np.where(clears, 0, 2), 1)
-        return np.where(beyond >= 0.0, fed, -1)
+        return np.where(beyond >= 0.0, np.where(side == self.side, np.where(clears, 0, 2), 1), -1)
 
     def at_edge(self, x: Any, side: Any) -> Any:
         """Say of which parts at rest before the end the next throw acts beyond it: their fate is "edge"."""
@@ -420,5 +417,4 @@ def _edges(scene: Scene, x: float) -> Array:
     sides = scene.sides
     c = scene.radius_of_gyration**2 + sides.d * (scene.surface_height + sides.d)
     root = np.sqrt(np.maximum(x * x - 4.0 * c, 0.0))
-    acts = np.where(4.0 * c < x * x, 0.5 * (x + root), 0.0)
-    return np.clip(acts, np.maximum(x - sides.right, sides.a), x)
+    return np.clip(np.where(4.0 * c < x * x, 0.5 * (x + root), 0.0), np.maximum(x - sides.right, sides.a), x)

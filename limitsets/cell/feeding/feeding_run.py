@@ -171,8 +171,9 @@ class Feeding(Tabled):
             The checker does not confirm it: it is kept as NAME.denied.zip, and what it holds is undecided.
         """
         if self.proof is None:
-            remedy = "ask for the proof: prove=True"
-            raise AnswerError("the certificate", "without a proof", "safety or progress", remedy)
+            raise AnswerError(
+                "the certificate", "without a proof", "safety or progress", "ask for the proof: prove=True"
+            )
         return write_proof(path, self.proof, self.end, recheck=recheck, workers=workers)
 
     def denied(self, reason: str) -> Feeding:

@@ -281,8 +281,7 @@ class Paths:
             landings = [spread[ends[cell, 0] : ends[cell, 1] + 1] for ends in ways if ends[cell, 0] >= 0]
             ends_on[cell] = np.bitwise_or.reduce(np.concatenate([*landings, near[inward[:, cell]]]))
         leaving = (inward | outward).any(axis=0) & ~fed
-        stay = (parts.recurrent[parts.label] & ~fed) | leaving
-        late = reach(ranges, parts, stay.astype(np.uint8)) > 0
+        late = reach(ranges, parts, ((parts.recurrent[parts.label] & ~fed) | leaving).astype(np.uint8)) > 0
         leaves = reach(ranges, parts, leaving.astype(np.uint8)) > 0
         steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
         return cls(attraction, end, ~fed, ends_on=ends_on, near=near, leaves=leaves, late=late, steps=steps)
@@ -326,8 +325,7 @@ class Paths:
         bad, near = self.ends_on & wrong > 0, self.near & wrong == 0
         sides = range(self.attraction.cover.grid.sides)
         possible = {side: self.extents(self.ends_on >> side & 1 > 0) for side in sides}
-        whole = not (bad & self.starts).any() and bool(near.all())
-        share = 1.0 if whole else self.share(~bad, near)
+        share = 1.0 if (not (bad & self.starts).any() and bool(near.all())) else self.share(~bad, near)
         begins = self.begins
         measure = self.attraction.cover.grid.measure
         return Safe(

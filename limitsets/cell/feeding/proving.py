@@ -306,11 +306,10 @@ def write_proof(
     if not section:
         remedy = "see the reason in .fed; a part without a proof is in no certificate"
         raise AnswerError("the certificate", "without a proved claim", "safety or progress", remedy)
-    claim = {"claim": "feeds", "section": section, "verdict": verdict_of(proof, laid=bool(end.laid))}
     write(
         path,
         [proof.attraction],
-        [claim],
+        [{"claim": "feeds", "section": section, "verdict": verdict_of(proof, laid=bool(end.laid))}],
         noise=box.noise or None,
         tolerance=None,
         unit=end.scene.unit,

@@ -357,5 +357,4 @@ def success_curve(
             middle = 0.5 * (ends[0] + ends[1])
             right(middle)
             ends[int(known[middle][end_of] <= wanted)] = middle
-    level = (between[0][0], between[1][1])
-    return Curve(np.array(possible), np.array(shares), wanted, level)
+    return Curve(np.array(possible), np.array(shares), wanted, ((between[0][0], between[1][1])))

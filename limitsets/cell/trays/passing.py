@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
@@ -86,8 +87,7 @@ class Passes:
 
     def again(self, pose: Pose, random: np.random.Generator) -> tuple[Pose, Motion]:
         """Draw how a part that lies on the plate comes by: kicked and washed on, the next depression being equal."""
-        x = math.remainder(pose.x, self.tray.pitch)
-        return Pose(x, pose.y, pose.angle), self.kick(random)
+        return Pose(math.remainder(pose.x, self.tray.pitch), pose.y, pose.angle), self.kick(random)
 
     def to_json(self) -> dict[str, Any]:
         """Give what was drawn, and with which contact."""
@@ -371,32 +371,39 @@ class Histories:
         )
 
 
-def _history(
-    passes: Passes, count: int, seed: int, returning: bool, numbers: Sequence[int]
-) -> list[list[tuple[int, int]]]:
-    """Follow depressions from empty ones: states after kick and pass."""
-    chains = []
-    for number in numbers:
-        random = random_of(seed, RETURNING if returning else FRESH, number)
-        state, pose, on_plate, rows = EMPTY, Pose(0.0, 0.0, 0.0), None, []
-        for _ in range(count):
-            if state > EMPTY:
-                rest = passes.plate.settle(pose, passes.kick(random))
-                state, pose = rest.state, rest.pose
-                # what popped out is washed on with the parts that pass; it does not come by again in this pass
-            after_kick = state
-            if state == EMPTY:
-                again = on_plate is not None and returning
-                came = passes.again(on_plate, random) if again and on_plate else passes.arrival(random)
-                rest = passes.plate.settle(*came)
-                state, pose = rest.state, rest.pose
-                on_plate = pose if state == EMPTY and rest.side >= 0 else None
-            rows.append((after_kick, state))
-            if state == UNFINISHED:
-                rows += [(UNFINISHED, UNFINISHED)] * (count - len(rows))
-                break
-        chains.append(rows)
-    return chains
+def _pass_by_pass(
+    passes: Passes, random: np.random.Generator, returning: bool, settle: Callable[[Pose, Motion, bool], Rest]
+) -> Iterator[tuple[int, int]]:
+    """Follow a depression from an empty one: states after the kick and after the part that came by, without end.
+
+    `settle` lets a part move to rest, and is told whether it was kicked or came by.
+    """
+    state, pose, on_plate = EMPTY, Pose(0.0, 0.0, 0.0), None
+    while True:
+        if state != EMPTY:
+            # what pops out is washed on with the parts that pass; it does not come by again in this pass
+            pose, state, *_ = settle(pose, passes.kick(random), True)
+        after_kick = state
+        if state == EMPTY:
+            came = passes.again(on_plate, random) if on_plate and returning else passes.arrival(random)
+            rest = settle(*came, False)
+            state, pose = rest.state, rest.pose
+            on_plate = pose if state == EMPTY and rest.side >= 0 else None
+        yield after_kick, state
+
+
+def _history(passes: Passes, count: int, seed: int, returning: bool, number: int) -> list[tuple[int, int]]:
+    """Follow a depression: its states after each kick and pass, those of a part that does not rest from there on."""
+    random = random_of(seed, RETURNING if returning else FRESH, number)
+    rows: list[tuple[int, int]] = []
+    settled = _pass_by_pass(
+        passes, random, returning, lambda pose, motion, _: passes.plate.settle(pose, motion)
+    )
+    for row in islice(settled, count):
+        rows.append(row)
+        if row[1] == UNFINISHED:
+            break
+    return rows + [(UNFINISHED, UNFINISHED)] * (count - len(rows))
 
 
 def histories(
@@ -426,7 +433,7 @@ def histories(
         As in `limitsets.tray`.
     """
     task = functools.partial(_history, passes, count, seed, returning)
-    rows = in_order("histories", task, [[k] for k in range(number)], executor, progress)
+    rows = in_order("histories", task, range(number), executor, progress)
     table = np.array(rows, dtype=np.int64).reshape(number, count, 2)
     return Histories(table[..., 0].copy(), table[..., 1].copy(), returning, passes.right)
 
@@ -488,31 +495,27 @@ def filmed(
     every = max(round(1.0 / (FRAMES * step)), 1)
     frames: list[tuple[float, int, Pose]] = []
     marks: list[Mark] = []
-    start, parts, state, pose = 0.0, 0, EMPTY, Pose(0.0, 0.0, 0.0)
+    start, parts = 0.0, 0
 
-    def move(part: int, pose: Pose, motion: Motion) -> Rest:
+    def move(pose: Pose, motion: Motion, kicked: bool) -> Rest:
         """Let a part move to rest; what is kept begins where the last motion ended."""
-        nonlocal start
-        kept: list[tuple[float, Pose]] = []
+        nonlocal start, parts
+        parts += not kicked
+        part, kept = parts - 1, list[tuple[float, Pose]]()
+        if kicked:
+            marks.append((start, part, "thrown"))
         rest = plate.settle(pose, motion, lambda time, now, _: kept.append((time, now)))
-        last = rest.time
-        shown = [*kept[::every], (last, rest.pose)]
+        shown = [*kept[::every], (rest.time, rest.pose)]
         frames.extend((start + unit * time, part, now) for time, now in shown)
-        start += unit * last
+        start += unit * rest.time
         marks.append((start, part, "rest"))
         start += unit * step
+        if rest.state == EMPTY or not kicked:
+            missed = "ejected" if kicked else "lost"
+            marks.append((start, part, missed if rest.state == EMPTY else "in the cavity"))
         return rest
 
-    for _ in range(passes):
-        if state != EMPTY:
-            marks.append((start, parts - 1, "thrown"))
-            pose, state, *_ = move(parts - 1, pose, asked.kick(random))
-            if state == EMPTY:
-                marks.append((start, parts - 1, "ejected"))
-        if state == EMPTY:
-            parts += 1
-            pose, state, *_ = move(parts - 1, *asked.arrival(random))
-            marks.append((start, parts - 1, "lost" if state == EMPTY else "in the cavity"))
+    deque(islice(_pass_by_pass(asked, random, False, move), passes), maxlen=0)
     times = np.array([time for time, _, _ in frames])
     poses = np.full((times.size, parts, 3), np.nan)
     for number, (_, part, now) in enumerate(frames):

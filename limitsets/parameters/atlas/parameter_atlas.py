@@ -326,8 +326,8 @@ def atlas(
         if kept < of:
             if executor is None and cluster is None and of > 1:
                 _require_importable(plan)
-            with chosen_pool(of, executor, cluster, workers) as pool:
-                drive(_work(plan), held, pool, progress)
+            with chosen_pool(of, executor, cluster, workers) as (pool, window):
+                drive(_work(plan), held, pool, window, progress)
     return Atlas(opened(held.group.store), path, of - kept, kept)
 
 

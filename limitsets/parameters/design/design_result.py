@@ -194,8 +194,7 @@ def front_of(
         chosen += [int(k) for k in mine[np.argsort(early)[:PER_CLASS]]]
     chosen += [int(k) for k in np.argsort(-margins)[:PER_CLASS]]
     counted = one_by_one("throws to feed", dict.fromkeys(chosen), len(chosen), tell)
-    tried = (_option(known[k], searches[known[k].order], side, seed) for k in counted)
-    options = [own, *filter(None, tried)]
+    options = [own, *filter(None, (_option(known[k], searches[known[k].order], side, seed) for k in counted))]
     # The designs on the front are rated again on all corners, until all of them are: the search knew some corners only,
     # so that a rating from then may be too high, and hides designs that are better on all.
     sure = [own]

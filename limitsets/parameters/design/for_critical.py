@@ -222,8 +222,9 @@ def design(
     targets = _targets(chosen, critical_points)
     names = [vary] if isinstance(vary, str) else list(vary)
     if not names or len(set(names)) != len(names):
-        said = ", ".join(map(str, names))
-        raise AnswerError("the quantities to vary", said, "one or more, each once", "name them")
+        raise AnswerError(
+            "the quantities to vary", ", ".join(map(str, names)), "one or more, each once", "name them"
+        )
     unknowns = unknowns_of(chosen, names, bounds)
     with_present(
         chosen, dict(zip(unknowns.names, unknowns.start.tolist(), strict=True))
@@ -286,8 +287,7 @@ def _searched(
         if best is None:
             return Solution(None, [], False), "no scene was found that has the critical points wanted"
         near = nearest_to_targets(search, best)
-        reached = search.cost(near) <= REACHED
-        return Solution(near, [*solution.path[:1], near], reached), "least squares"
+        return Solution(near, [*solution.path[:1], near], (search.cost(near) <= REACHED)), "least squares"
     if search.wanted.size < center.size and solution.trial is not None:
         near = nearest_to_start(search, solution.trial, own)
         solution = Solution(
@@ -341,22 +341,25 @@ def _message(search: TrialLog, outcome: Solution, residual: tuple[float | None, 
 
 def _in_the_way(search: TrialLog, trial: Trial) -> list[str]:
     """Say which bounds and which edges of the part hold the search."""
-    unknowns, reasons = search.unknowns, []
-    for row, side in enumerate(search.sides):
-        if not trial.slope[row].any():
-            reasons.append(f"the critical point of side {side} does not depend on what is varied")
-    for k, name in enumerate(unknowns.names):
-        for end, word in ((unknowns.lo[k], "lower"), (unknowns.hi[k], "upper")):
-            if np.isfinite(end) and abs(trial.at[k] - end) < 1e-6:
-                reasons.append(f"{name} is at its {word} bound")
+    unknowns = search.unknowns
+    still = [side for side, slope in zip(search.sides, trial.slope, strict=True) if not slope.any()]
+    bounds = {"lower": unknowns.lo, "upper": unknowns.hi}
     size = float(np.ptp(search.scene.vertices, axis=0).max())
     words = ("the left end", "the right end", "the level")
-    for k, slack in enumerate(trial.jacobian.slack.tolist()):
-        if slack < 2.0 * KEPT * size:
-            reasons.append(
-                f"the centre of mass is at {words[k % 3]} of side {k // 3}: beyond it the part tips over"
-            )
-    return reasons
+    tipping = np.flatnonzero(trial.jacobian.slack < 2.0 * KEPT * size).tolist()
+    return [
+        *(f"the critical point of side {side} does not depend on what is varied" for side in still),
+        *(
+            f"{name} is at its {word} bound"
+            for k, name in enumerate(unknowns.names)
+            for word, ends in bounds.items()
+            if np.isfinite(ends[k]) and abs(trial.at[k] - ends[k]) < 1e-6
+        ),
+        *(
+            f"the centre of mass is at {words[k % 3]} of side {k // 3}: beyond it the part tips over"
+            for k in tipping
+        ),
+    ]
 
 
 # ----------------------------------------------------------------

@@ -109,8 +109,7 @@ class GoalDesign(Tabled):
             proof = "proved" if self.verdict == "proved" else "sampled, not proved"
             held = f"the goal holds of the limit set at X = {x:g} {unit} ({proof})"
             return f"{held}, with {self.room:.3g} {unit} to spare (sampled)"
-        why = said(self.ruled_out)
-        return f"no design that meets the goal at X = {x:g} {unit} among {self.evaluations}: {why}"
+        return f"no design that meets the goal at X = {x:g} {unit} among {self.evaluations}: {said(self.ruled_out)}"
 
     @property
     def itself(self) -> str:
@@ -308,7 +307,6 @@ def design_for_goal(
     reaches = Reaches(start.goal.x, start.goal.side)
     asked = (start.goal, reaches) if isinstance(start.goal, OrientedBeyond) else (start.goal,)
     goals = tuple(laid_goal(goal, start.goal.laid) for goal in asked)
-    verdict = Query.of(design, goals).prove().verdict if room > 0.0 else "undecided"
     return GoalDesign(
         scene=design,
         before=start,
@@ -317,7 +315,7 @@ def design_for_goal(
         room_before=None if why in (LOST, NO_PART) else room_before,
         lacking_before=why,
         leaving=_leaving(design, start.goal.laid),
-        verdict=verdict,
+        verdict=(Query.of(design, goals).prove().verdict if room > 0.0 else "undecided"),
         ruled_out=dict(search.ruled_out),
         evaluations=search.evaluations,
         seconds=time.perf_counter() - begin,

@@ -263,12 +263,11 @@ class NoDesignError(AnswerError):
     def __init__(
         self, evaluations: int, ruled_out: Mapping[str, int], miss: Scene | None, varied: Iterable[str]
     ) -> None:
-        remedy = "widen the bounds, look at more designs, or ask the goal of another side"
         super().__init__(
             "the design",
             f"none that feeds among {evaluations}",
             "one at least",
-            f"{said(ruled_out)}; {remedy}",
+            f"{said(ruled_out)}; {'widen the bounds, look at more designs, or ask the goal of another side'}",
         )
         self.evaluations, self.ruled_out, self.miss, self.varied = evaluations, ruled_out, miss, tuple(varied)
 

@@ -353,8 +353,7 @@ def continued(search: TrialLog, first: Trial, step: float) -> Solution:
         to = 1.0 if share + step > 1.0 - 1e-9 else share + step
         last, goal = path[-1], first.x + to * (search.wanted - first.x)
         within = REACHED if to == 1.0 else STAGE
-        ahead = last.at + np.linalg.pinv(last.slope) @ (goal - last.x)
-        start = search.unknowns.inside(ahead)
+        start = search.unknowns.inside(last.at + np.linalg.pinv(last.slope) @ (goal - last.x))
         if search.at(start) is None:
             start = last.at
         solution = solved(search, start, goal, MOST_OF_STAGE, within)

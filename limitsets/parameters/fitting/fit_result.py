@@ -157,9 +157,8 @@ class Fit(Tabled):
         own = self.likelihood
         at = self.best.at.copy()
         fixed = [own.names.index(name) for name in values]
-        for k, value in zip(fixed, values.values(), strict=True):
-            at[k] = (value - own.centre[k]) / own.scale[k]
-        free = np.array([k for k in range(at.size) if k not in fixed])
+        at[fixed] = (np.array([*values.values()]) - own.centre[fixed]) / own.scale[fixed]
+        free = np.setdiff1d(np.arange(at.size), fixed)
 
         def function(numbers: Array) -> Array:
             points = np.repeat(at[None], len(numbers), axis=0)

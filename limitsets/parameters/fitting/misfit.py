@@ -303,8 +303,7 @@ def explanation(
         return _Judged(_cost(scene, own.rows, own.known, reading.scale), own)
 
     now = math.inf if start is None else _cost(scene, start.rows, start.known, 1.0)
-    first = sorted(_readings(scene, throws), key=suits)[:FITTED]
-    judged = [(reading, fitted(reading)) for reading in first]
+    judged = [(reading, fitted(reading)) for reading in sorted(_readings(scene, throws), key=suits)[:FITTED]]
     plain, best = min(judged, key=lambda pair: pair[1].cost)
     gained = best.start is not None and now - best.cost > EACH * len(throws)
     if gained and _holds(scene, best):

@@ -161,16 +161,14 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
             )
         names, units = tuple(names[k] for k in keep), units[keep]
         values = np.array([scene.value(name) for name in names])
-    covariance = np.linalg.inv(slopes.T @ slopes / spread**2)
-    errors = np.sqrt(np.diag(covariance))
-    undetermined = _undetermined(scene.with_values(here), rows, names, together, slopes, errors)
+    errors = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes / spread**2)))
     return Start(
         rows=rows,
         names=names,
         values=values,
         errors=errors * units,
         held=held,
-        undetermined=undetermined,
+        undetermined=_undetermined(scene.with_values(here), rows, names, together, slopes, errors),
         spread=spread,
     )
 
@@ -415,8 +413,7 @@ def largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     # landings that agree better than their errors of measurement by chance tell no more than these errors allow
     sizes[: len(start.names)] *= max(1.0, math.sqrt(float(known.mean())) / start.spread)
     own = replace(own, scale=np.append(sizes, [share, left]))
-    at = np.append(np.zeros(len(names)), [1.0, 1.0])
-    best = maximised(own, _best_radius(own, at))
+    best = maximised(own, _best_radius(own, np.append(np.zeros(len(names)), [1.0, 1.0])))
     for _ in range(ROUNDS):
         best_values = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
         again = assigned(own.rows, scene, best_values, start.spread)
@@ -444,8 +441,7 @@ def largest_radius(scene: Scene) -> float:
 
     arms = scene.vertices - np.array(scene.centre)
     shares = np.vstack([arms.T, np.ones(len(arms))])
-    program = linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0])
-    return math.sqrt(max(-float(program.fun), 0.0))
+    return math.sqrt(max(-float(linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0]).fun), 0.0))
 
 
 def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:

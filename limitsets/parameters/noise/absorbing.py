@@ -122,14 +122,13 @@ def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Ints
 
 def _ranges(chain: Transfer, source: Ints, start: Ints, run: Ints) -> Ranges:
     counts = np.bincount(source, minlength=chain.n_cells)
-    bits = (chain.sinks > 0.0) @ (1 << np.arange(chain.sinks.shape[1]))
     return Ranges(
         np.cumulative_sum(counts, include_initial=True),
         one_run(chain.grid.side_of(start), start, run),
         False,
         np.ones(chain.grid.sides, dtype=np.int64),
         np.ones(chain.grid.sides, dtype=np.int64),
-        bits.astype(np.uint8),
+        ((chain.sinks > 0.0) @ (1 << np.arange(chain.sinks.shape[1]))).astype(np.uint8),
     )
 
 
@@ -383,16 +382,12 @@ def absorption(
     for cells in closed:
         open_[cells] = False
     equations = _Equations(chain, open_, strong_components(graph).label)
-    ends: dict[str, Any] = {"goal": np.flatnonzero(goal)}
-    if other is not None:
-        ends["other"] = np.flatnonzero(other & ~goal)
-    ends.update({f"class {number}": cells for number, cells in enumerate(closed)})
-    probability = {}
-    for name, cells in ends.items():
-        mark = chain.marked(cells)
-        probability[name] = np.clip(mark + equations.solve(np.maximum(chain.apply(mark), 0.0)), 0.0, 1.0)
-    for number, name in enumerate(chain.exits):
-        probability[name] = np.clip(equations.solve(chain.sinks[:, number]), 0.0, 1.0)
+    ends: dict[str, Any] = {"goal": goal} | ({} if other is None else {"other": other & ~goal})
+    ends |= {f"class {number}": cells for number, cells in enumerate(closed)}
+    marks = {name: chain.marked(cells) for name, cells in ends.items()}
+    hits = {name: mark + equations.solve(np.maximum(chain.apply(mark), 0.0)) for name, mark in marks.items()}
+    hits |= {name: equations.solve(rates) for name, rates in zip(chain.exits, chain.sinks.T, strict=True)}
+    probability = {name: np.clip(chances, 0.0, 1.0) for name, chances in hits.items()}
     share = probability["goal"]
     steps = equations.solve(np.where(goal, 0.0, share))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -471,12 +466,12 @@ def cells_for_noise(domain: Domain, cells: int) -> Grid:
     plain = grid(domain, cells=cells, grading="uniform")
     if domain.anchor is None:
         return plain
-    sides = []
     graded = grid(domain, cells=max(cells // 2, 1), grading="graded")
-    for (equal,), (towards,) in zip(plain.edges, graded.edges, strict=True):
-        narrower = towards[:-1][np.diff(towards) < equal[1] - equal[0]]
-        sides.append((np.union1d(equal, narrower),))
-    return Grid(domain, tuple(sides))
+    both = zip(plain.edges, graded.edges, strict=True)
+    narrower = (
+        (equal, towards[:-1][np.diff(towards) < equal[1] - equal[0]]) for (equal,), (towards,) in both
+    )
+    return Grid(domain, tuple((np.union1d(*pair),) for pair in narrower))
 
 
 def with_border(grid: Grid, x: float) -> Grid:
@@ -494,8 +489,7 @@ def with_border(grid: Grid, x: float) -> Grid:
     sides = []
     for (edges,) in grid.edges:
         near = np.abs(edges - x).min() <= 1e-9 * (edges[-1] - edges[0])
-        outside = not edges[0] < x < edges[-1]
-        sides.append((edges if near or outside else np.sort(np.append(edges, x)),))
+        sides.append((edges if near or (not edges[0] < x < edges[-1]) else np.sort(np.append(edges, x)),))
     return Grid(grid.domain, tuple(sides))
 
 
@@ -536,10 +530,9 @@ def feeding(chain: Transfer, ends: Absorption, starts: Array) -> Feeding:
         masses[stopped] = 0.0
     share = min(float(starts @ chance), 1.0)
     known = np.where(np.isfinite(ends.mean), ends.mean, 0.0)
-    mean = float(starts @ (known * chance)) / share if share > 0.0 else None
     return Feeding(
         np.array(arrived),
         share,
-        mean,
+        (float(starts @ (known * chance)) / share if share > 0.0 else None),
         {name: float(starts @ chances) for name, chances in ends.probability.items()},
     )

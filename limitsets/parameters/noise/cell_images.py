@@ -146,8 +146,7 @@ def mass_rows(block: BoxcarBlock, edges: Array) -> tuple[Ints, Ints, Array]:
     cell = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count) + first[owner]
     part = np.maximum(np.minimum(hi[owner], cell + 1.0) - np.maximum(lo[owner], cell), 0.0)
     cell = np.minimum(cell, edges.size - 2)
-    mass = block.per_length[owner] * part * np.diff(edges)[cell]
-    return owner + block.first, cell, mass
+    return owner + block.first, cell, (block.per_length[owner] * part * np.diff(edges)[cell])
 
 
 def first_cells(edges: tuple[Array, ...]) -> Ints:

@@ -108,8 +108,7 @@ def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:
     speed, landing = (float(getattr(each, size, 0.0)) for each in (scatter.speed, scatter.landing))
     plain = still_map(scene)
     full = plain if hasattr(plain, "bare") else with_effects(plain, {}, None)
-    spread = Spread(law, speed, landing, float(seed))
-    return full._replace(effects=(*full.effects, spread))
+    return full._replace(effects=(*full.effects, Spread(law, speed, landing, float(seed))))
 
 
 class ManyParts:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -99,8 +99,9 @@ def _ways_out(params: Any, grid: Grid, exits: tuple[int, ...], otherwise: int) -
     met = np.zeros((grid.n_cells, len(exits)))
     for side in range(grid.sides):
         source, _, _, code, _, _ = rows_of_points(lambda _: params, grid, 0.0, 0.0, 1.0, side)
-        for column, value in enumerate(exits):
-            met[:, column] += np.bincount(source[code == value], minlength=grid.n_cells)
+        met += np.stack(
+            [np.bincount(source[code == exit_], minlength=grid.n_cells) for exit_ in exits], axis=1
+        )
     met[met.sum(axis=1) == 0, otherwise] = 1.0
     return np.asarray(met / met.sum(axis=1, keepdims=True))
 
@@ -152,8 +153,7 @@ def _landed(
     cell = grid.index(x, target) - grid.offset[target]
     inside = cell >= 0
     outside = np.where(inside, 0.0, share)
-    owner = np.flatnonzero(inside)
-    return owner, cell[inside], share[inside], outside, np.zeros(share.size)
+    return np.flatnonzero(inside), cell[inside], share[inside], outside, np.zeros(share.size)
 
 
 def landing_stage(
@@ -362,25 +362,23 @@ def transfer(
     >>> found.matrix.toarray()[0], found.sinks[0]
     (array([0.4375, 0.4375, 0.0625, 0.    ]), array([0.0625, 0.    ]))
     """
-    fixed = isinstance(map_of, tuple)
-    at: Callable[[float], Any] = (lambda _: map_of) if fixed else map_of
+    at: Callable[[float], Any] = (lambda _: map_of) if isinstance(map_of, tuple) else map_of
     law = certain(1.0) if parameter is None else parameter
     pieces = law if isinstance(law, Strata) else law.strata(strata)
     params = at(float(pieces.mean[0]))
     kind = kind_of(params)
     if kind.dimension != grid.dimension:
-        allowed = f"{kind.dimension}, the map's"
-        raise AnswerError("the dimension of the grid", grid.dimension, allowed, "cut another domain")
+        raise AnswerError(
+            "the dimension of the grid", grid.dimension, f"{kind.dimension}, the map's", "cut another domain"
+        )
     if landing is not None and kind.dimension != 1:
         raise AnswerError("the noise of x", landing, "none in more than one dimension", "leave it out")
     finer = max(strata, min(LANDING_STRATA, LANDING_BOXCARS // grid.n_cells))
     added = None if landing is None else landing.strata(finer)
     reach = (0.0, 0.0) if added is None else (added.lo, added.hi)
     edges = beyond(grid, reach) if kind.dimension == 1 else ()
-    if uses_pieces(params):
-        throw, sinks, branches = from_pieces(at, grid, pieces, edges, cutter)
-    else:
-        throw, sinks, branches = from_points(at, grid, pieces, edges)
+    first_stage = partial(from_pieces, cutter=cutter) if uses_pieces(params) else from_points
+    throw, sinks, branches = first_stage(at, grid, pieces, edges)
     cut, second = pieces.cut, None
     if added is not None:
         second, late = landing_stage(grid, edges, added, kind.exits)
