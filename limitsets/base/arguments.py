@@ -129,8 +129,7 @@ def _kind_of_many(node: ast.Subscript) -> _Kind | None:
         )
     if outer in ("Sequence", "tuple") and (outer == "Sequence" or ast.unparse(inner[-1]) == "..."):
         one = _kind_of(inner[0])
-        words = "a list" + (f" of {one.words}" if one else "")
-        return _Kind(_all_fit(one), words, one.call if one else "")
+        return _Kind(_all_fit(one), ("a list" + (f" of {one.words}" if one else "")), one.call if one else "")
     if outer == "tuple":
         several = [_kind_of(each) for each in inner]
         return _Kind(

@@ -12,12 +12,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    shown_in_notebooks,
+)
 from limitsets.base.campaign import Row, finished_trials
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table
-from limitsets.base.progress import Progress, shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
 from limitsets.cell.assembly.pairing import Pair, Start, pair_of, require_apart, seats_of
 from limitsets.cell.assembly.trials import Pushed, Question, pass_through, push
 from limitsets.cell.feeding.falling import FATES

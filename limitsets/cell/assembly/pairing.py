@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array
-from limitsets.base.errors import AnswerError
 from limitsets.cell.feeding.falling import ArmEnd, arm_end_of
 from limitsets.feeder.engine.crowd import depth_of_overlap
 from limitsets.feeder.engine.depression import seat_of
@@ -353,8 +353,7 @@ def way_of(scene: Scene, params: Any, start: Start, side: int) -> Way:
     inertia = scene.radius_of_gyration**2 + right**2 + above**2
     # plastic impact: angular momentum about the corner is kept
     rate = (scene.radius_of_gyration**2 + right * (x - kappa * phi) + above * height) / inertia
-    sides = (side - before) % count
-    turned = sum(float(scene.sides.corner[(before + k) % count]) for k in range(sides))
+    turned = sum(float(scene.sides.corner[(before + k) % count]) for k in range((side - before) % count))
     turns, fastest = _turned(turned - phi, rate, (right, above), inertia, kappa)
     return Way(
         scene,

@@ -15,11 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError, Progress, as_table, picked
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.campaign import in_order
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress
 from limitsets.cell.feeding.falling import FATES, ArmEnd
 from limitsets.feeder.engine import Crowd, Rest
 from limitsets.feeder.scattering import Gaussian, Law, Scattering, Uniform

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Ints
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.geometry.polygon import above_side, side_ends
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
 from limitsets.feeder.scattering import starts_from, uniform_starts

@@ -11,11 +11,17 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress, shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    picked,
+    shown_in_notebooks,
+)
 from limitsets.cell.feeding.crowd import BATCHES, CrowdTrials, run_crowd
 from limitsets.cell.feeding.falling import ArmEnd, arm_end_of, clear_beyond, tipping_times
 from limitsets.cell.feeding.paths import Fed, Safe, without_scatter

@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base import as_table, picked
 from limitsets.base.arrays import Mask
-from limitsets.base.files import as_table, picked
 from limitsets.cell.feeding.falling import ArmEnd
 from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
 from limitsets.proofs.prover.attraction import Attraction
@@ -296,8 +296,7 @@ class Paths:
             return self._laid_share(some)
         grid, a = self.attraction.cover.grid, self.attraction.cover.box.bare[0].a
         before = sum(float(edges[0] - a[side]) for side, (edges,) in enumerate(grid.edges) if near[side])
-        inside = float(grid.measure[some & self.starts].sum())
-        return (inside + before) / float((self.end.x - a).sum())
+        return (float(grid.measure[some & self.starts].sum()) + before) / float((self.end.x - a).sum())
 
     def _laid_share(self, some: Mask) -> float:
         """Share of the ranges where parts are laid down that lies in some cells; 1.0 where all of it does."""

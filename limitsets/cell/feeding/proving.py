@@ -17,8 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.progress import Progress, silent
+from limitsets.base import AnswerError, Progress, silent
 from limitsets.cell.feeding.falling import ArmEnd
 from limitsets.cell.feeding.paths import MOST_SIDES, Fed, Paths, Safe, verdict_of_share
 from limitsets.feeder.goals import OrientedBeyond

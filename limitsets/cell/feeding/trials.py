@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import Progress, as_table, silent
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.files import as_table
-from limitsets.base.progress import Progress, silent
 from limitsets.cell.feeding.falling import FATES, ArmEnd
 from limitsets.feeder.scattering import Scattering, still_map
 from limitsets.parameters.noise.sampling import ManyParts, binomial_interval, scattering_map

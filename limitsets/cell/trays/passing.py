@@ -13,11 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError, Progress, as_table
 from limitsets.base.arrays import Array, Ints
 from limitsets.base.campaign import in_order
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table
-from limitsets.base.progress import Progress
 from limitsets.feeder.engine.depression import EMPTY, UNFINISHED, Motion, Plate, Pose, Rest, fall_speed
 from limitsets.feeder.engine.member import Mark, Recording
 from limitsets.feeder.scene import Scene, Tray

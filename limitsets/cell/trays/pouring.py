@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError, as_table, picked
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.campaign import Row
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
 from limitsets.cell.trays.passing import Passes, random_of
 from limitsets.feeder.engine import Crowd, Recording
 from limitsets.feeder.engine.depression import EMPTY, FAR, Motion, Pose, state_of

@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from limitsets.base import AnswerError, as_table, picked
 from limitsets.base.arrays import Array
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.numbers import Numbers
 from limitsets.feeder.scene.quantities import base_unit

@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.files import as_json, as_table, picked
-from limitsets.base.progress import Progress, one_by_one
-from limitsets.base.tables import Column, Table, Tabled, joined
+from limitsets.base import Column, Progress, Table, Tabled, as_json, as_table, joined, one_by_one, picked
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scene import Scene, dump
 from limitsets.feeder.scene.left_out import Model

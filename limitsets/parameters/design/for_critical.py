@@ -8,11 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress, one_by_one, shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    one_by_one,
+    picked,
+    shown_in_notebooks,
+)
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
 from limitsets.feeder.scene.quantities import text_at, texts

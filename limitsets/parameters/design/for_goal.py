@@ -18,10 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress, silent
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import AnswerError, Column, Progress, Table, Tabled, as_table, picked, silent
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
 from limitsets.feeder.scattering import uniform_starts
 from limitsets.feeder.scene import Scene, load

@@ -18,10 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import AnswerError, Progress, arguments_checked, shown_in_notebooks, silent
 from limitsets.base.arrays import Array
-from limitsets.base.errors import AnswerError
-from limitsets.base.progress import Progress, shown_in_notebooks, silent
 from limitsets.feeder.geometry import triangle
 from limitsets.feeder.goals import Goal, Laid, OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene, load

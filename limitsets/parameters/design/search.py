@@ -17,9 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from limitsets.base import AnswerError, Progress, SceneError
 from limitsets.base.arrays import Array
-from limitsets.base.errors import AnswerError, SceneError
-from limitsets.base.progress import Progress
 from limitsets.feeder.geometry import plate_with_points, side_ends
 from limitsets.feeder.geometry.polygon import above_side
 from limitsets.feeder.scene import Scene

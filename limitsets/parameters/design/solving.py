@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from limitsets.base import AnswerError, LimitsetsError, Progress, silent
 from limitsets.base.arrays import Array, Mask
-from limitsets.base.errors import AnswerError, LimitsetsError
-from limitsets.base.progress import Progress, silent
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import find, in_units
 from limitsets.parameters.design.derivatives import (
@@ -433,14 +432,13 @@ def _minimised(model: _Model, start: Trial, cost: Any, slope: Any, more: list[di
     from scipy.optimize import minimize
 
     unknowns = model.search.unknowns
-    rests = {"type": "ineq", "fun": model.slack, "jac": model.slack_slope}
     minimize(
         cost,
         start.at,
         jac=slope,
         method="SLSQP",
         bounds=list(zip(unknowns.lo, unknowns.hi, strict=True)),
-        constraints=[rests, *more],
+        constraints=[{"type": "ineq", "fun": model.slack, "jac": model.slack_slope}, *more],
         options={"maxiter": MOST_NEAREST, "ftol": 1e-14},
     )
 

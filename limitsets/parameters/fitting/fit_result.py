@@ -9,11 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError, Column, Progress, Table, Tabled, as_table, picked
 from limitsets.base.arrays import Array
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress
-from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.scene import in_unit_of, in_units_of, unit_of

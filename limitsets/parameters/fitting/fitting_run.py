@@ -10,10 +10,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import (
+    AnswerError,
+    DataError,
+    Progress,
+    arguments_checked,
+    one_by_one,
+    shown_in_notebooks,
+    silent,
+)
 from limitsets.base.arrays import Array
-from limitsets.base.errors import AnswerError, DataError
-from limitsets.base.progress import Progress, one_by_one, shown_in_notebooks, silent
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.feeder.scene.quantities import base_unit, find
@@ -358,8 +364,7 @@ def bootstrap(found: Fit, count: int = 200, *, seed: int = 0, progress: Progress
             corner=corner,
             seed=seed + number,
         )
-        again = fit(scene, replace(film, row=rows.throws.row))
-        for each in again.quantities:
+        for each in fit(scene, replace(film, row=rows.throws.row)).quantities:
             if each.name in covered:
                 covered[each.name] += each.lo <= truth[each.name] <= each.hi
     return Bootstrap(count, covered)

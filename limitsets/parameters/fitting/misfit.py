@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from limitsets.base import DataError
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.errors import DataError
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.units import UNITS, exact_factor
 from limitsets.parameters.fitting.likelihood import MISREAD, Rows, as_recorded, assigned, whitened
@@ -413,10 +413,9 @@ def _closest(
 
     numbers = np.sort(np.append(grid, 0.0))
     k = int(np.argmin([suits(make(each)) for each in numbers]))
-    ends = numbers[max(k - 1, 0)], numbers[min(k + 1, numbers.size - 1)]
     best = minimize_scalar(
         lambda number: min(fitted(make(number)).cost, WORST),
-        bounds=ends,
+        bounds=(numbers[max(k - 1, 0)], numbers[min(k + 1, numbers.size - 1)]),
         method="bounded",
         options={"maxiter": STEPS},
     )

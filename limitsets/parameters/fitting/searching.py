@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from limitsets.base import DataError
 from limitsets.base.arrays import Array, Ints
-from limitsets.base.errors import DataError
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.fitting.likelihood import SCATTERS, Likelihood, Rows, assigned
 
@@ -72,8 +72,7 @@ class Start(NamedTuple):
 def quantities_of(scene: Scene) -> tuple[str, ...]:
     """Name what landings depend on: the speed, or kappa without gravity, and what the scene is written in."""
     thrown = "throw.kappa" if scene.gravity is None else "throw.speed"
-    centre = "center" in scene.text["part"]["mass"]
-    return (thrown, *(QUANTITIES if centre else QUANTITIES[2:]))
+    return (thrown, *(QUANTITIES if ("center" in scene.text["part"]["mass"]) else QUANTITIES[2:]))
 
 
 def units_of_change(scene: Scene, names: tuple[str, ...]) -> Array:
@@ -451,8 +450,7 @@ def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
         return abs(float(best.at[k])) if way < 0 else 1e4
     if own.names[k] == RADIUS:
         scene = own.scene.with_values(dict(zip(own.names[:k], values.tolist(), strict=False)))
-        room = values[k] if way < 0 else max(largest_radius(scene) - values[k], 0.0)
-        return float(room / own.scale[k])
+        return float((values[k] if way < 0 else max(largest_radius(scene) - values[k], 0.0)) / own.scale[k])
     return 1e4
 
 

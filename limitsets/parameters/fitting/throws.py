@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from limitsets.base import DataError, SceneError, shown
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.errors import DataError, SceneError, shown
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.units import UNITS, convert, parse
 

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base import GridError, as_table, picked
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.errors import GridError
-from limitsets.base.files import as_table, picked
 from limitsets.parameters.noise.cell_images import BoxcarOperator, cells_met
 from limitsets.parameters.noise.ulam import SubOperator, Transfer
 from limitsets.systems.cells import CellSet, Domain, Grid, grid
@@ -121,9 +120,8 @@ def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Ints
 
 
 def _ranges(chain: Transfer, source: Ints, start: Ints, run: Ints) -> Ranges:
-    counts = np.bincount(source, minlength=chain.n_cells)
     return Ranges(
-        np.cumulative_sum(counts, include_initial=True),
+        np.cumulative_sum(np.bincount(source, minlength=chain.n_cells), include_initial=True),
         one_run(chain.grid.side_of(start), start, run),
         False,
         np.ones(chain.grid.sides, dtype=np.int64),
@@ -466,8 +464,7 @@ def cells_for_noise(domain: Domain, cells: int) -> Grid:
     plain = grid(domain, cells=cells, grading="uniform")
     if domain.anchor is None:
         return plain
-    graded = grid(domain, cells=max(cells // 2, 1), grading="graded")
-    both = zip(plain.edges, graded.edges, strict=True)
+    both = zip(plain.edges, grid(domain, cells=max(cells // 2, 1), grading="graded").edges, strict=True)
     narrower = (
         (equal, towards[:-1][np.diff(towards) < equal[1] - equal[0]]) for (equal,), (towards,) in both
     )

@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.scattering import Gaussian, Scattering, Uniform, still_map, uniform_starts
 from limitsets.feeder.scene import Scene
 from limitsets.systems.maps import advance, kind_of

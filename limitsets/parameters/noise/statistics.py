@@ -10,12 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    how_found,
+    picked,
+    shown_in_notebooks,
+    silent,
+)
 from limitsets.base.arrays import Array, Mask
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress, shown_in_notebooks, silent
-from limitsets.base.tables import Column, Table, Tabled, how_found
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scattering import (
     Scattering,

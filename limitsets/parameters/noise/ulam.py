@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Ints
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.scattering import Law, Strata, certain
 from limitsets.parameters.noise.cell_images import (
     BoxcarBlock,
