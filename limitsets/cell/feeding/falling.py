@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,14 +20,11 @@ from limitsets.base.arrays import Array, Ints
 from limitsets.feeder.geometry.polygon import above_side, side_ends
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
 from limitsets.feeder.scattering import starts_from, uniform_starts
+from limitsets.feeder.scene import Cavity, Scene
 from limitsets.feeder.scene.laid import LaidLike, read_laid
 from limitsets.feeder.scene.scene import require_rests
 from limitsets.feeder.thrower import fly
 from limitsets.systems.maps import codes, images
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Cavity, Scene
-
 
 # ----------------------------------------------------------------
 # How long a part takes to tip over the end of the arm, until its side lies flush on the ramp.

@@ -66,14 +66,9 @@ class Passes:
         flush = (f"side {i}" for i in range(count))
         return "empty", *flush, *(f"leaning, vertex {k} lowest" for k in range(count))
 
-    @property
-    def kick_speed(self) -> float:
-        """Standard deviation of a kick's velocity [length per unit of time]."""
-        return fall_speed(self.plate.size, self.tray.agitation)
-
     def kick(self, random: np.random.Generator) -> Motion:
         """Draw what a kick of the plate does to a part at rest."""
-        up, turning = random.normal(0.0, self.kick_speed, 2).tolist()
+        up, turning = random.normal(0.0, fall_speed(self.plate.size, self.tray.agitation), 2).tolist()
         along = random.uniform(0.0, fall_speed(self.plate.size, self.tray.wash))
         return Motion(along, abs(up), turning / self.plate.size)
 

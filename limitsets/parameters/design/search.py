@@ -379,12 +379,12 @@ class DesignSearch:
         if estimated_margin is None or not estimated_margin.margin > 0.0:
             self.ruled_out[LOST if estimated_margin is None else OTHER_SIDE] += 1
             return (-10.0 if estimated_margin is None else estimated_margin.margin - self.strict), None
-        lacking = self.broken(scene, estimated_margin)
-        if lacking < 0.0:
-            self.ruled_out[
-                LEAVES if validity_slack(scene, estimated_margin.invariant) >= 0.0 else ASSUMPTION
-            ] += 1
-            return max(lacking, -1.0) if self.strict else lacking, None
+        valid = validity_slack(scene, estimated_margin.invariant)
+        stays = least_slack(scene.bare_map) / scene.arm_length if self.everywhere else valid
+        broken = max(min(valid, stays), -9.0)
+        if broken < 0.0:
+            self.ruled_out[LEAVES if valid >= 0.0 else ASSUMPTION] += 1
+            return max(broken, -1.0) if self.strict else broken, None
         return estimated_margin.margin, estimated_margin
 
     def lacking(self, scene: Scene) -> float:
@@ -394,13 +394,6 @@ class DesignSearch:
         weight = counterweight_of(scene)
         lacking = max(weight.share - MOST_LEAD, -weight.inside / float(scene.sides.length.mean()))
         return 0.0 if lacking <= 0.0 else -20.0 - min(9.0, lacking)
-
-    def broken(self, scene: Scene, estimate: Estimate) -> float:
-        """Rate a design outside of the model, or one that loses parts: below 0; 0 or above for any other."""
-        spare = validity_slack(scene, estimate.invariant)
-        if self.everywhere:
-            spare = min(spare, least_slack(scene.bare_map) / scene.arm_length)
-        return max(spare, -9.0)
 
     def drawn(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
         """Draw designs evenly, and rate them."""

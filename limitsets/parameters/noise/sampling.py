@@ -215,12 +215,11 @@ def _long_run(
         far = (many.x >= goal[0]) & alive
         beyond += far
         wrong += far & (many.side != goal[1])
-        for k in range(sides):
-            here = (many.side == k) & alive
-            on_side[k] += here
-            histograms[k] += np.histogram(many.x[here], borders[k])[0]
-        for k in range(len(names)):
-            by_branch[k] += (code == k) & alive
+        here = (many.side == np.arange(sides)[:, None]) & alive
+        on_side += here
+        by_branch += (code == np.arange(len(names))[:, None]) & alive
+        for histogram, on_it, edges in zip(histograms, here, borders, strict=True):
+            histogram += np.histogram(many.x[on_it], edges)[0]
         if progress is not None:
             progress(done + 1, rounds)
     total = on_side.sum(axis=0)
