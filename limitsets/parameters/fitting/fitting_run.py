@@ -28,7 +28,6 @@ from limitsets.parameters.fitting.likelihood import (
     SCATTERS,
     SHARPEST,
     Likelihood,
-    Question,
     Rows,
     as_recorded,
     further_throws,
@@ -199,7 +198,8 @@ def _answer(
     error = own.rows.error
     if not own.rows.known:  # the gain of further throws is then computed with all scatter as one
         error = np.full(len(error), landing.value / math.sqrt(2.0))
-    asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value), throws.corner)
+    units = dict(zip(names, units_of_change(new, names).tolist(), strict=True))
+    scatter = (speed.value, landing.value)
     misread, misread_rate = _misread(own.rows, len(scene.sides))
     return Fit(
         scene=new,
@@ -217,7 +217,7 @@ def _answer(
         explained=remark,
         residuals=throws.x_after - told.after[0],
         deviations=np.sqrt(told.variance(own.rows.error, values[-2], loose)[0]),
-        further=further_throws(asked, throws.x_before, own.rows.side, error),
+        further=further_throws(throws, own.rows.side, error, scene=new, units=units, scatter=scatter),
         seconds=time.perf_counter() - begin,
         likelihood=own,
         best=best,

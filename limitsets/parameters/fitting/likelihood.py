@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -366,27 +367,26 @@ class Further:
     shrinks: dict[str, float]
 
 
-class Question(NamedTuple):
-    """Quantities of a scene that are to be known, the units of their change, the scatter of speed and place.
+def information(
+    x: Array,
+    side: Ints,
+    error: Array,
+    *,
+    scene: Scene,
+    units: Mapping[str, float],
+    scatter: tuple[float, float],
+    corner: bool,
+) -> Array:
+    """Return the information of single throws about quantities in their units of change; shape (n, p, p).
 
-    With `corner` places are those of the left corner, else of the centre of mass.
+    `scatter` is that of speed and place; with `corner` places are those of the left corner, else of the centre of mass.
     """
-
-    scene: Scene
-    names: tuple[str, ...]
-    units: Array
-    scatter: tuple[float, float]
-    corner: bool
-
-
-def information(asked: Question, x: Array, side: Ints, error: Array) -> Array:
-    """Return the information of single throws about quantities in their units of change; shape (n, p, p)."""
     from scipy.stats import norm
 
-    scene, names, units, scatter, corner = asked
-    centre = np.array([scene.value(name) for name in names])
-    moves = np.concatenate([np.zeros((1, len(names))), np.diag(units), -np.diag(units)]) * STEP_OF_GAIN
-    points = dict(zip(names, (centre + moves).T, strict=True))
+    centre, p = np.array([scene.value(name) for name in units]), len(units)
+    unit = np.diag([*units.values()])
+    moves = np.concatenate([np.zeros((1, p)), unit, -unit]) * STEP_OF_GAIN
+    points = dict(zip(units, (centre + moves).T, strict=True))
     jog, flip = (
         predicted(scene, points, x, side, np.full(side.size, b, np.int64), corner=corner) for b in (0, 1)
     )
@@ -394,7 +394,6 @@ def information(asked: Question, x: Array, side: Ints, error: Array) -> Array:
     size = np.sqrt((jog.decides_slope * error) ** 2 + (jog.decides_per_log_speed * speed) ** 2)[0]
     z = jog.decides / np.maximum(size, 1e-9)
     flips = norm.cdf(z[0])
-    p = len(names)
     total = np.zeros((side.size, p, p))
     for told, share in ((jog, 1.0 - flips), (flip, flips)):
         slope = ((told.after[1 : p + 1] - told.after[p + 1 :]) / (2.0 * STEP_OF_GAIN)).T
@@ -409,20 +408,27 @@ def information(asked: Question, x: Array, side: Ints, error: Array) -> Array:
     return np.where(np.isfinite(total), total, 0.0)
 
 
-def further_throws(asked: Question, x: Array, side: Ints, error: Array) -> tuple[Further, ...]:
+def further_throws(
+    filmed: Throws,
+    side: Ints,
+    error: Array,
+    *,
+    scene: Scene,
+    units: Mapping[str, float],
+    scatter: tuple[float, float],
+) -> tuple[Further, ...]:
     """Find the start on each side from which a throw tells most beside those filmed; the most telling first."""
-    scene, names = asked.scene, asked.names
-    known = information(asked, x, side, error).sum(axis=0)
-    known += np.eye(len(names)) / BEFORE**2
+    told_by = partial(information, scene=scene, units=units, scatter=scatter, corner=filmed.corner)
+    known = told_by(filmed.x_before, side, error).sum(axis=0) + np.eye(len(units)) / BEFORE**2
     further = []
-    size = float(np.mean(error)) if np.mean(error) > 0 else asked.scatter[1]
+    size = float(np.mean(error)) if np.mean(error) > 0 else scatter[1]
     for own in range(len(scene.sides)):
         near, far = scene.sides.a[own], scene.arm_length
-        places = np.linspace(near + 0.02 * (far - near), far, PLACES) - (near if asked.corner else 0.0)
-        there = information(asked, places, np.full(PLACES, own), np.full(PLACES, size))
+        places = np.linspace(near + 0.02 * (far - near), far, PLACES) - (near if filmed.corner else 0.0)
+        there = told_by(places, np.full(PLACES, own), np.full(PLACES, size))
         gains = np.linalg.slogdet(known + there)[1] - np.linalg.slogdet(known)[1]
         best = int(np.argmax(gains))
         ratio = np.diag(np.linalg.inv(known)) / np.diag(np.linalg.inv(known + MORE * there[best]))
-        shrinks = {name: float(np.sqrt(each)) for name, each in zip(names, ratio, strict=True)}
+        shrinks = {name: float(np.sqrt(each)) for name, each in zip(units, ratio, strict=True)}
         further.append(Further(float(places[best]), own, 0.5 * float(gains[best]), shrinks))
     return tuple(sorted(further, key=lambda each: -each.gain))
