@@ -402,8 +402,20 @@ def drive(
                     lost(number)
             for future in wait(flight, timeout=_SECONDS, return_when=FIRST_COMPLETED).done:
                 number = flight.pop(future)
-                if not _kept(work, store, future, number, pace):
+                try:
+                    answer = future.result()
+                except BrokenExecutor:
                     lost(number)
+                    continue
+                except LimitsetsError:
+                    raise
+                except Exception as error:
+                    raise LimitsetsError(
+                        work.task, f"{type(error).__name__}: {error}", "a task that answers",
+                        f"it failed in the chunk at {work.place(number)}",
+                    ) from error  # fmt: skip
+                store.write(answer)
+                pace.points += work.size(number)
     except BaseException as error:
         for future in flight:
             future.cancel()
@@ -412,24 +424,6 @@ def drive(
         if isinstance(error, KeyboardInterrupt) and store.path is not None:
             error.add_note(GOES_ON)
         raise
-
-
-def _kept(work: Work, store: Kept, future: Future[Any], number: int, pace: _Pace) -> bool:
-    """Write the answers of a chunk; False where the worker died."""
-    try:
-        answer = future.result()
-    except BrokenExecutor:
-        return False
-    except LimitsetsError:
-        raise
-    except Exception as error:
-        raise LimitsetsError(
-            work.task, f"{type(error).__name__}: {error}", "a task that answers",
-            f"it failed in the chunk at {work.place(number)}",
-        ) from error  # fmt: skip
-    store.write(answer)
-    pace.points += work.size(number)
-    return True
 
 
 # ----------------------------------------------------------------

@@ -317,14 +317,10 @@ class TrayFill(Tabled):
         filled, counts = self.filled, self.counts
         numbers = [0, *counts.met]
         came = counts.captured[numbers] / max(int(counts.captured.sum()), 1)
-        rows = []
-        for k, (number, name) in enumerate(zip(numbers, filled.states, strict=True)):
-            kept = counts.kicked[number]
-            stays = float(kept[number] / kept.sum()) if number else None
-            word = f"{name}: right" if k == filled.number else name
-            rows.append(
-                (word, float(came[k]), stays, float(filled.last[k]), filled.last_interval[k].tolist())
-            )
+        names = (f"{name}: right" if k == filled.number else name for k, name in enumerate(filled.states))
+        stays = (counts.kicked[k][k] / counts.kicked[k].sum() for k in numbers[1:])
+        values = (came.tolist(), [None, *stays], filled.last.tolist(), filled.last_interval.tolist())
+        rows = list(zip(names, *values, strict=True))
         columns = (
             "a depression",
             Column("after a part came by", show=".4f"),
