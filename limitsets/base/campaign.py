@@ -463,9 +463,7 @@ class TrialFile:
     def __init__(self, path: Path | None, question: dict[str, Any], trials: int, chunk: int) -> None:
         self.path, self.trials, self.chunk = path, trials, chunk
         self.question = as_plain({"limitsets": code_digest(), **question})
-        self.rows: dict[int, Row] = {}
-        if path is not None and path.exists():
-            self.rows = _read(path, self.question)
+        self.rows = _read(path, self.question) if path is not None and path.exists() else {}
 
     @property
     def chunks(self) -> int:

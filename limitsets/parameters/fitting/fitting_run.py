@@ -195,9 +195,8 @@ def _answer(
     told = own.told(values[None])
     loose = math.hypot(values[-1], SHARPEST * scene.arm_length)
     names, throws = tuple(each.name for each in fitted), own.rows.throws
-    error = own.rows.error
-    if not own.rows.known:  # the gain of further throws is then computed with all scatter as one
-        error = np.full(len(error), landing.value / math.sqrt(2.0))
+    # where no error is known the gain of further throws is computed with all scatter as one
+    error = own.rows.error if own.rows.known else np.full(len(throws), landing.value / math.sqrt(2.0))
     units = dict(zip(names, units_of_change(new, names).tolist(), strict=True))
     scatter = (speed.value, landing.value)
     misread, misread_rate = _misread(own.rows, len(scene.sides))

@@ -298,9 +298,8 @@ def _heard(synthesis: Synthesis, x: Array, side: Ints, random: np.random.Generat
 def _thrown(box: Any, x: Array, side: Ints, random: np.random.Generator) -> tuple[Array, Ints, Ints]:
     """Throw parts, each with a kappa of the box; where they come to rest, and the codes."""
     low, high = box.bare[0].kappa, box.bare[1].kappa
-    kappas: Sequence[float] = [box.middle_kappa]
-    if box.kappa_varies:
-        kappas = [low, high, *random.uniform(low, high, KAPPAS - 2).tolist()]
+    between = random.uniform(low, high, KAPPAS - 2).tolist() if box.kappa_varies else []
+    kappas: Sequence[float] = [low, high, *between] if between else [box.middle_kappa]
     drawn = random.integers(len(kappas), size=x.size)
     after, to, code = x.copy(), side.copy(), np.zeros(x.size, np.int64)
     for k, kappa in enumerate(kappas):
