@@ -47,7 +47,6 @@ from limitsets.parameters.fitting.searching import (
     units_of_change,
 )
 from limitsets.parameters.fitting.throws import Throws, length_of, read_throws, throws_in
-from limitsets.parameters.noise.sampling import binomial_interval
 from limitsets.systems.maps.pieces import at_points
 
 # Differences of readings of one place from which an error of measurement is taken.
@@ -228,6 +227,8 @@ def _misread(
     rows: Rows, sides: int
 ) -> tuple[tuple[tuple[int, str, int, int], ...], tuple[float, float, float]]:
     """Name misrecorded sides, and give their share with its exact interval (Clopper and Pearson)."""
+    from scipy.stats import beta
+
     throws, after = rows.throws, rows.side_after(sides)
     readings = (
         ("side_before", throws.side_before, rows.side, rows.misread_before()),
@@ -239,7 +240,9 @@ def _misread(
         for k in np.flatnonzero(misread)
     ]
     wrong, count = rows.misread(sides)
-    return tuple(sorted(lines)), (wrong / count, *binomial_interval(wrong, count, LEVEL))
+    tail = 0.5 * (1.0 - LEVEL)
+    lo = float(beta.ppf(tail, wrong, count - wrong + 1)) if wrong else 0.0
+    return tuple(sorted(lines)), (wrong / count, lo, float(beta.ppf(1.0 - tail, wrong + 1, count - wrong)))
 
 
 # ----------------------------------------------------------------
