@@ -55,22 +55,16 @@ class _Kind(NamedTuple):
     call: str = ""
 
 
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, numbers.Integral) and not isinstance(value, bool)
-
-
 def _is_number(value: Any) -> bool:
     return isinstance(value, numbers.Real) and not isinstance(value, bool) and not math.isnan(value)
 
 
-def _is_yes_or_no(value: Any) -> bool:
-    return isinstance(value, bool) or type(value).__name__ == "bool"  # numpy's is no bool of Python
-
-
 _PLAIN = {
-    "int": _Kind(_is_whole, "a whole number"),
+    "int": _Kind(
+        lambda value: isinstance(value, numbers.Integral) and not isinstance(value, bool), "a whole number"
+    ),
     "float": _Kind(_is_number, "a number"),
-    "bool": _Kind(_is_yes_or_no, "True or False"),
+    "bool": _Kind(lambda value: type(value).__name__ == "bool", "True or False"),  # Python's, or numpy's
     "str": _Kind(lambda value: isinstance(value, str), "text"),
     "Path": _Kind(lambda value: isinstance(value, str | os.PathLike), "a path"),
     "None": _Kind(lambda value: value is None, "None"),
@@ -129,8 +123,7 @@ def _kind_of_many(node: ast.Subscript) -> _Kind | None:
         )
     if outer in ("Sequence", "tuple") and (outer == "Sequence" or ast.unparse(inner[-1]) == "..."):
         one = _kind_of(inner[0])
-        words = "a list" + (f" of {one.words}" if one else "")
-        return _Kind(_all_fit(one), words, one.call if one else "")
+        return _Kind(_all_fit(one), ("a list" + (f" of {one.words}" if one else "")), one.call if one else "")
     if outer == "tuple":
         several = [_kind_of(each) for each in inner]
         return _Kind(

@@ -14,60 +14,32 @@ import threading
 import time
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeVar
 
 from limitsets.base.errors import AnswerError, LimitsetsError
-from limitsets.base.files import as_json, as_plain, locked, replaced
-from limitsets.base.progress import GOES_ON
+from limitsets.base.files import as_json, as_plain, code_digest, locked, replaced
+from limitsets.base.progress import GOES_ON, Progress, one_by_one
+
+R = TypeVar("R")
 
 # ----------------------------------------------------------------
 # Where chunks are computed: processes on this machine, a Dask cluster, or an executor that the caller gives.
 
 
-# Chunks that wait beside those that are computed: enough that no worker ever waits for the driver.
-_WAITING = 2
+# Chunks that wait beside those that are computed: enough that no worker ever waits for the driver; and chunks that an
+# executor is given at once whose workers nobody has counted.
+_WAITING, _GIVEN = 2, 32
 
 
 def present_cores() -> int:
     """Count the cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-class Given:
-    """An executor that somebody else starts and ends.
-
-    Parameters
-    ----------
-    executor : concurrent.futures.Executor
-        It computes the chunks.
-    window : int
-        How many chunks it is given at once.
-    """
-
-    def __init__(self, executor: Executor, window: int = 32) -> None:
-        self.executor, self.window = executor, window
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Begin to compute something."""
-        return self.executor.submit(function, *arguments)
-
-    def restart(self) -> None:
-        """Refuse to go on with an executor that broke: it is not ours to start again."""
-        raise LimitsetsError(
-            "the executor", "broken: one of its workers died", "one whose workers live",
-            "start a new one; the same call goes on with what is left",
-        )  # fmt: skip
-
-    def end(self) -> None:
-        """Leave it as it is."""
-
-    abandon = end
 
 
 class Here(Executor):
@@ -108,7 +80,6 @@ class Processes(Executor):
 
     def __init__(self, workers: int) -> None:
         self._max_workers = workers  # under the name that pools of the standard library have for it
-        self.window = _WAITING * workers
         self._tasks: queue.SimpleQueue[tuple[Future[Any], tuple[Any, ...]] | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._running: set[Any] = set()
@@ -129,9 +100,6 @@ class Processes(Executor):
             self._threads[-1].start()
         return future
 
-    def restart(self) -> None:
-        """Do nothing: in place of a process that died another one is started when there is work for it."""
-
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes when they have done what they were given; what has not begun can be cancelled."""
         if cancel_futures:
@@ -143,9 +111,7 @@ class Processes(Executor):
         for thread in self._threads if wait else ():
             thread.join()
 
-    def end(self) -> None:
-        """End the processes, which have nothing left to do."""
-        self.shutdown()
+    end = shutdown
 
     def abandon(self) -> None:
         """End the processes at once, whatever they do."""
@@ -171,11 +137,9 @@ class Processes(Executor):
             except (EOFError, OSError):
                 self._ended(process, pipe)
                 process = pipe = None
-                allowed, remedy = (
-                    "one that lives until it answers",
-                    "give it more memory, or ask for fewer workers",
-                )
-                future.set_exception(WorkerDiedError("a worker process", "dead", allowed, remedy))
+                remedy = "give it more memory, or ask for fewer workers"
+                died = WorkerDiedError("a worker process", "dead", "one that lives until it answers", remedy)
+                future.set_exception(died)
             except Exception as error:  # noqa: BLE001 - what cannot be sent: whoever asks for the result gets it
                 future.set_exception(error)
             else:
@@ -244,8 +208,8 @@ def _listen(pipe: Any, calls: queue.SimpleQueue[bytes]) -> None:
 
 
 @contextmanager
-def on_cluster(address: str) -> Iterator[Given]:
-    """Use a Dask cluster, by the address of its scheduler."""
+def on_cluster(address: str) -> Iterator[tuple[Executor, int]]:
+    """Use a Dask cluster, by the address of its scheduler: its executor, and how many chunks it is given at once."""
     distributed = imported("distributed")
     try:
         client = distributed.Client(address, timeout=10, set_as_default=False)
@@ -254,15 +218,14 @@ def on_cluster(address: str) -> Iterator[Given]:
             "the cluster", address, "the address of a Dask scheduler, like tcp://10.0.0.1:8786", f"{error}"
         ) from None
     with client:
-        threads = sum(client.nthreads().values())
-        yield Given(client.get_executor(pure=False), _WAITING * max(threads, 1))
+        yield client.get_executor(pure=False), _WAITING * max(sum(client.nthreads().values()), 1)
 
 
 @contextmanager
 def chosen_pool(
     chunks: int, executor: Executor | None, cluster: str | None, workers: int | None
-) -> Iterator[Given | Processes]:
-    """Choose where so many chunks are computed.
+) -> Iterator[tuple[Executor, int]]:
+    """Choose where so many chunks are computed: an executor, and how many it is given at once.
 
     Raises
     ------
@@ -274,14 +237,28 @@ def chosen_pool(
     if workers is not None and workers < 1:
         raise LimitsetsError("the number of workers", workers, "1 or more", "correct it")
     if executor is not None:
-        yield Given(executor)
+        yield executor, _GIVEN
     elif cluster is not None:
         with on_cluster(cluster) as pool:
             yield pool
     elif chunks == 1 and workers is None:  # to start a process takes longer than most single chunks
-        yield Given(Here(), 1)
+        yield Here(), 1
     else:
-        yield Processes(min(workers or present_cores(), chunks))
+        count = min(workers or present_cores(), chunks)
+        with Processes(count) as processes:
+            yield processes, _WAITING * count
+
+
+def in_order(
+    step: str,
+    task: Callable[[Any], R],
+    things: Sequence[Any],
+    executor: Executor | None,
+    progress: Progress | None,
+) -> list[R]:
+    """Run a task on things, here or by an executor: the answers in their order, the same wherever it runs."""
+    answers = map(task, things) if executor is None else executor.map(task, things)
+    return list(one_by_one(step, answers, len(things), progress))
 
 
 def imported(module: str) -> Any:
@@ -300,8 +277,6 @@ def imported(module: str) -> Any:
 # ----------------------------------------------------------------
 # The driver: hands chunks out in a bounded window, writes what comes back, and starts workers again that died.
 
-
-Progress: TypeAlias = Callable[[str, int, int], None]
 
 # How often a chunk may kill the worker that computes it, alone.
 _MOST_DEATHS = 3
@@ -363,10 +338,8 @@ class _Pace:
 
     def tell(self) -> None:
         """Say it."""
-        if self.progress is None:
-            return
         done, of = len(self.store.done), self.work.chunks
-        if done == of:
+        if self.progress is None or done == of:
             return
         seconds = time.monotonic() - self.began
         words = f"{self.work.name} (a first run compiles: up to two minutes)"
@@ -384,10 +357,13 @@ def _in_words(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
-def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress | None = None) -> None:
-    """Compute the chunks that a store does not hold yet.
+def drive(
+    work: Work, store: Kept, pool: Executor, window: int = _GIVEN, progress: Progress | None = None
+) -> None:
+    """Compute the chunks that a store does not hold yet, of which the pool is given so many at once.
 
-    A chunk whose worker died is computed again alone, so that nothing else can have ended its worker.
+    A chunk whose worker died is computed again alone, so that nothing else can have ended its worker: in its place
+    another process is started when there is work for it.  An executor that somebody else started is not started again.
 
     Raises
     ------
@@ -407,14 +383,18 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
                 "a worker", f"killed {_MOST_DEATHS} times by one chunk", "a chunk that a worker survives",
                 f"it is the one at {work.place(number)}; look at its memory and at the task there",
             )  # fmt: skip
+        if not isinstance(pool, Processes):
+            raise LimitsetsError(
+                "the executor", "broken: one of its workers died", "one whose workers live",
+                "start a new one; the same call goes on with what is left",
+            )  # fmt: skip
         again.append(number)
-        pool.restart()
 
     try:
         while todo or again or flight:
             pace.tell()
             alone = again or any(k in deaths for k in flight.values())
-            while (todo or again) and len(flight) < (1 if alone else pool.window):
+            while (todo or again) and len(flight) < (1 if alone else window):
                 number = (again or todo).popleft()
                 try:
                     flight[pool.submit(work.function, *work.given, number)] = number
@@ -422,34 +402,28 @@ def drive(work: Work, store: Kept, pool: Given | Processes, progress: Progress |
                     lost(number)
             for future in wait(flight, timeout=_SECONDS, return_when=FIRST_COMPLETED).done:
                 number = flight.pop(future)
-                if not _kept(work, store, future, number, pace):
+                try:
+                    answer = future.result()
+                except BrokenExecutor:
                     lost(number)
+                    continue
+                except LimitsetsError:
+                    raise
+                except Exception as error:
+                    raise LimitsetsError(
+                        work.task, f"{type(error).__name__}: {error}", "a task that answers",
+                        f"it failed in the chunk at {work.place(number)}",
+                    ) from error  # fmt: skip
+                store.write(answer)
+                pace.points += work.size(number)
     except BaseException as error:
         for future in flight:
             future.cancel()
-        pool.abandon()
+        if isinstance(pool, Processes):
+            pool.abandon()
         if isinstance(error, KeyboardInterrupt) and store.path is not None:
             error.add_note(GOES_ON)
         raise
-    pool.end()
-
-
-def _kept(work: Work, store: Kept, future: Future[Any], number: int, pace: _Pace) -> bool:
-    """Write the answers of a chunk; False where the worker died."""
-    try:
-        answer = future.result()
-    except BrokenExecutor:
-        return False
-    except LimitsetsError:
-        raise
-    except Exception as error:
-        raise LimitsetsError(
-            work.task, f"{type(error).__name__}: {error}", "a task that answers",
-            f"it failed in the chunk at {work.place(number)}",
-        ) from error  # fmt: skip
-    store.write(answer)
-    pace.points += work.size(number)
-    return True
 
 
 # ----------------------------------------------------------------
@@ -461,6 +435,8 @@ Row = dict[str, Any]
 
 class TrialFile:
     """Trials by their numbers, in chunks; without a path they are kept in memory alone.
+
+    What was asked is that of this very code: its digest is part of the question.
 
     Parameters
     ----------
@@ -485,10 +461,9 @@ class TrialFile:
     """
 
     def __init__(self, path: Path | None, question: dict[str, Any], trials: int, chunk: int) -> None:
-        self.path, self.question, self.trials, self.chunk = path, as_plain(question), trials, chunk
-        self.rows: dict[int, Row] = {}
-        if path is not None and path.exists():
-            self.rows = _read(path, self.question)
+        self.path, self.trials, self.chunk = path, trials, chunk
+        self.question = as_plain({"limitsets": code_digest(), **question})
+        self.rows = _read(path, self.question) if path is not None and path.exists() else {}
 
     @property
     def chunks(self) -> int:
@@ -519,39 +494,51 @@ class TrialFile:
         return (self.rows[number] for number in range(self.trials))
 
 
-def complete(
-    kept: TrialFile,
-    made: Callable[..., list[tuple[int, Row]]],
-    given: tuple[Any, ...],
+class Trial(Protocol):
+    """What is asked of trials, as workers are sent it."""
+
+    def question(self) -> dict[str, Any]:
+        """Give what is asked, for the file of the trials: everything but how many they are."""
+        ...
+
+    def row(self, number: int) -> Row:
+        """Make the trial of a number."""
+        ...
+
+
+def finished_trials(
+    trial: Trial,
+    trials: int,
+    chunk: int,
     name: str,
     points: str,
     *,
+    file: str | Path | None = None,
     executor: Executor | None = None,
     cluster: str | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
-) -> None:
-    """Make the trials that are not kept yet: here, or where one of the last arguments says.
+) -> tuple[Row, ...]:
+    """Make the trials that are not in the file yet, here or where one of the arguments says, and give all of them.
 
     Parameters
     ----------
-    kept : TrialFile
-        Where they are kept.
-    made : callable
-        Importable by workers: called with `given` and the number of a chunk, it makes the chunk's trials.
-    given : tuple
-        What it is given before the number.
+    trial : Trial
+        What is asked; workers are sent it.
+    trials, chunk : int
+        How many trials, and how many of them a worker makes at once.
     name, points : str
         What is done, and what is counted, in words.
-    executor, cluster, workers, progress
+    file, executor, cluster, workers, progress
         As in `limitsets.assemble`.
     """
+    kept = TrialFile(None if file is None else Path(file), trial.question(), trials, chunk)
     if len(kept.done) == kept.chunks:
-        return
+        return tuple(kept)
     work = Work(
         kept.chunks,
-        made,
-        given,
+        _made,
+        (trial, trials, chunk),
         size=lambda chunk: len(kept.numbers(chunk)),
         place=lambda chunk: f"{points} {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
         task=f"the {points}",
@@ -560,8 +547,14 @@ def complete(
     )
     here = executor is None and cluster is None and workers is None
     alone = nullcontext() if kept.path is None else locked(kept.path)
-    with alone, chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as pool:
-        drive(work, kept, pool, progress)
+    with alone, chosen_pool(1 if here else kept.chunks, executor, cluster, workers) as (pool, window):
+        drive(work, kept, pool, window, progress)
+    return tuple(kept)
+
+
+def _made(trial: Trial, trials: int, chunk: int, number: int) -> list[tuple[int, Row]]:
+    """Make the trials of a chunk: what a worker does."""
+    return [(k, trial.row(k)) for k in range(number * chunk, min((number + 1) * chunk, trials))]
 
 
 def _read(path: Path, question: dict[str, Any]) -> dict[int, Row]:

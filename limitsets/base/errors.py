@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import numbers
+from functools import partial
 
 # Letters of a text that an error shows.
 LONGEST = 64
@@ -56,22 +57,8 @@ class LimitsetsError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Rebuild from the parts, so that an error crosses process borders whole."""
-        return (
-            _rebuild,
-            (type(self), self.thing, self.value, self.allowed, self.remedy, self.key, self.file),
-        )
-
-
-def _rebuild(
-    kind: type[LimitsetsError],
-    thing: str,
-    value: object,
-    allowed: str,
-    remedy: str,
-    key: str | None,
-    file: str | None,
-) -> LimitsetsError:
-    return kind(thing, value, allowed, remedy, key=key, file=file)
+        kind = partial(type(self), key=self.key, file=self.file)
+        return kind, (self.thing, self.value, self.allowed, self.remedy)
 
 
 class SceneError(LimitsetsError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import wraps
 from html import escape
@@ -16,6 +16,7 @@ Progress: TypeAlias = Callable[[str, int, int], None]
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
 
 # What takes longer than this says what it is doing [s].
 PATIENCE = 2.0
@@ -33,6 +34,17 @@ BARS = 4
 
 # A notebook's bar is painted again after this at the earliest [s].
 PAINTED = 0.2
+
+
+def silent(step: str, done: int, of: int) -> None:
+    """Say nothing: the progress of whoever gives none."""
+
+
+def one_by_one(step: str, things: Iterable[T], of: int, progress: Progress | None) -> Iterator[T]:
+    """Go through so many things, and say before each how many are done."""
+    for done, thing in enumerate(things):
+        (progress or silent)(step, done, of)
+        yield thing
 
 
 def _number(done: int, of: int) -> int:

@@ -64,6 +64,10 @@ class Column:
         unit = f" [{self.unit}]" if self.unit else ""
         return [f"{self.head} low{unit}", f"{self.head} high{unit}"]
 
+    def cells(self, value: Any) -> Iterable[Any]:
+        """Give a value as a spreadsheet has it: the ends of an interval in two cells."""
+        return ((None, None) if value is None else value) if self.ends else (value,)
+
     def text(self, value: Any) -> str:
         """Write a value for people."""
         if self.ends and value is not None:
@@ -76,8 +80,7 @@ class Column:
             return "-"
         if callable(self.show):
             return self.show(value)
-        if isinstance(value, bool) or hasattr(value, "dtype"):
-            value = _plain(value)
+        value = _plain(value)
         if isinstance(value, bool):
             return "yes" if value else "no"
         return format(value, self.show) if self.show and not isinstance(value, str) else str(value)
@@ -151,12 +154,10 @@ class Table:
     def flat(self) -> tuple[list[str], list[list[Any]]]:
         """Give heads and rows of single values, as spreadsheets have them."""
         heads = [title for column in self._columns for title in column.titles]
-        rows = []
-        for row in self.rows:
-            cells: list[Any] = []
-            for column, value in zip(self._columns, row, strict=True):
-                cells += ([None, None] if value is None else list(value)) if column.ends else [value]
-            rows.append(cells)
+        rows = [
+            [cell for column, value in zip(self._columns, row, strict=True) for cell in column.cells(value)]
+            for row in self.rows
+        ]
         return heads, rows
 
     @property
@@ -180,9 +181,7 @@ class Table:
         """Write it as CSV: units in the heads, numbers in full."""
         heads, rows = self.flat()
         stream = io.StringIO()
-        lines = csv.writer(stream, lineterminator="\n")
-        lines.writerow(heads)
-        lines.writerows([_cell(value) for value in row] for row in rows)
+        csv.writer(stream, lineterminator="\n").writerows([heads, *(map(_cell, row) for row in rows)])
         return stream.getvalue()
 
     def html(self) -> str:
@@ -215,8 +214,9 @@ def pandas() -> Any:
     except ModuleNotFoundError:
         from limitsets.base.errors import AnswerError
 
-        remedy = "pip install 'limitsets[atlas]'"
-        raise AnswerError("the package pandas", "missing", "an installed one", remedy) from None
+        raise AnswerError(
+            "the package pandas", "missing", "an installed one", "pip install 'limitsets[atlas]'"
+        ) from None
     return pd
 
 
@@ -243,8 +243,7 @@ class Tabled:
         words = [f"{name}={_in_short(getattr(self, name))}" for name in names]
         ends = accumulate(len(word) + 2 for word in words)
         kept = [word for word, end in zip(words, ends, strict=True) if end <= SHORT]
-        more = ["..."] if len(kept) < len(words) else []
-        return f"{type(self).__name__}({', '.join([*kept, *more])})"
+        return f"{type(self).__name__}({', '.join([*kept, *(['...'] if len(kept) < len(words) else [])])})"
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -278,8 +277,7 @@ def _in_short(value: Any) -> str:
     """Write a value as it is where it is short, else its kind and size."""
     text = "" if isinstance(value, Tabled) else repr(value)
     if not text or len(text) > SHORT // 4 or "\n" in text:
-        size = f" of {len(value)}" if isinstance(value, Sized) else ""
-        return f"<{type(value).__name__}{size}>"
+        return f"<{type(value).__name__}{(f' of {len(value)}' if isinstance(value, Sized) else '')}>"
     return text
 
 

@@ -439,3 +439,17 @@ def thrown(params: Any) -> Callable[[float], Any]:
 def starts_from(scene: Scene, offset: float | None = None) -> NDArray[np.float64]:
     """Where random starts begin on each side: `offset` beyond a_i, a twentieth of the arm unless given [length]."""
     return scene.sides.a + (BEYOND_FOOT * scene.arm_length if offset is None else offset)
+
+
+def uniform_starts(
+    random: np.random.Generator,
+    lo: NDArray[np.float64],
+    hi: float | NDArray[np.float64],
+    count: int,
+    sides: NDArray[np.int64] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Draw starts from ranges `lo` to `hi` on some sides, by default one on each, equally likely per length."""
+    length = np.maximum(hi - lo, 0.0)
+    drawn = random.choice(lo.size, size=count, p=length / length.sum())
+    side = drawn if sides is None else sides[drawn]
+    return random.uniform(lo[drawn], np.broadcast_to(hi, lo.shape)[drawn]), side.astype(np.int64)

@@ -250,8 +250,8 @@ class Played:
 def test_only_what_missed_and_lies_flat_comes_by_again():
     # misses flat; comes again, misses on no side; a new one is captured; popped out by a kick, a new one misses flat
     played = Played((0, 2), (0, -1), (3, -1), (0, 1), (0, 1), (0, 1))
-    rows = _history(played, 5, 0, True, [0])
-    assert rows == [[(0, 0), (0, 0), (0, 3), (0, 0), (0, 0)]]
+    rows = _history(played, 5, 0, True, 0)
+    assert rows == [(0, 0), (0, 0), (0, 3), (0, 0), (0, 0)]
     assert played.asked == [
         ("new", "new"),
         ("again", "place 1"),

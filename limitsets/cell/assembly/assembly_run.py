@@ -4,35 +4,35 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.campaign import Row, TrialFile, complete
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, code_digest
-from limitsets.base.progress import shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    shown_in_notebooks,
+)
+from limitsets.base.campaign import Row, finished_trials
 from limitsets.cell.assembly.pairing import Pair, Start, pair_of, require_apart, seats_of
-from limitsets.cell.assembly.trials import pass_through
+from limitsets.cell.assembly.trials import Pushed, Question, pass_through, push
 from limitsets.cell.feeding.falling import FATES
+from limitsets.feeder.engine.member import Recording
 from limitsets.feeder.scattering import Scattering
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.noise.sampling import binomial_interval, require_seed
 
-if TYPE_CHECKING:
-    from limitsets.feeder.engine.member import Recording
-
-
 # ----------------------------------------------------------------
 # Rates with their intervals, the joint law of two fates, and shares of trials in which outlines overlap.
-
-
-TrialRow = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -82,14 +82,6 @@ class Overlaps:
     in_flight: Rate
 
 
-def overlaps_of(rows: Sequence[TrialRow]) -> Overlaps:
-    """Count trials with overlaps."""
-    names = ("overlap_at_start", "overlap_at_rest", "overlap_in_flight")
-    counts = [sum(bool(row[name]) for row in rows) for name in names]
-    ever = sum(any(row[name] for name in names) for row in rows)
-    return Overlaps(*(rate_of(count, len(rows)) for count in (ever, *counts)))
-
-
 @dataclass(frozen=True)
 class Joint:
     """The joint law of both parts' fates.
@@ -122,7 +114,7 @@ class Joint:
     serial: tuple[float, float]
 
 
-def joint_of(rows: Sequence[TrialRow]) -> Joint:
+def joint_of(rows: Sequence[Mapping[str, Any]]) -> Joint:
     """Count pairs of fates."""
     of = len(rows)
     pairs = [tuple(row["fates"]) for row in rows]
@@ -137,7 +129,6 @@ def joint_of(rows: Sequence[TrialRow]) -> Joint:
     error = product - both.share
     # each marginal at 97.5 %, so that both hold at 95 %
     ends = [binomial_interval(rate.count, of, 0.975) for rate in (first, second)]
-    serial = ends[0][0] * ends[1][0], ends[0][1] * ends[1][1]
     return Joint(
         table,
         (first, second),
@@ -145,20 +136,13 @@ def joint_of(rows: Sequence[TrialRow]) -> Joint:
         product=product,
         error=error,
         error_interval=(error - spread, error + spread),
-        serial=serial,
+        serial=(ends[0][0] * ends[1][0], ends[0][1] * ends[1][1]),
     )
 
 
 # ----------------------------------------------------------------
 # Trials of assembly, run anywhere and counted: `limitsets.assemble`.
 
-
-Progress = Callable[[str, int, int], None]
-
-OUTCOMES = ("assembled", "ejected", "order", "wrong", "wall", "edge", "left", "never", "unfinished")
-"""Both in their places; one came out of the cavity again; both on their sides, but the second below the first; one in a
-wrong orientation; one stuck at the wall; one thrown so near the end that the throw acts beyond it, which is assumed to
-be no feed; one left the arm otherwise; one is still on the arm; one still moves."""
 
 TRIALS, CHUNK = 2000, 10
 SERIES = 20
@@ -175,36 +159,24 @@ class Series:
     apart: bool
     starts: tuple[Start, Start] | None
     seed: int
-    trials: int
 
     def question(self) -> dict[str, Any]:
         """Give what is asked, for the file of the trials: everything but how many they are."""
-        words = {
-            name: value for name, value in asdict(self).items() if name not in ("scenes", "scatter", "trials")
-        }
         scenes = [json.loads(text) for text in self.scenes]
-        return {"limitsets": code_digest(), "scenes": scenes, "scatter": self.scatter.words(), **words}
-
-    def film(self, number: int, last: int) -> Recording:
-        """Make a trial in contact again, and keep poses from throw `last` on."""
-        from limitsets.cell.assembly.trials import push
-
-        return push(_pair(self), self.seed, number, self._how(), starts=self.starts, last=last)[1]
+        return asdict(self) | {"scenes": scenes, "scatter": self.scatter.words()}
 
     def row(self, number: int) -> Row:
         """Make a trial."""
-        pair = _pair(self)
-        if self.contact is None:
-            passed = pass_through(pair, self.seed, number, apart=self.apart, starts=self.starts)
-            return {"outcome": passed.outcome, **asdict(passed)}
-        from limitsets.cell.assembly.trials import push
+        if self.contact is not None:
+            return asdict(self.pushed(number)[0])
+        pair = _read(self.scenes, self.scatter)
+        passed = pass_through(pair, self.seed, number, apart=self.apart, starts=self.starts)
+        return {"outcome": passed.outcome, **asdict(passed)}
 
-        return asdict(push(pair, self.seed, number, self._how(), starts=self.starts)[0])
-
-    def _how(self) -> Any:
-        from limitsets.cell.assembly.trials import Question
-
-        return Question(self.contact or "hinge", self.carried)
+    def pushed(self, number: int, last: int | None = None) -> tuple[Pushed, Recording]:
+        """Make a trial in contact, and keep poses from throw `last` on."""
+        pair, how = _read(self.scenes, self.scatter), Question(self.contact or "hinge", self.carried)
+        return push(pair, self.seed, number, how, starts=self.starts, last=last)
 
 
 @lru_cache(maxsize=4)
@@ -212,17 +184,6 @@ def _read(scenes: tuple[str, str], scatter: Scattering) -> Pair:
     return pair_of(json.loads(scenes[0]), json.loads(scenes[1]), scatter)
 
 
-def _pair(series: Series) -> Pair:
-    return _read(series.scenes, series.scatter)
-
-
-def made(series: Series, chunk: int, number: int) -> list[tuple[int, Row]]:
-    """Make the trials of a chunk: what a worker does."""
-    numbers = range(number * chunk, min((number + 1) * chunk, series.trials))
-    return [(k, series.row(k)) for k in numbers]
-
-
-# Outcomes for people.
 ENDED = {
     "assembled": "assembled",
     "ejected": "a part came out of the cavity again",
@@ -234,6 +195,8 @@ ENDED = {
     "never": "a part stays on the arm",
     "unfinished": "still in motion",
 }
+"""Outcomes, and what they are for people."""
+OUTCOMES = tuple(ENDED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,8 +226,7 @@ class Assembly(Tabled):
     @property
     def counts(self) -> dict[str, int]:
         """How many trials ended in each way."""
-        words = [row["outcome"] for row in self.rows]
-        return {name: words.count(name) for name in OUTCOMES}
+        return dict.fromkeys(OUTCOMES, 0) | Counter(row["outcome"] for row in self.rows)
 
     @property
     def assembled(self) -> Rate:
@@ -280,7 +242,12 @@ class Assembly(Tabled):
     @property
     def overlaps(self) -> Overlaps | None:
         """Shares of the trials in which the outlines overlap; None with contact."""
-        return overlaps_of(self.rows) if self.series.contact is None else None
+        if self.series.contact is not None:
+            return None
+        names = ("overlap_at_start", "overlap_at_rest", "overlap_in_flight")
+        seen = [[bool(row[name]) for name in names] for row in self.rows]
+        counts = (sum(map(any, seen)), *map(sum, zip(*seen, strict=True)))
+        return Overlaps(*(rate_of(count, len(seen)) for count in counts))
 
     @property
     def joint(self) -> Joint | None:
@@ -299,12 +266,9 @@ class Assembly(Tabled):
     @property
     def survived(self) -> dict[str, Rate]:
         """Assembled pairs that are whole after one more throw: with a standing cavity, and with one that is thrown."""
-        rates = {}
-        for name in ("standing", "carried"):
-            known = [row[f"survives_{name}"] for row in self.rows if row.get(f"survives_{name}") is not None]
-            if known:
-                rates[name] = rate_of(sum(known), len(known))
-        return rates
+        whole = {name: [row.get(f"survives_{name}") for row in self.rows] for name in ("standing", "carried")}
+        known = {name: [each for each in thrown if each is not None] for name, thrown in whole.items()}
+        return {name: rate_of(sum(thrown), len(thrown)) for name, thrown in known.items() if thrown}
 
     def example(self, outcome: str) -> int | None:
         """Give the number of the first trial that ended so."""
@@ -323,7 +287,7 @@ class Assembly(Tabled):
             raise AnswerError("the film", "of parts without contact", "trials in the engine", remedy)
         if not 0 <= number < len(self.rows):
             raise AnswerError("the trial", number, f"0 to {len(self.rows) - 1}", "name one that was made")
-        return self.series.film(number, max(max(self.rows[number]["throws"]) - throws + 1, 1))
+        return self.series.pushed(number, max(max(self.rows[number]["throws"]) - throws + 1, 1))[1]
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
@@ -436,18 +400,25 @@ def assemble(
         raise AnswerError("the starts", "overlapping", "parts that do not overlap", "leave apart out")
     given = None if starts is None else require_apart(pair, starts)
     one, two = (json.dumps(each.as_dict()) for each in pair.scenes)
-    side_by_side = bool(how if apart is None else apart)
     series = Series(
         (one, two),
         pair.scatter,
         how,
         carried=carried and pair.contact,
-        apart=side_by_side,
+        apart=bool(how if apart is None else apart),
         starts=given,
         seed=seed,
-        trials=trials,
     )
-    kept = TrialFile(None if file is None else Path(file), series.question(), trials, CHUNK)
-    where: dict[str, Any] = {"executor": executor, "cluster": cluster, "workers": workers}
-    complete(kept, made, (series, CHUNK), "assembly", "trials", **where, progress=progress)
-    return Assembly(pair, series, tuple(kept))
+    rows = finished_trials(
+        series,
+        trials,
+        CHUNK,
+        "assembly",
+        "trials",
+        file=file,
+        executor=executor,
+        cluster=cluster,
+        workers=workers,
+        progress=progress,
+    )
+    return Assembly(pair, series, rows)

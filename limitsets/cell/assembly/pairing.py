@@ -6,28 +6,30 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
+from limitsets.base.arrays import Array
 from limitsets.cell.feeding.falling import ArmEnd, arm_end_of
 from limitsets.feeder.engine.crowd import depth_of_overlap
 from limitsets.feeder.engine.depression import seat_of
 from limitsets.feeder.geometry import side_ends
-from limitsets.feeder.scattering import Gaussian, Scattering, Uniform, scattering_of
+from limitsets.feeder.scattering import Gaussian, Law, Scattering, Uniform, scattering_of
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.scene import require_rests
 from limitsets.feeder.thrower import impact_angles
 from limitsets.parameters.sheet.summary import still
 
-if TYPE_CHECKING:
-    from limitsets.feeder.scattering import Law
-
-
 SHARED = ("unit", "kappa", "surface_height", "arm_length", "gravity", "flight", "flip", "cavity")
 """What two parts on one arm have in common."""
+
+FOLLOWED = {
+    "flight": ("exact", "outlines in flight are those of the exact one"),
+    "flip": ("signed", "a part that flips by another criterion has no way from its impact to rest"),
+}
+"""Of which models outlines are followed, and why."""
 
 Start = tuple[float, int]
 """x [length] and side."""
@@ -91,12 +93,9 @@ def pair_of(
         if others:
             remedy = "their motion after the impact is not followed here: switch them off"
             raise AnswerError(f"the effects of {each.name}", others, "landing, spread and contact", remedy)
-        if each.flight != "exact":
-            remedy = "outlines in flight are those of the exact one"
-            raise AnswerError(f"the flight of {each.name}", each.flight, "exact", remedy)
-        if each.flip != "signed":
-            remedy = "a part that flips by another criterion has no way from its impact to rest"
-            raise AnswerError(f"the flip of {each.name}", each.flip, "signed", remedy)
+        for name, (allowed, remedy) in FOLLOWED.items():
+            if getattr(each, name) != allowed:
+                raise AnswerError(f"the {name} of {each.name}", getattr(each, name), allowed, remedy)
     if scatter is None:
         drawn = [Scattering() if each.effects.spread is None else scattering_of(each) for each in (one, two)]
         if drawn[0] != drawn[1]:
@@ -119,7 +118,7 @@ def _said(scene: Scene, name: str) -> str:
     return f"{value:.9g} {unit}" if isinstance(value, float) else str(value)
 
 
-def seats_of(pair: Pair) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def seats_of(pair: Pair) -> tuple[Array, Array]:
     """Give the corners of both parts in their seats, the second on the first, shapes (n, 2) [length].
 
     Raises
@@ -136,8 +135,7 @@ def outline_at(scene: Scene, x: float, height: float, angle: float) -> list[tupl
     """Give the corners of a part, its centre of mass at (x, height) from the joint, turned from side 0 by an angle."""
     about = scene.vertices - np.asarray(scene.centre)
     cos, sin = math.cos(angle), math.sin(angle)
-    turned: NDArray[np.float64] = about @ np.array([[cos, sin], [-sin, cos]]) + (x, height)
-    return [(float(px), float(py)) for px, py in turned]
+    return [(float(px), float(py)) for px, py in (about @ np.array([[cos, sin], [-sin, cos]]) + (x, height))]
 
 
 def angle_on(scene: Scene, side: int) -> float:
@@ -172,11 +170,10 @@ def require_apart(pair: Pair, starts: Sequence[Start]) -> tuple[Start, Start]:
         if not (0 <= side < len(scene.sides) and float(scene.sides.a[side]) < x < end.x):
             allowed = f"a side of the part, and x on the arm before its end at {end.x:g} {scene.unit}"
             raise AnswerError(f"the start of {scene.name}", (x, side), allowed, "lay it on the arm")
+    (x1, side1), (x2, side2) = starts
     if not are_apart(pair, starts):
-        (x1, side1), (x2, side2) = starts
         thing = f"the starts {x1:g} on side {side1} and {x2:g} on side {side2}"
         raise AnswerError(thing, "overlapping", "parts that do not overlap", "move one of them along the arm")
-    (x1, side1), (x2, side2) = starts
     return (float(x1), int(side1)), (float(x2), int(side2))
 
 
@@ -215,29 +212,24 @@ class Draws:
     def starts(self, *, apart: bool) -> tuple[Start, Start]:
         """Draw where the parts lie at first, each as `limitsets.feed` does; `apart`: until they do not overlap."""
         for _ in range(MOST_DRAWN):
-            first, second = (self._start(number) for number in (0, 1))
+            (x1, side1), (x2, side2) = (end.drawn(self.random, 1) for end in self.pair.ends)
+            first, second = (float(x1[0]), int(side1[0])), (float(x2[0]), int(side2[0]))
             if not apart or are_apart(self.pair, (first, second)):
                 return first, second
         remedy = "lengthen the arm, or throw without contact"
         raise AnswerError("the arm", "too short for both parts", "room for two parts side by side", remedy)
-
-    def _start(self, number: int) -> Start:
-        end = self.pair.ends[number]
-        x, side = end.drawn(self.random, 1)
-        return float(x[0]), int(side[0])
 
     def throw(self) -> tuple[float, tuple[float, float]]:
         """Draw the next throw: relative deviation of the speed, and of each part's landing place [length]."""
         if not self.rows:
             scatter, shape = self.pair.scatter, (AT_ONCE, 1)
             speed = _drawn(scatter.speed, self.random, shape)
-            landing = _drawn(scatter.landing, self.random, (AT_ONCE, 2))
-            self.rows = np.hstack([speed, landing])[::-1].tolist()
+            self.rows = np.hstack([speed, _drawn(scatter.landing, self.random, (AT_ONCE, 2))])[::-1].tolist()
         speed_of, one, two = self.rows.pop()
         return speed_of, (one, two)
 
 
-def _drawn(law: Law | None, random: np.random.Generator, shape: tuple[int, int]) -> NDArray[np.float64]:
+def _drawn(law: Law | None, random: np.random.Generator, shape: tuple[int, int]) -> Array:
     if isinstance(law, Gaussian):
         return law.sigma * random.standard_normal(shape)
     if isinstance(law, Uniform):
@@ -361,10 +353,8 @@ def way_of(scene: Scene, params: Any, start: Start, side: int) -> Way:
     inertia = scene.radius_of_gyration**2 + right**2 + above**2
     # plastic impact: angular momentum about the corner is kept
     rate = (scene.radius_of_gyration**2 + right * (x - kappa * phi) + above * height) / inertia
-    sides = (side - before) % count
-    turned = sum(float(scene.sides.corner[(before + k) % count]) for k in range(sides))
+    turned = sum(float(scene.sides.corner[(before + k) % count]) for k in range((side - before) % count))
     turns, fastest = _turned(turned - phi, rate, (right, above), inertia, kappa)
-    in_flight = math.hypot(height, max(abs(x), abs(x - kappa * phi))) + reach
     return Way(
         scene,
         start,
@@ -372,7 +362,7 @@ def way_of(scene: Scene, params: Any, start: Start, side: int) -> Way:
         phi=phi,
         struck=struck,
         turns=turns,
-        in_flight=in_flight,
+        in_flight=(math.hypot(height, max(abs(x), abs(x - kappa * phi))) + reach),
         turning=2.0 * reach * fastest,
     )
 

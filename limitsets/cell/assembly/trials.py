@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from limitsets.cell.assembly.pairing import Draws, Pair, Start, are_apart, meet, seats_of, way_of
 from limitsets.cell.feeding.falling import FATES, ArmEnd
-from limitsets.feeder.engine.crowd import Crowd
+from limitsets.feeder.engine import Crowd, Recording, Rest
 from limitsets.feeder.engine.depression import SEATED, off_seat
 from limitsets.feeder.scattering import thrown
 from limitsets.systems.maps import codes, images
-
-if TYPE_CHECKING:
-    from limitsets.feeder.engine.member import Recording, Rest
-
 
 # ----------------------------------------------------------------
 # A trial of two parts that pass through each other, as the paper assumes: the throw map alone, and common
@@ -230,31 +226,21 @@ class _Watched:
 
     def outcome(self, rests: list[Rest]) -> str:
         """Say what became of them, for the first reason that holds."""
-        if all(rest.where == "cavity" for rest in rests) and self.assembled():
-            return "assembled"
-        if self.ejected:
-            return "ejected"
-        if self.left or self.edge:
-            return "left" if self.left else "edge"
-        if any(rest.where == "unfinished" for rest in rests):
-            return "unfinished"
         inside = [k for k, rest in enumerate(rests) if rest.where == "cavity"]
-        return self._outcome_inside(rests, inside) if inside else "never"
-
-    def _outcome_inside(self, rests: list[Rest], inside: list[int]) -> str:
-        """Say why parts of which at least one lies in the cavity are not assembled."""
-        sides = [end.side for end in self.pair.ends]
-        if any(rests[k].side not in (sides[k], -1) for k in inside):
-            return "wrong"
-        if (
-            len(inside) == 2
-            and all(rests[k].side == sides[k] for k in (0, 1))
-            and self.throws[1] <= self.throws[0]
-        ):
-            return "order"
-        if any(self.wall[k] and rests[k].side == -1 for k in inside):
-            return "wall"
-        return "wrong" if len(inside) == 2 else "never"
+        both, sides = len(inside) == 2, [end.side for end in self.pair.ends]
+        on_their_sides = both and [rest.side for rest in rests] == sides
+        reasons = (
+            ("assembled", both and self.assembled()),
+            ("ejected", self.ejected),
+            ("left", self.left),
+            ("edge", self.edge),
+            ("unfinished", any(rest.where == "unfinished" for rest in rests)),
+            ("wrong", any(rests[k].side not in (sides[k], -1) for k in inside)),
+            ("order", on_their_sides and self.throws[1] <= self.throws[0]),
+            ("wall", any(self.wall[k] and rests[k].side == -1 for k in inside)),
+            ("wrong", both),
+        )
+        return next((word for word, holds in reasons if holds), "never")
 
 
 def crowd_of(pair: Pair, how: Question, *, record: bool = False) -> Crowd:

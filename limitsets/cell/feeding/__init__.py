@@ -6,14 +6,13 @@ fates, and finds the noise at which success falls to a share.  `crowd` throws ma
 `feeding_run` joins them (`limitsets.feed`).
 """
 
-from limitsets.cell.feeding.falling import (
-    FATES as FATES,
-)
-from limitsets.cell.feeding.falling import (
-    clear_beyond as clear_beyond,
-)
-from limitsets.cell.feeding.falling import (
-    time_to_tip as time_to_tip,
-)
-from limitsets.cell.feeding.feeding_run import Feeding as Feeding
-from limitsets.cell.feeding.feeding_run import feed as feed
+from limitsets.cell.feeding.falling import FATES, clear_beyond, time_to_tip
+from limitsets.cell.feeding.feeding_run import Feeding, feed
+
+__all__ = [
+    "FATES",
+    "Feeding",
+    "clear_beyond",
+    "feed",
+    "time_to_tip",
+]

@@ -9,16 +9,15 @@ from __future__ import annotations
 import functools
 import math
 import time
-from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table
+from limitsets.base import AnswerError, Progress, as_table, picked
+from limitsets.base.arrays import Array, Ints, Mask
+from limitsets.base.campaign import in_order
 from limitsets.cell.feeding.falling import FATES, ArmEnd
 from limitsets.feeder.engine import Crowd, Rest
 from limitsets.feeder.scattering import Gaussian, Law, Scattering, Uniform
@@ -65,10 +64,10 @@ class CrowdTrials:
     parts: int
     between: bool
     contact: str
-    fates: NDArray[np.int64]
-    throws: NDArray[np.int64]
-    spilled: NDArray[np.int64]
-    met: NDArray[np.bool_]
+    fates: Ints
+    throws: Ints
+    spilled: Ints
+    met: Mask
     thrown: int
     seconds: float
     seed: int
@@ -96,9 +95,7 @@ class CrowdTrials:
         """Give the numbers as JSON takes them."""
         total, (rate, error) = int(self.fates.sum()), self.right_per_throw
         return as_table(
-            parts=self.parts,
-            between=self.between,
-            contact=self.contact,
+            **picked(self, "parts", "between", "contact"),
             batches=self.throws.size,
             seed=self.seed,
             counts=self.counts,
@@ -124,7 +121,7 @@ def run_crowd(
     seed: int = 0,
     step: float = 4e-3,
     executor: Executor | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> CrowdTrials:
     """Throw batches of parts until each part has met its fate.
 
@@ -156,8 +153,7 @@ def run_crowd(
     AnswerError
         Contact is off in the scene, no parts, laws that throws cannot draw from, or no pymunk.
     """
-    scene = end.scene
-    if not scene.effects.contact:
+    if not end.scene.effects.contact:
         remedy = "add contact = true to [effects]: parts that pass through each other are those of trials"
         raise AnswerError("effects.contact", False, "true where parts are thrown together", remedy)
     if parts < 1 or batches < 1 or throws < 1:
@@ -168,14 +164,7 @@ def run_crowd(
         raise AnswerError("the noise to throw with", scatter.words(), allowed, "take another law")
     how: dict[str, Any] = {"between": between, "contact": contact, "step": step}
     task = functools.partial(_thrown, end, scatter, parts, throws, seed, how)
-    every = range(batches)
-    rows: list[Any] = []
-    for row in map(task, every) if executor is None else executor.map(task, every):
-        if progress is not None:
-            progress(f"{parts} parts at once", len(rows), batches)
-        rows.append(row)
-    if progress is not None:
-        progress(f"{parts} parts at once", batches, batches)
+    rows = in_order(f"{parts} parts at once", task, range(batches), executor, progress)
     fates, made, spilled, met, thrown, seconds = zip(*rows, strict=True)
     return CrowdTrials(
         parts,
@@ -263,41 +252,42 @@ class _Batch:
             deviation = _drawn(self.random, scatter.speed, 1)[0]
             shifts = _drawn(self.random, scatter.landing, parts)
             self.throws += 1
-            self._lose_at_edge()
+            for (
+                rest
+            ) in crowd.rests():  # what a throw does that acts beyond the end of the arm is not simulated
+                if (
+                    rest.number not in self.fate
+                    and rest.where == "arm"
+                    and self.end.at_edge(rest.x, rest.side)
+                ):
+                    self._take(rest.number, "edge")
             self._take_out(crowd.throw(float(deviation), shifts.tolist()))
         return thrown
 
-    def _lose_at_edge(self) -> None:
-        """Take out the parts on which this throw acts beyond the end of the arm: what it does is not simulated."""
-        for rest in self.crowd.rests():
-            at_edge = rest.where == "arm" and bool(self.end.at_edge(rest.x, rest.side))
-            if at_edge and rest.number not in self.fate:
-                self.fate[rest.number] = FATES.index("edge")
-                self.crowd.take(rest.number)
+    def _take(self, number: int, fate: str) -> None:
+        """Count a part and take it out, the first time that it is seen there."""
+        self.fate[number] = FATES.index(fate)
+        self.crowd.take(number)
 
     def _take_out(self, rests: list[Rest]) -> None:
         """Count and take out what lies in the cavity, the lowest first, as more slides down; and what has left."""
         while True:
             for rest in rests:
-                gone = rest.where in ("arm", "leaning") and rest.x <= self._least(rest.side)
+                # in the map a part is off the arm from a of the side down that it lies on
+                least = float(self.end.scene.sides.a[rest.side]) if rest.side >= 0 else 0.0
+                gone = rest.where in ("arm", "leaning") and rest.x <= least
                 if rest.number not in self.fate and (rest.where == "lost" or gone):
-                    self.fate[rest.number] = FATES.index("left")
-                    self.crowd.take(rest.number)
+                    self._take(rest.number, "left")
             fallen = [rest for rest in rests if rest.where == "cavity"]
             if not fallen:
                 return
             lowest = min(fallen, key=lambda rest: rest.pose[1])
             word = "wall" if lowest.side < 0 else "right" if lowest.side == self.end.side else "wrong"
-            self.fate[lowest.number] = FATES.index(word)
-            self.crowd.take(lowest.number)
+            self._take(lowest.number, word)
             rests = self.crowd.settle() if len(fallen) > 1 else []
 
-    def _least(self, side: int) -> float:
-        """From which x down a part is off the arm: a of the side it lies on, as in the map."""
-        return float(self.end.scene.sides.a[side]) if side >= 0 else 0.0
 
-
-def _drawn(random: np.random.Generator, law: Law | None, count: int) -> NDArray[np.float64]:
+def _drawn(random: np.random.Generator, law: Law | None, count: int) -> Array:
     """Draw deviations; the same numbers are used up whatever the law."""
     if isinstance(law, Gaussian):
         return law.sigma * random.standard_normal(count)

@@ -10,24 +10,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
+from limitsets.base.arrays import Array, Ints
 from limitsets.feeder.geometry.polygon import above_side, side_ends
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
-from limitsets.feeder.scattering import starts_from
+from limitsets.feeder.scattering import starts_from, uniform_starts
+from limitsets.feeder.scene import Cavity, Scene
 from limitsets.feeder.scene.laid import LaidLike, read_laid
 from limitsets.feeder.scene.scene import require_rests
 from limitsets.feeder.thrower import fly
-from limitsets.parameters.noise.sampling import uniform_starts
 from limitsets.systems.maps import codes, images
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Cavity, Scene
-
 
 # ----------------------------------------------------------------
 # How long a part takes to tip over the end of the arm, until its side lies flush on the ramp.
@@ -48,8 +45,6 @@ if TYPE_CHECKING:
 #
 # What is assumed stands in docs/feeding.md.
 
-
-Array = NDArray[np.float64]
 
 # Abscissae of the integral, and starts on the arm whose landings are looked at.
 NODES, STARTS = 96, 800
@@ -250,10 +245,8 @@ def farthest_clear(scene: Scene, cavity: Cavity, side: int) -> float:
     for corner in corners:
         along, above, _ = above_side(corners[left], corners[right], corner)
         q = max(above, 0.0)  # on the side itself, to rounding
-        if q <= cavity.width * sin:
-            wall = math.sqrt(cavity.width**2 - q**2)
-        else:
-            wall = (cavity.width - q * sin) / cos
+        near = q <= cavity.width * sin
+        wall = math.sqrt(cavity.width**2 - q**2) if near else (cavity.width - q * sin) / cos
         floor = (cavity.depth + q * cos) / sin
         most = min(most, min(wall, floor) - (along - float(scene.sides.a[side])))
     return most
@@ -350,30 +343,29 @@ class ArmEnd:
     x: float
     side: int
     clear: tuple[tuple[float, float], ...]
-    edges: NDArray[np.float64]
-    starts: NDArray[np.float64]
+    edges: Array
+    starts: Array
     laid: Laid = ()
 
     @property
-    def ranges(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    def ranges(self) -> tuple[Array, Array, Ints]:
         """Lower ends, upper ends and sides of the ranges in which random starts lie."""
         whole = [(side, lo, self.x) for side, lo in enumerate(self.starts.tolist())]
         side, lo, hi = zip(*(self.laid or whole), strict=True)
         return np.array(lo), np.array(hi), np.array(side)
 
-    def drawn(self, random: np.random.Generator, count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    def drawn(self, random: np.random.Generator, count: int) -> tuple[Array, Ints]:
         """Draw random starts: places and sides."""
         lo, hi, side = self.ranges
         return uniform_starts(random, lo, hi, count, side)
 
-    def fate(self, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.int64]:
+    def fate(self, x: Array, side: Ints) -> Ints:
         """Say what becomes of parts at rest: a number of `FATES`, -1 of those that stay on the arm."""
         beyond = x - self.x
         clears = np.zeros(np.shape(x), dtype=bool)
         for lo, hi in self.clear:
             clears |= (beyond >= lo) & (beyond <= hi)
-        fed = np.where(side == self.side, np.where(clears, 0, 2), 1)
-        return np.where(beyond >= 0.0, fed, -1)
+        return np.where(beyond >= 0.0, np.where(side == self.side, np.where(clears, 0, 2), 1), -1)
 
     def at_edge(self, x: Any, side: Any) -> Any:
         """Say of which parts at rest before the end the next throw acts beyond it: their fate is "edge"."""
@@ -417,10 +409,9 @@ def arm_end_of(scene: Scene, side: int | None = None, laid: LaidLike | None = No
     )
 
 
-def _edges(scene: Scene, x: float) -> NDArray[np.float64]:
+def _edges(scene: Scene, x: float) -> Array:
     """Give by side the least place from which a throw acts beyond the end: y + c / y > x, the side over the end."""
     sides = scene.sides
     c = scene.radius_of_gyration**2 + sides.d * (scene.surface_height + sides.d)
     root = np.sqrt(np.maximum(x * x - 4.0 * c, 0.0))
-    acts = np.where(4.0 * c < x * x, 0.5 * (x + root), 0.0)
-    return np.clip(acts, np.maximum(x - sides.right, sides.a), x)
+    return np.clip(np.where(4.0 * c < x * x, 0.5 * (x + root), 0.0), np.maximum(x - sides.right, sides.a), x)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -11,11 +11,17 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    picked,
+    shown_in_notebooks,
+)
 from limitsets.cell.feeding.crowd import BATCHES, CrowdTrials, run_crowd
 from limitsets.cell.feeding.falling import ArmEnd, arm_end_of, clear_beyond, tipping_times
 from limitsets.cell.feeding.paths import Fed, Safe, without_scatter
@@ -38,7 +44,6 @@ from limitsets.parameters.noise.sampling import require_seed
 from limitsets.parameters.sheet.summary import still
 from limitsets.proofs.chances.absorption import AbsorptionBrackets
 
-Progress = Callable[[str, int, int], None]
 Verdict = TypeVar("Verdict", Safe, Fed)
 
 # Parts thrown unless it is said how many: fewer where that takes more throws than these.
@@ -172,8 +177,9 @@ class Feeding(Tabled):
             The checker does not confirm it: it is kept as NAME.denied.zip, and what it holds is undecided.
         """
         if self.proof is None:
-            remedy = "ask for the proof: prove=True"
-            raise AnswerError("the certificate", "without a proof", "safety or progress", remedy)
+            raise AnswerError(
+                "the certificate", "without a proof", "safety or progress", "ask for the proof: prove=True"
+            )
         return write_proof(path, self.proof, self.end, recheck=recheck, workers=workers)
 
     def denied(self, reason: str) -> Feeding:

@@ -14,7 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.files import as_table, picked
+from limitsets.base import as_table, picked
+from limitsets.base.arrays import Mask
 from limitsets.cell.feeding.falling import ArmEnd
 from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
 from limitsets.proofs.prover.attraction import Attraction
@@ -197,7 +198,6 @@ def _places(beyond: Mapping[Any, float], unit: str) -> str:
 # What can be reached on enclosed images of the cells before X, where the arm ends.
 
 
-Mask = NDArray[np.bool_]
 Bits = NDArray[np.uint8]
 
 # What may be open of a claim that is proved.
@@ -281,8 +281,7 @@ class Paths:
             landings = [spread[ends[cell, 0] : ends[cell, 1] + 1] for ends in ways if ends[cell, 0] >= 0]
             ends_on[cell] = np.bitwise_or.reduce(np.concatenate([*landings, near[inward[:, cell]]]))
         leaving = (inward | outward).any(axis=0) & ~fed
-        stay = (parts.recurrent[parts.label] & ~fed) | leaving
-        late = reach(ranges, parts, stay.astype(np.uint8)) > 0
+        late = reach(ranges, parts, ((parts.recurrent[parts.label] & ~fed) | leaving).astype(np.uint8)) > 0
         leaves = reach(ranges, parts, leaving.astype(np.uint8)) > 0
         steps = ranks(ranges, parts, np.zeros(parts.count, dtype=bool))
         return cls(attraction, end, ~fed, ends_on=ends_on, near=near, leaves=leaves, late=late, steps=steps)
@@ -297,8 +296,7 @@ class Paths:
             return self._laid_share(some)
         grid, a = self.attraction.cover.grid, self.attraction.cover.box.bare[0].a
         before = sum(float(edges[0] - a[side]) for side, (edges,) in enumerate(grid.edges) if near[side])
-        inside = float(grid.measure[some & self.starts].sum())
-        return (inside + before) / float((self.end.x - a).sum())
+        return (float(grid.measure[some & self.starts].sum()) + before) / float((self.end.x - a).sum())
 
     def _laid_share(self, some: Mask) -> float:
         """Share of the ranges where parts are laid down that lies in some cells; 1.0 where all of it does."""
@@ -326,8 +324,7 @@ class Paths:
         bad, near = self.ends_on & wrong > 0, self.near & wrong == 0
         sides = range(self.attraction.cover.grid.sides)
         possible = {side: self.extents(self.ends_on >> side & 1 > 0) for side in sides}
-        whole = not (bad & self.starts).any() and bool(near.all())
-        share = 1.0 if whole else self.share(~bad, near)
+        share = 1.0 if (not (bad & self.starts).any() and bool(near.all())) else self.share(~bad, near)
         begins = self.begins
         measure = self.attraction.cover.grid.measure
         return Safe(
@@ -372,51 +369,43 @@ class Paths:
         """Prove of every start that it is fed."""
         if self.end.laid:
             share, missing = self._laid(self.late)
-            throws = int(self.steps[self.begins & ~self.late].max(initial=0))
             if missing:
                 return Fed("undecided", None, {}, share, reason=missing)
-            return Fed("proved", throws, {}, share)
+            return Fed("proved", int(self.steps[self.begins & ~self.late].max(initial=0)), {}, share)
         beyond, good = self.from_on(self.late)
         if not good.any():
             place = self.attraction.cover.place(int(np.flatnonzero(self.late & self.starts)[0]))
             return Fed("undecided", None, {}, 0.0, reason=f"an orbit from {place} may never be fed")
-        near = self.near_to(self.late)
-        whole = bool(near.all()) and not (self.late & self.starts).any()
-        share = 1.0 if whole else self.share(good, near & self._whole_side(good))
+        share = self._share_from_on(good, self.late, self.near_to(self.late))
         return Fed(verdict_of_share(share), int(self.steps[good].max()), beyond, share)
 
-    def _whole_side(self, good: Mask) -> Mask:
-        """Of which sides all starts in cells are good."""
+    def _share_from_on(self, good: Mask, bad: Mask, near: Mask) -> float:
+        """Share of the starts from some x on, and of those before the first cells of sides all of which is good."""
+        if near.all() and not (bad & self.starts).any():
+            return 1.0
         grid = self.attraction.cover.grid
-        return np.array(
-            [good[cells][self.starts[cells]].all() for cells in map(grid.of_side, range(grid.sides))]
-        )
+        sides = [good[cells][self.starts[cells]].all() for cells in map(grid.of_side, range(grid.sides))]
+        # a share of the arm that rounds to all of it leaves something out
+        return min(self.share(good, near & np.array(sides)), 1.0 - ROUNDING)
 
     def almost(self, fed: Fed) -> Fed:
         """Prove of almost every start that it is fed: those that are late thin out, where they cannot leave the arm."""
-        if self.end.laid:
-            share, missing = self._laid(self.leaves)
-            met = reached_from(self.attraction, self.begins & ~self.leaves)
-            thinned = perron_frobenius_bound(
-                self.attraction.cover, self.late & self.starts & ~self.leaves & met
-            )
-            if missing or thinned.reason:
-                return replace(fed, almost_every="undecided", reason=missing or thinned.reason)
-            rounds = thinned.throws + thinned.throws // 8 + 1
-            return replace(
-                fed, almost_every="proved", almost_from="almost-every", almost_share=1.0, thinning=rounds
-            )
-        beyond, good = self.from_on(self.leaves)
         # what cannot leave the arm comes to no cell that can, and what is not late never comes to be
         left = self.late & self.starts & ~self.leaves
+        starts: Any = "almost-every"
+        if self.end.laid:
+            share, missing = self._laid(self.leaves)
+            left &= reached_from(self.attraction, self.begins & ~self.leaves)
+        else:
+            beyond, good = self.from_on(self.leaves)
+            missing = fed.reason
+            # next to the joint a throw rises with the start: it carries no set of positive length into one of length 0
+            near = self.near_to(self.leaves) & all(each.rises for each in self.attraction.joint)
+            share = self._share_from_on(good, self.leaves, near) if good.any() else 0.0
+            starts = starts if share == 1.0 else {"from": {str(side): x for side, x in beyond.items()}}
         thinned = perron_frobenius_bound(self.attraction.cover, left)
-        if thinned.reason or not good.any():
-            return replace(fed, almost_every="undecided", reason=fed.reason or thinned.reason)
-        # next to the joint a throw rises with the start: it carries no set of positive length into one of length zero
-        near = self.near_to(self.leaves) & all(each.rises for each in self.attraction.joint)
-        whole = bool(near.all()) and not (self.leaves & self.starts).any()
-        share = 1.0 if whole else self.share(good, near & self._whole_side(good))
-        starts = "almost-every" if whole else {"from": {str(side): x for side, x in beyond.items()}}
+        if thinned.reason or share == 0.0 or (self.end.laid and missing):
+            return replace(fed, almost_every="undecided", reason=missing or thinned.reason)
         # a little more, so that other arithmetic can confirm it
         rounds = thinned.throws + thinned.throws // 8 + 1
         return replace(

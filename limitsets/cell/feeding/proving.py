@@ -12,12 +12,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, Progress, silent
 from limitsets.cell.feeding.falling import ArmEnd
 from limitsets.cell.feeding.paths import MOST_SIDES, Fed, Paths, Safe, verdict_of_share
 from limitsets.feeder.goals import OrientedBeyond
@@ -51,7 +51,7 @@ def fate_brackets(
     cells: int,
     *,
     throws: int = THROWS,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> AbsorptionBrackets:
     """Prove brackets of the fates right, wrong, wall, edge and exits ("left") within n throws.
 
@@ -105,8 +105,6 @@ def _places(end: ArmEnd) -> dict[str, Places]:
 # ----------------------------------------------------------------
 # Which sides can be fed, from which starts, under every sequence of the noise; and that every start is fed.
 
-
-Progress = Callable[[str, int, int], None]
 
 # Cells per side, tried in turn until both questions are answered.
 LADDER = (2048, 8192, 32768)
@@ -184,7 +182,7 @@ def proved_feeding(
         raise AnswerError(
             "the sides of the part", len(scene.sides), f"up to {MOST_SIDES}", "pass prove=False"
         )
-    tell = progress or (lambda stage, done, of: None)
+    tell = progress or silent
     every = joined(spelled_deviations(scene, noise), spelled_deviations(scene, scattered(scene)))
     box, cuts = parameter_box(scene, noise=every), _cuts(end)
     wrong = OrientedBeyond(end.x, end.side, from_anywhere=True).wrong()
@@ -278,15 +276,9 @@ def verdict_of(proof: FeedingProof, *, laid: bool = False) -> str:
     safe, fed, _ = proof
     if safe.counterexample or (fed.never_fed and fed.almost_every not in PROVED):
         return "refuted"
-    share = min(safe.share, _progress(fed))
+    every, almost = fed.verdict in PROVED, fed.almost_every in PROVED
+    share = min(safe.share, max(fed.share * every, fed.almost_share * almost))
     return "proved-on-cells" if laid and 0.0 < share < 1.0 else verdict_of_share(share)
-
-
-def _progress(fed: Fed) -> float:
-    """Share of the starts of which every one, or almost every one, is fed."""
-    return max(
-        fed.share if fed.verdict in PROVED else 0.0, fed.almost_share if fed.almost_every in PROVED else 0.0
-    )
 
 
 def holds(proof: FeedingProof, end: ArmEnd) -> bool:
@@ -308,20 +300,15 @@ def write_proof(
     """
     section, box = section_of(proof, end), proof.attraction.cover.box
     if box.effects:
-        raise AnswerError(
-            "the certificate",
-            "with effects",
-            "the minimal model, and noise",
-            "nothing rechecks other maps; the proof stands in .safe and .fed",
-        )
+        remedy = "nothing rechecks other maps; the proof stands in .safe and .fed"
+        raise AnswerError("the certificate", "with effects", "the minimal model, and noise", remedy)
     if not section:
         remedy = "see the reason in .fed; a part without a proof is in no certificate"
         raise AnswerError("the certificate", "without a proved claim", "safety or progress", remedy)
-    claim = {"claim": "feeds", "section": section, "verdict": verdict_of(proof, laid=bool(end.laid))}
     write(
         path,
         [proof.attraction],
-        [claim],
+        [{"claim": "feeds", "section": section, "verdict": verdict_of(proof, laid=bool(end.laid))}],
         noise=box.noise or None,
         tolerance=None,
         unit=end.scene.unit,

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.files import as_table
+from limitsets.base import Progress, as_table, silent
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.cell.feeding.falling import FATES, ArmEnd
 from limitsets.feeder.scattering import Scattering, still_map
 from limitsets.parameters.noise.sampling import ManyParts, binomial_interval, scattering_map
@@ -46,9 +46,9 @@ class Trials:
         Of starts and noise.
     """
 
-    fate: NDArray[np.int64]
-    throws: NDArray[np.int64]
-    beyond: NDArray[np.bool_]
+    fate: Ints
+    throws: Ints
+    beyond: Mask
     seed: int
 
     @cached_property
@@ -61,7 +61,7 @@ class Trials:
         """Intervals of the probabilities of each fate, 95 %."""
         return {name: binomial_interval(count, self.fate.size) for name, count in self.counts.items()}
 
-    def series(self) -> NDArray[np.int64]:
+    def series(self) -> Ints:
         """Right feeds in each series of 20 trials, in the order of the trials; what is left over is left out."""
         whole = self.fate[: self.fate.size // SERIES * SERIES].reshape(-1, SERIES)
         return np.asarray((whole == 0).sum(axis=1), dtype=np.int64)
@@ -85,7 +85,7 @@ class Trials:
         )
 
 
-def creeping_below(end: ArmEnd, scatter: Scattering) -> NDArray[np.float64]:
+def creeping_below(end: ArmEnd, scatter: Scattering) -> Array:
     """By side the x below which a part creeps to the joint and never comes there; a_i where none does.
 
     With the arm's surface above the joint a start just beyond a_i keeps the share 1 - 2 h/kappa of its distance at
@@ -102,9 +102,8 @@ def creeping_below(end: ArmEnd, scatter: Scattering) -> NDArray[np.float64]:
     True
     """
     scene, a = end.scene, end.scene.sides.a
-    minimal = not hasattr(still_map(scene), "bare")
-    creeps = minimal and scatter.landing is None and 0.0 < 2.0 * scene.surface_height < scene.kappa
-    return a * (1.0 + AT_JOINT) if creeps else a
+    creeps = scatter.landing is None and 0.0 < 2.0 * scene.surface_height < scene.kappa
+    return a * (1.0 + AT_JOINT) if creeps and not hasattr(still_map(scene), "bare") else a
 
 
 def trials_within(end: ArmEnd, scatter: Scattering, most: int, throws: float, *, seed: int = 0) -> int:
@@ -121,7 +120,7 @@ def run_trials(
     count: int,
     *,
     seed: int = 0,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Trials:
     """Throw parts from random starts until each has met its fate.
 
@@ -148,50 +147,34 @@ def run_trials(
     throws = np.full(count, MOST_THROWS, dtype=np.int64)
     beyond = np.zeros(count, dtype=bool)
     drawn = 0
+    a, right = end.scene.sides.a, end.scene.sides.right
     for first in range(0, count, BLOCK):
-        here = slice(first, min(first + BLOCK, count))
-        many = ManyParts(params, *end.drawn(random, here.stop - first), drawn)
-        for waiting in _to_their_fates(end, many, creeping, fate[here], throws[here], beyond[here]):
-            if progress is not None:
-                progress("trials", here.stop - waiting, count)
+        last = min(first + BLOCK, count)
+        waiting = np.arange(first, last)
+        many = ManyParts(params, *end.drawn(random, waiting.size), drawn)
+        for number in range(1, MOST_THROWS + 1):
+            (progress or silent)("trials", last - waiting.size, count)
+            edge = end.at_edge(many.x, many.side)
+            code = many.throw()
+            # a jog lands on the left corner of its side, a flip on the right corner of the next one
+            corner = many.x + np.where(code == 0, -a[many.side], right[many.side])
+            beyond[waiting] |= ((code == 0) | (code == 1)) & (corner > end.x) & ~edge
+            met = np.where(code < 0, FATES.index("left"), end.fate(many.x, many.side))
+            met = np.where((met < 0) & (many.x < creeping[many.side]), NEVER, met)
+            met[edge] = FATES.index("edge")
+            done = met >= 0
+            fate[waiting[done]], throws[waiting[done]] = met[done], number
+            many.keep(~done)
+            waiting = waiting[~done]
+            if not waiting.size:
+                break
         drawn = many.drawn
     return Trials(fate, throws, beyond, seed)
-
-
-def _to_their_fates(
-    end: ArmEnd,
-    many: ManyParts,
-    creeping: NDArray[np.float64],
-    fate: NDArray[np.int64],
-    throws: NDArray[np.int64],
-    beyond: NDArray[np.bool_],
-) -> Iterator[int]:
-    """Throw parts until each has met its fate, and fill in what is asked of each; before every throw, how many wait."""
-    waiting = np.arange(fate.size)
-    a, right = end.scene.sides.a, end.scene.sides.right
-    for number in range(1, MOST_THROWS + 1):
-        yield waiting.size
-        edge = end.at_edge(many.x, many.side)
-        code = many.throw()
-        # a jog lands on the left corner of its side, a flip on the right corner of the next one
-        corner = many.x + np.where(code == 0, -a[many.side], right[many.side])
-        beyond[waiting] |= ((code == 0) | (code == 1)) & (corner > end.x) & ~edge
-        met = np.where(code < 0, FATES.index("left"), end.fate(many.x, many.side))
-        met = np.where((met < 0) & (many.x < creeping[many.side]), NEVER, met)
-        met[edge] = FATES.index("edge")
-        done = met >= 0
-        fate[waiting[done]], throws[waiting[done]] = met[done], number
-        many.keep(~done)
-        waiting = waiting[~done]
-        if not waiting.size:
-            break
 
 
 # ----------------------------------------------------------------
 # Shares of all fates among parts that were thrown, throw by throw; the noise that is too much.
 
-
-Progress = Callable[[str, int, int], None]
 
 # Factors on the noise of the curve; the speed's deviation stays above this share of the speed, backwards.
 FACTORS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
@@ -238,7 +221,7 @@ class FedShares:
         }
 
     @cached_property
-    def by_throw(self) -> NDArray[np.float64]:
+    def by_throw(self) -> Array:
         """Share that meets each fate of `FATES` but the last, at each throw from the first, shape (n, 5)."""
         fates = len(FATES) - 1
         ended = self.trials.fate < fates
@@ -252,12 +235,12 @@ class FedShares:
         return self.shares["never"]
 
     @cached_property
-    def _ended(self) -> NDArray[np.int64]:
+    def _ended(self) -> Ints:
         """How many have ended, by whatever fate, after each number of throws from 0 on."""
         return np.cumsum(np.bincount(self.trials.throws[self.trials.fate < len(FATES) - 1], minlength=1))
 
     @property
-    def ended(self) -> NDArray[np.float64]:
+    def ended(self) -> Array:
         """Share that has ended, by whatever fate, after each number of throws from 0 on."""
         return self._ended / self.trials.fate.size
 
@@ -296,8 +279,8 @@ class Curve:
         noise.
     """
 
-    factors: NDArray[np.float64]
-    right: NDArray[np.float64]
+    factors: Array
+    right: Array
     wanted: float
     level: tuple[float, float] | None
 
@@ -346,10 +329,9 @@ def success_curve(
     """
     reach = 0.0 if scatter.speed is None else scatter.speed.strata(2).lo
     possible = [factor for factor in factors if factor * reach > BACKWARDS]
-    tell = progress or (lambda stage, done, of: None)
 
     def right(factor: float, of: float = 1.0) -> float:
-        tell("noise levels", len(known), len(possible) + 2 * HALVINGS)
+        (progress or silent)("noise levels", len(known), len(possible) + 2 * HALVINGS)
         noise = scatter.scaled(factor)
         count = trials_within(end, noise, max(int(of * parts), 1), of * THROWS, seed=seed)
         made = run_trials(end, noise, count, seed=seed).counts
@@ -374,5 +356,4 @@ def success_curve(
             middle = 0.5 * (ends[0] + ends[1])
             right(middle)
             ends[int(known[middle][end_of] <= wanted)] = middle
-    level = (between[0][0], between[1][1])
-    return Curve(np.array(possible), np.array(shares), wanted, level)
+    return Curve(np.array(possible), np.array(shares), wanted, ((between[0][0], between[1][1])))

@@ -5,11 +5,17 @@ follows one depression pass by pass, and keeps its passes for a film.  `pouring`
 depressions at once.  `filling` says what follows for n passes (`limitsets.tray`).
 """
 
-from limitsets.cell.trays.filling import Chain as Chain
-from limitsets.cell.trays.filling import TrayFill as TrayFill
-from limitsets.cell.trays.filling import tray as tray
-from limitsets.cell.trays.passing import Histories as Histories
-from limitsets.cell.trays.passing import Passes as Passes
-from limitsets.cell.trays.passing import filmed as filmed
-from limitsets.cell.trays.pouring import Pouring as Pouring
-from limitsets.cell.trays.pouring import TrayCrowd as TrayCrowd
+from limitsets.cell.trays.filling import Chain, TrayFill, tray
+from limitsets.cell.trays.passing import Histories, Passes, filmed
+from limitsets.cell.trays.pouring import Pouring, TrayCrowd
+
+__all__ = [
+    "Chain",
+    "Histories",
+    "Passes",
+    "Pouring",
+    "TrayCrowd",
+    "TrayFill",
+    "filmed",
+    "tray",
+]

@@ -6,29 +6,35 @@ import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.campaign import TrialFile, complete
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table
-from limitsets.base.progress import shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    picked,
+    shown_in_notebooks,
+)
+from limitsets.base.arrays import Array
+from limitsets.base.campaign import finished_trials
 from limitsets.cell.trays.passing import (
     Counts,
     Histories,
     Passes,
-    Progress,
     count,
-    histories,
     passes_of,
     random_of,
 )
-from limitsets.cell.trays.pouring import Pouring, TrayCrowd, crowds_of, made
+from limitsets.cell.trays.passing import histories as histories_of
+from limitsets.cell.trays.pouring import Pouring, TrayCrowd, crowds_of
 from limitsets.feeder.scene import Scene, load
 from limitsets.parameters.noise.sampling import require_seed
 
@@ -40,8 +46,6 @@ from limitsets.parameters.noise.sampling import require_seed
 # and leaves all others as they are.  The chain has no memory but its state: `histories` asks whether a depression
 # has.
 
-
-Array = NDArray[np.float64]
 
 # Passes after which nothing changes any more: 2 to this power.
 ENDLESS = 40
@@ -81,10 +85,7 @@ class Chain:
         step = self.passed
         now = np.zeros((*step.shape[:-2], 1, step.shape[-1]))
         now[..., 0] = 1.0
-        rows = [now]
-        for _ in range(passes):
-            rows.append(rows[-1] @ step)
-        return np.concatenate(rows, axis=-2)
+        return np.concatenate([*accumulate([step] * passes, np.matmul, initial=now)], axis=-2)
 
     def of_many(self, each: float) -> Chain:
         """Give the chain of passes in which so many parts come by, one after the other.
@@ -122,23 +123,18 @@ class Chain:
         return np.asarray(watched[..., 0, 1]), np.asarray(watched[..., 1, 0])
 
 
-def chain_of(counts: Counts) -> Chain:
-    """Give the chain with the counted shares; only states that came about are in it."""
-    return _chain(counts, *_met(counts))
+def chain_of(counts: Counts, captured: Array | None = None, kicked: Array | None = None) -> Chain:
+    """Give the chain with the counted shares, or others; only states that came about are in it.
 
-
-def _met(counts: Counts) -> tuple[Array, Array]:
+    The empty depression stays empty under a kick.
+    """
     at = [0, *counts.met]
-    return counts.captured[at].astype(np.float64), counts.kicked[np.ix_(at, at)].astype(np.float64)
-
-
-def _chain(counts: Counts, captured: Array, kicked: Array) -> Chain:
-    """Normalise rows; the empty depression stays empty under a kick."""
-    rows = np.array(kicked)
+    came = counts.captured[at].astype(np.float64) if captured is None else captured
+    rows = counts.kicked[np.ix_(at, at)].astype(np.float64) if kicked is None else kicked
     rows[..., 0, :] = 0.0
     rows[..., 0, 0] = 1.0
     rows /= rows.sum(axis=-1, keepdims=True)
-    return Chain(captured / captured.sum(axis=-1, keepdims=True), rows, 1 + counts.met.index(counts.right))
+    return Chain(came / came.sum(axis=-1, keepdims=True), rows, 1 + counts.met.index(counts.right))
 
 
 def drawn_chains(counts: Counts, random: np.random.Generator, draws: int = DRAWS) -> Chain:
@@ -146,10 +142,10 @@ def drawn_chains(counts: Counts, random: np.random.Generator, draws: int = DRAWS
 
     That is a Bayesian bootstrap with Perks's prior; a plain one would never draw what was not counted.
     """
-    captured, kicked = _met(counts)
-    more = 1.0 / captured.size
-    rows = np.stack([random.dirichlet(row + more, draws) for row in kicked], axis=-2)
-    return _chain(counts, random.dirichlet(captured + more, draws), rows)
+    at = [0, *counts.met]
+    more = 1.0 / len(at)
+    rows = np.stack([random.dirichlet(row + more, draws) for row in counts.kicked[np.ix_(at, at)]], axis=-2)
+    return chain_of(counts, random.dirichlet(counts.captured[at] + more, draws), rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,15 +204,10 @@ class Filled:
 
     def to_json(self) -> dict[str, Any]:
         """Give the numbers as JSON takes them."""
-        names = self.states
+        by_state = picked(self, "last", "last_interval", "stays")
         return as_table(
-            right=self.right,
-            interval=self.interval,
-            wrong=self.wrong,
-            wrong_interval=self.wrong_interval,
-            last=dict(zip(names, self.last.tolist(), strict=True)),
-            last_interval=dict(zip(names, self.last_interval.tolist(), strict=True)),
-            stays=dict(zip(names, self.stays.tolist(), strict=True)),
+            **picked(self, "right", "interval", "wrong", "wrong_interval"),
+            **{name: dict(zip(self.states, values, strict=True)) for name, values in by_state.items()},
             unfilled=self.unfilled,
             rest={
                 "p_capture": self.capture,
@@ -326,14 +317,10 @@ class TrayFill(Tabled):
         filled, counts = self.filled, self.counts
         numbers = [0, *counts.met]
         came = counts.captured[numbers] / max(int(counts.captured.sum()), 1)
-        rows = []
-        for k, (number, name) in enumerate(zip(numbers, filled.states, strict=True)):
-            kept = counts.kicked[number]
-            stays = float(kept[number] / kept.sum()) if number else None
-            word = f"{name}: right" if k == filled.number else name
-            rows.append(
-                (word, float(came[k]), stays, float(filled.last[k]), filled.last_interval[k].tolist())
-            )
+        names = (f"{name}: right" if k == filled.number else name for k, name in enumerate(filled.states))
+        stays = (counts.kicked[k][k] / counts.kicked[k].sum() for k in numbers[1:])
+        values = (came.tolist(), [None, *stays], filled.last.tolist(), filled.last_interval.tolist())
+        rows = list(zip(names, *values, strict=True))
         columns = (
             "a depression",
             Column("after a part came by", show=".4f"),
@@ -344,15 +331,14 @@ class TrayFill(Tabled):
         return Table(columns, rows, "States of a depression", COUNTED)
 
     def _at_once(self) -> Table:
-        rows = []
-        for crowd in self.crowds:
-            shares = [crowd.share(counts) for counts in (crowd.right, crowd.covered, crowd.wrong)]
-            ends = [(float(share[-1]), ends[-1].tolist()) for share, ends in shares]
-            cost = 1e3 * crowd.seconds / max(crowd.moved, 1)
-            rows.append((crowd.words, *(value for pair in ends for value in pair), cost))
         columns: list[str | Column] = ["parts"]
+        rows: list[list[Any]] = [[crowd.words] for crowd in self.crowds]
         for name in ("right", "covered", "wrong"):
             columns += [Column(name, show=".4f"), Column(f"{name}: 95 % interval", show=".4f", ends=True)]
+            for row, crowd in zip(rows, self.crowds, strict=True):
+                row += [values[-1].tolist() for values in crowd.share(getattr(crowd, name))]
+        for row, crowd in zip(rows, self.crowds, strict=True):
+            row.append(1e3 * crowd.seconds / max(crowd.moved, 1))
         crowd = self.crowds[0]
         passes = crowd.right.shape[1] - 1
         title = f"{crowd.parts} parts at once over {crowd.depressions} depressions, after {passes} passes"
@@ -469,29 +455,16 @@ def tray(
     pouring = None if parts is None else Pouring(asked, parts, depressions or 0, passes, seed)
     kicks = max(drops // 2, 1) if kicks is None else kicks
     counted = count(asked, drops, kicks, seed, executor=executor, progress=progress)
-    follow = (False, True) if histories else ()
     followed = tuple(
-        _followed(asked, histories, passes, seed=seed, returning=back, executor=executor, progress=progress)
-        for back in follow
+        histories_of(asked, histories, passes, seed, returning=back, executor=executor, progress=progress)
+        for back in ((False, True) if histories else ())
     )
     chances = filled(counted, passes, random_of(seed, INTERVALS))
     answer = TrayFill(read, asked, counted, chances, followed, seed)
     if pouring is None:
         return answer
-    kept = TrialFile(None if file is None else Path(file), pouring.question(), batches, 1)
     name = f"{pouring.parts} parts at once"
-    complete(kept, made, (pouring,), name, "batches", executor=executor, workers=workers, progress=progress)
+    where: dict[str, Any] = {"file": file, "executor": executor, "workers": workers, "progress": progress}
+    rows = finished_trials(pouring, batches, 1, name, "batches", **where)
     chain = filled(counted, passes, random_of(seed, INTERVALS), pouring.parts / pouring.depressions)
-    return replace(answer, crowds=crowds_of(pouring, tuple(kept)), crowd_chain=chain)
-
-
-def _followed(
-    asked: Passes,
-    number: int,
-    passes: int,
-    seed: int,
-    returning: bool,
-    executor: Executor | None,
-    progress: Progress | None,
-) -> Histories:
-    return histories(asked, number, passes, seed, returning=returning, executor=executor, progress=progress)
+    return replace(answer, crowds=crowds_of(pouring, rows), crowd_chain=chain)

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from itertools import chain, islice
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table
+from limitsets.base import AnswerError, Progress, as_table
+from limitsets.base.arrays import Array, Ints
+from limitsets.base.campaign import in_order
 from limitsets.feeder.engine.depression import EMPTY, UNFINISHED, Motion, Plate, Pose, Rest, fall_speed
 from limitsets.feeder.engine.member import Mark, Recording
-from limitsets.feeder.scene import Scene
+from limitsets.feeder.scene import Scene, Tray
 from limitsets.feeder.scene.scene import require_rests
 from limitsets.feeder.scene.surroundings import heights_over_sides
 from limitsets.parameters.noise.sampling import binomial_interval
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Tray
 
 
 def random_of(seed: int, *number: int) -> np.random.Generator:
@@ -67,14 +66,9 @@ class Passes:
         flush = (f"side {i}" for i in range(count))
         return "empty", *flush, *(f"leaning, vertex {k} lowest" for k in range(count))
 
-    @property
-    def kick_speed(self) -> float:
-        """Standard deviation of a kick's velocity [length per unit of time]."""
-        return fall_speed(self.plate.size, self.tray.agitation)
-
     def kick(self, random: np.random.Generator) -> Motion:
         """Draw what a kick of the plate does to a part at rest."""
-        up, turning = random.normal(0.0, self.kick_speed, 2).tolist()
+        up, turning = random.normal(0.0, fall_speed(self.plate.size, self.tray.agitation), 2).tolist()
         along = random.uniform(0.0, fall_speed(self.plate.size, self.tray.wash))
         return Motion(along, abs(up), turning / self.plate.size)
 
@@ -86,14 +80,13 @@ class Passes:
 
     def again(self, pose: Pose, random: np.random.Generator) -> tuple[Pose, Motion]:
         """Draw how a part that lies on the plate comes by: kicked and washed on, the next depression being equal."""
-        x = math.remainder(pose.x, self.tray.pitch)
-        return Pose(x, pose.y, pose.angle), self.kick(random)
+        return Pose(math.remainder(pose.x, self.tray.pitch), pose.y, pose.angle), self.kick(random)
 
     def to_json(self) -> dict[str, Any]:
         """Give what was drawn, and with which contact."""
         plate = self.plate
         return as_table(
-            **{name: getattr(self.tray, name) for name in self.tray.__dataclass_fields__},
+            **vars(self.tray),
             friction=plate.friction,
             restitution=plate.restitution,
             contact="unilateral",
@@ -109,37 +102,34 @@ def passes_of(scene: Scene, side: int | None, step: float) -> Passes:
     AnswerError
         No [tray], no effects.contact, no friction or restitution, or a side the part has not.
     """
-
-    def refuse(thing: str, value: object, allowed: str, remedy: str, key: str) -> AnswerError:
-        return AnswerError(thing, value, allowed, remedy, key=key, file=scene.file)
-
+    refuse = functools.partial(AnswerError, file=scene.file)
     tray = scene.tray
     if tray is None:
         require_rests(scene)
         remedy = "add [tray] with depression_width, depression_depth, pitch, agitation and wash"
-        raise refuse("the scene", "without [tray]", "one with a tray", remedy, "tray")
+        raise refuse("the scene", "without [tray]", "one with a tray", remedy, key="tray")
     if not scene.effects.contact:
         remedy = "a part in a depression touches its walls: write contact = true in [effects]"
-        raise refuse("contact", None, "true", remedy, "effects.contact")
+        raise refuse("contact", None, "true", remedy, key="effects.contact")
     facts = {"friction": scene.world.friction, "restitution": scene.world.restitution}
     for name, given in facts.items():
         if given is None:
             remedy = f"the engine needs it: add {name} to [world]"
-            raise refuse(f"the {name}", None, "a number from 0", remedy, f"world.{name}")
+            raise refuse(f"the {name}", None, "a number from 0", remedy, key=f"world.{name}")
     wanted = getattr(scene.goal, "side", None) if side is None else side
     if wanted is None or not 0 <= wanted < len(scene.sides):
         allowed = f"0 to {len(scene.sides) - 1}"
         remedy = "pass side= (--side), or give the scene a goal with a side"
-        raise refuse("the side wanted", wanted, allowed, remedy, "goal")
+        raise refuse("the side wanted", wanted, allowed, remedy, key="goal")
     if tray.depression_width < scene.sides.length[wanted]:
         allowed = f"at least {scene.sides.length[wanted]:.6g} {scene.unit}, the length of side {wanted}"
         remedy = "the part cannot lie in it: widen it"
-        raise refuse("the width", tray.depression_width, allowed, remedy, "tray.depression_width")
+        raise refuse("the width", tray.depression_width, allowed, remedy, key="tray.depression_width")
     height = heights_over_sides([(float(x), float(y)) for x, y in scene.vertices])[wanted]
     if tray.depression_depth >= height:
         allowed = f"below {height:.6g} {scene.unit}, the height of the part on side {wanted}"
         remedy = "the depression is deeper than the part, and nothing would pop out: make it less deep"
-        raise refuse("the depth", tray.depression_depth, allowed, remedy, "tray.depression_depth")
+        raise refuse("the depth", tray.depression_depth, allowed, remedy, key="tray.depression_depth")
     if not 0.0 < step <= 0.02:
         raise AnswerError("the engine's step", step, "above 0 and at most 0.02", "pass step=4e-3")
     friction, restitution = float(facts["friction"] or 0.0), float(facts["restitution"] or 0.0)
@@ -150,8 +140,6 @@ def passes_of(scene: Scene, side: int | None, step: float) -> Passes:
 # ----------------------------------------------------------------
 # What a depression does with parts that come by and with kicks, counted in the engine.
 
-
-Progress = Callable[[str, int, int], None]
 
 # Trials of one task, and the streams of random numbers: a part that comes by; from here on kicks, by state.
 BLOCK, ARRIVALS, KICKS = 50, 0, 1
@@ -179,8 +167,8 @@ class Counts:
 
     states: tuple[str, ...]
     right: int
-    captured: NDArray[np.int64]
-    kicked: NDArray[np.int64]
+    captured: Ints
+    kicked: Ints
     unfinished: int
     poses: dict[int, Pose]
 
@@ -194,16 +182,19 @@ class Counts:
         names = ["empty", *(self.states[k] for k in self.met)]
         numbers = [EMPTY, *self.met]
 
-        def row(counts: NDArray[np.int64]) -> dict[str, Any]:
-            of_fate, of = (
-                {name: int(counts[k]) for name, k in zip(names, numbers, strict=True)},
-                int(counts.sum()),
-            )
-            intervals = {name: binomial_interval(n, of) if of else (0.0, 1.0) for name, n in of_fate.items()}
+        def row(counts: Ints) -> dict[str, Any]:
+            of_fate = dict(zip(names, counts[numbers].tolist(), strict=True))
+            of = int(counts.sum())
+            intervals = {name: _interval(n, of) for name, n in of_fate.items()}
             return {"counts": of_fate, "of": of, "intervals": intervals}
 
         kicked = {self.states[k]: row(self.kicked[k]) for k in self.met}
         return as_table(arrivals=row(self.captured), kicks=kicked, unfinished=self.unfinished)
+
+
+def _interval(count: int, of: int) -> tuple[float, float]:
+    """Give the interval of a share; all of it where nothing was counted."""
+    return binomial_interval(count, of) if of else (0.0, 1.0)
 
 
 def _arrivals(passes: Passes, seed: int, numbers: Sequence[int]) -> list[Rest]:
@@ -216,35 +207,24 @@ def _kicks(
     passes: Passes, seed: int, state: int, poses: Sequence[Pose], numbers: Sequence[int]
 ) -> list[Rest]:
     """Kick parts that lie in a depression, each as one of those that came to lie so."""
-    rests = []
-    for k in numbers:
-        motion = passes.kick(random_of(seed, KICKS + state, k))
-        rests.append(passes.plate.settle(poses[k % len(poses)], motion))
-    return rests
-
-
-def spread_over(
-    executor: Executor | None, task: Callable[[Any], list[Any]], blocks: Iterable[Any]
-) -> Iterable[Any]:
-    """Run a task on blocks, here or by an executor, and give the answers in the order of the blocks."""
-    return map(task, blocks) if executor is None else executor.map(task, blocks)
+    motions = (passes.kick(random_of(seed, KICKS + state, k)) for k in numbers)
+    return [
+        passes.plate.settle(poses[k % len(poses)], motion) for k, motion in zip(numbers, motions, strict=True)
+    ]
 
 
 def _run(
+    step: str,
     task: Callable[[Any], list[Rest]],
     trials: int,
     executor: Executor | None,
-    advance: Callable[[int], None],
+    progress: Progress | None,
 ) -> list[Rest]:
     blocks = [range(lo, min(lo + BLOCK, trials)) for lo in range(0, trials, BLOCK)]
-    rests: list[Rest] = []
-    for block_rests in spread_over(executor, task, blocks):
-        rests += block_rests
-        advance(len(rests))
-    return rests
+    return [*chain.from_iterable(in_order(step, task, blocks, executor, progress))]
 
 
-def _tally(rests: Sequence[Rest], states: int, which: str) -> NDArray[np.int64]:
+def _tally(rests: Sequence[Rest], states: int, which: str) -> Ints:
     """Count states; without any the chain would have a row of nothing."""
     done = [rest.state for rest in rests if rest.state != UNFINISHED]
     if not done:
@@ -275,11 +255,7 @@ def count(
     if drops < 1 or kicks < 1:
         raise AnswerError("the drops and kicks", (drops, kicks), "1 or more", "let some parts fall")
     states = len(passes.states)
-
-    def reporter(stage: str, of: int) -> Callable[[int], None]:
-        return lambda done: None if progress is None else progress(stage, min(done, of - 1), of)
-
-    rests = _run(functools.partial(_arrivals, passes, seed), drops, executor, reporter("drops", drops))
+    rests = _run("drops", functools.partial(_arrivals, passes, seed), drops, executor, progress)
     captured = _tally(rests, states, "that came by")
     kicked = np.zeros((states, states), dtype=np.int64)
     poses: dict[int, list[Pose]] = {passes.right: []}
@@ -292,7 +268,7 @@ def count(
     while waiting:
         state = waiting.pop(0)
         task = functools.partial(_kicks, passes, seed, state, poses[state])
-        after = _run(task, kicks, executor, reporter(f"kicks, {passes.states[state]}", kicks))
+        after = _run(f"kicks, {passes.states[state]}", task, kicks, executor, progress)
         kicked[state] = _tally(after, states, f"kicked from {passes.states[state]}")
         every += after
         fresh: dict[int, list[Pose]] = {}
@@ -314,8 +290,6 @@ def count(
 FRESH, RETURNING = 10_001, 10_002
 # So many past misses are told apart.
 PAST = 3
-
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,7 +313,7 @@ class Histories:
     right: int
 
     @property
-    def filled(self) -> NDArray[np.float64]:
+    def filled(self) -> Array:
         """Fraction filled rightly after 0, 1, ... passes, shape (passes + 1,)."""
         return np.concatenate([[0.0], (self.after_pass == self.right).mean(axis=0)])
 
@@ -377,10 +351,7 @@ class Histories:
         """Give the numbers as JSON takes them."""
 
         def table(counts: list[tuple[int, int]]) -> list[dict[str, Any]]:
-            return [
-                {"count": n, "of": of, "interval": binomial_interval(n, of) if of else (0.0, 1.0)}
-                for n, of in counts
-            ]
+            return [{"count": n, "of": of, "interval": _interval(n, of)} for n, of in counts]
 
         return as_table(
             histories=self.after_pass.shape[0],
@@ -393,32 +364,39 @@ class Histories:
         )
 
 
-def _history(
-    passes: Passes, count: int, seed: int, returning: bool, numbers: Sequence[int]
-) -> list[list[tuple[int, int]]]:
-    """Follow depressions from empty ones: states after kick and pass."""
-    chains = []
-    for number in numbers:
-        random = random_of(seed, RETURNING if returning else FRESH, number)
-        state, pose, on_plate, rows = EMPTY, Pose(0.0, 0.0, 0.0), None, []
-        for _ in range(count):
-            if state > EMPTY:
-                rest = passes.plate.settle(pose, passes.kick(random))
-                state, pose = rest.state, rest.pose
-                # what popped out is washed on with the parts that pass; it does not come by again in this pass
-            after_kick = state
-            if state == EMPTY:
-                again = on_plate is not None and returning
-                came = passes.again(on_plate, random) if again and on_plate else passes.arrival(random)
-                rest = passes.plate.settle(*came)
-                state, pose = rest.state, rest.pose
-                on_plate = pose if state == EMPTY and rest.side >= 0 else None
-            rows.append((after_kick, state))
-            if state == UNFINISHED:
-                rows += [(UNFINISHED, UNFINISHED)] * (count - len(rows))
-                break
-        chains.append(rows)
-    return chains
+def _pass_by_pass(
+    passes: Passes, random: np.random.Generator, returning: bool, settle: Callable[[Pose, Motion, bool], Rest]
+) -> Iterator[tuple[int, int]]:
+    """Follow a depression from an empty one: states after the kick and after the part that came by, without end.
+
+    `settle` lets a part move to rest, and is told whether it was kicked or came by.
+    """
+    state, pose, on_plate = EMPTY, Pose(0.0, 0.0, 0.0), None
+    while True:
+        if state != EMPTY:
+            # what pops out is washed on with the parts that pass; it does not come by again in this pass
+            pose, state, *_ = settle(pose, passes.kick(random), True)
+        after_kick = state
+        if state == EMPTY:
+            came = passes.again(on_plate, random) if on_plate and returning else passes.arrival(random)
+            rest = settle(*came, False)
+            state, pose = rest.state, rest.pose
+            on_plate = pose if state == EMPTY and rest.side >= 0 else None
+        yield after_kick, state
+
+
+def _history(passes: Passes, count: int, seed: int, returning: bool, number: int) -> list[tuple[int, int]]:
+    """Follow a depression: its states after each kick and pass, those of a part that does not rest from there on."""
+    random = random_of(seed, RETURNING if returning else FRESH, number)
+    rows: list[tuple[int, int]] = []
+    settled = _pass_by_pass(
+        passes, random, returning, lambda pose, motion, _: passes.plate.settle(pose, motion)
+    )
+    for row in islice(settled, count):
+        rows.append(row)
+        if row[1] == UNFINISHED:
+            break
+    return rows + [(UNFINISHED, UNFINISHED)] * (count - len(rows))
 
 
 def histories(
@@ -448,11 +426,7 @@ def histories(
         As in `limitsets.tray`.
     """
     task = functools.partial(_history, passes, count, seed, returning)
-    rows: list[list[tuple[int, int]]] = []
-    for block in spread_over(executor, task, [[k] for k in range(number)]):
-        if progress is not None:
-            progress("histories", len(rows), number)
-        rows += block
+    rows = in_order("histories", task, range(number), executor, progress)
     table = np.array(rows, dtype=np.int64).reshape(number, count, 2)
     return Histories(table[..., 0].copy(), table[..., 1].copy(), returning, passes.right)
 
@@ -514,31 +488,27 @@ def filmed(
     every = max(round(1.0 / (FRAMES * step)), 1)
     frames: list[tuple[float, int, Pose]] = []
     marks: list[Mark] = []
-    start, parts, state, pose = 0.0, 0, EMPTY, Pose(0.0, 0.0, 0.0)
+    start, parts = 0.0, 0
 
-    def move(part: int, pose: Pose, motion: Motion) -> Rest:
+    def move(pose: Pose, motion: Motion, kicked: bool) -> Rest:
         """Let a part move to rest; what is kept begins where the last motion ended."""
-        nonlocal start
-        kept: list[tuple[float, Pose]] = []
+        nonlocal start, parts
+        parts += not kicked
+        part, kept = parts - 1, list[tuple[float, Pose]]()
+        if kicked:
+            marks.append((start, part, "thrown"))
         rest = plate.settle(pose, motion, lambda time, now, _: kept.append((time, now)))
-        last = rest.time
-        shown = [*kept[::every], (last, rest.pose)]
+        shown = [*kept[::every], (rest.time, rest.pose)]
         frames.extend((start + unit * time, part, now) for time, now in shown)
-        start += unit * last
+        start += unit * rest.time
         marks.append((start, part, "rest"))
         start += unit * step
+        if rest.state == EMPTY or not kicked:
+            missed = "ejected" if kicked else "lost"
+            marks.append((start, part, missed if rest.state == EMPTY else "in the cavity"))
         return rest
 
-    for _ in range(passes):
-        if state != EMPTY:
-            marks.append((start, parts - 1, "thrown"))
-            pose, state, *_ = move(parts - 1, pose, asked.kick(random))
-            if state == EMPTY:
-                marks.append((start, parts - 1, "ejected"))
-        if state == EMPTY:
-            parts += 1
-            pose, state, *_ = move(parts - 1, *asked.arrival(random))
-            marks.append((start, parts - 1, "lost" if state == EMPTY else "in the cavity"))
+    deque(islice(_pass_by_pass(asked, random, False, move), passes), maxlen=0)
     times = np.array([time for time, _, _ in frames])
     poses = np.full((times.size, parts, 3), np.nan)
     for number, (_, part, now) in enumerate(frames):

@@ -9,22 +9,17 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base import AnswerError, as_table, picked
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.campaign import Row
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, code_digest
 from limitsets.cell.trays.passing import Passes, random_of
-from limitsets.feeder.engine import Crowd
+from limitsets.feeder.engine import Crowd, Recording
 from limitsets.feeder.engine.depression import EMPTY, FAR, Motion, Pose, state_of
 from limitsets.parameters.noise.sampling import binomial_interval
-
-if TYPE_CHECKING:
-    from limitsets.feeder.engine.member import Recording
-
 
 # The stream of random numbers, beside those of `histories` and `filming`.
 CROWD = 10_004
@@ -60,11 +55,10 @@ class Pouring:
     def question(self) -> dict[str, Any]:
         """Give what is asked, for the file of the batches."""
         return {
-            "limitsets": code_digest(),
             "scene": self.asked.plate.part.as_dict(),
             "side": self.asked.side,
             "step": self.asked.plate.step,
-            **{name: getattr(self, name) for name in ("parts", "depressions", "passes", "seed")},
+            **picked(self, "parts", "depressions", "passes", "seed"),
         }
 
     def row(self, number: int) -> Row:
@@ -99,11 +93,6 @@ class Pouring:
             tray.kick(random)
             tray.pour(first, came)
         return tray
-
-
-def made(pouring: Pouring, number: int) -> list[tuple[int, Row]]:
-    """Make a batch: what a worker does."""
-    return [(number, pouring.row(number))]
 
 
 class _Strewn:
@@ -211,10 +200,6 @@ def _box(corners: Sequence[tuple[float, float]]) -> tuple[float, float, float, f
 # Many parts on a tray at once, counted: fractions of the depressions, pass by pass, and what they cost.
 
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-
 @dataclass(frozen=True, eq=False)
 class TrayCrowd:
     """How depressions fill by which many parts come at once; counted.
@@ -246,7 +231,7 @@ class TrayCrowd:
     right: Ints
     covered: Ints
     wrong: Ints
-    met: NDArray[np.bool_]
+    met: Mask
     unfinished: int
     moved: int
     seconds: float
@@ -296,24 +281,20 @@ class TrayCrowd:
 
 def crowds_of(pouring: Pouring, rows: Sequence[Row]) -> tuple[TrayCrowd, ...]:
     """Count batches: of parts that push each other, and of parts that pass through each other."""
-    crowds = []
-    for name in ("pushing", "passing"):
-        kept = [row[name] for row in rows]
-        states = np.array([each["states"] for each in kept], dtype=np.int64)
-        right, covered, wrong = np.moveaxis(states, -1, 0)
-        crowds.append(
-            TrayCrowd(
-                pouring.parts,
-                pouring.depressions,
-                name == "pushing",
-                right=right,
-                covered=covered,
-                wrong=wrong,
-                met=np.array([each["met"] for each in kept]),
-                unfinished=sum(each["unfinished"] for each in kept),
-                moved=sum(each["moved"] for each in kept),
-                seconds=sum(each["seconds"] for each in kept),
-                seed=pouring.seed,
-            )
-        )
-    return tuple(crowds)
+    return tuple(_crowd_of(pouring, [row[name] for row in rows], name) for name in ("pushing", "passing"))
+
+
+def _crowd_of(pouring: Pouring, rows: Sequence[Row], name: str) -> TrayCrowd:
+    by_name = {key: [row[key] for row in rows] for key in rows[0]}
+    right, covered, wrong = np.moveaxis(np.array(by_name["states"], dtype=np.int64), -1, 0)
+    return TrayCrowd(
+        pouring.parts,
+        pouring.depressions,
+        name == "pushing",
+        right=right,
+        covered=covered,
+        wrong=wrong,
+        met=np.array(by_name["met"]),
+        **{key: sum(by_name[key]) for key in ("unfinished", "moved", "seconds")},
+        seed=pouring.seed,
+    )

@@ -26,7 +26,7 @@ from limitsets.face.cli.output import (
 )
 
 if TYPE_CHECKING:
-    from limitsets.base.campaign import Progress
+    from limitsets.base.progress import Progress
     from limitsets.parameters.atlas import Atlas
 
 

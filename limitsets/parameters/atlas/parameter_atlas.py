@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limitsets.base.arguments import arguments_checked
-from limitsets.base.campaign import Progress, Work, chosen_pool, drive, imported
+from limitsets.base.campaign import Work, chosen_pool, drive, imported
 from limitsets.base.errors import LimitsetsError, MapError
 from limitsets.base.files import as_plain, locked
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
@@ -326,8 +326,8 @@ def atlas(
         if kept < of:
             if executor is None and cluster is None and of > 1:
                 _require_importable(plan)
-            with chosen_pool(of, executor, cluster, workers) as pool:
-                drive(_work(plan), held, pool, progress)
+            with chosen_pool(of, executor, cluster, workers) as (pool, window):
+                drive(_work(plan), held, pool, window, progress)
     return Atlas(opened(held.group.store), path, of - kept, kept)
 
 

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
+from limitsets.base import AnswerError, as_table, picked
+from limitsets.base.arrays import Array
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.numbers import Numbers
 from limitsets.feeder.scene.quantities import base_unit
@@ -24,6 +23,7 @@ from limitsets.feeder.thrower import impact_angles
 from limitsets.feeder.thrower.flight import Turned
 from limitsets.feeder.thrower.impact import margin, strike
 from limitsets.feeder.thrower.params import FLIGHTS, FLIPS
+from limitsets.proofs.prover.numbers import Jet
 from limitsets.systems.cells import Domain
 from limitsets.systems.maps import critical_points
 from limitsets.systems.maps.critical import CriticalPoint, margins
@@ -35,91 +35,38 @@ from limitsets.systems.maps.critical import CriticalPoint, margins
 # derivatives up to rounding, without finite differences.
 
 
-Array = npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class MultiDual:
-    """A number that knows its derivatives.
-
-    Parameters
-    ----------
-    value : float
-        The number.
-    slope : ndarray, shape (k,)
-        Its derivatives with respect to k quantities.
+def multi_dual(value: float, slope: Array) -> Jet:
+    """Give a number that knows its derivatives with respect to k quantities.
 
     Examples
     --------
     >>> import numpy as np
-    >>> x, y = MultiDual(3.0, np.array([1.0, 0.0])), MultiDual(2.0, np.array([0.0, 1.0]))
-    >>> (x * y / (x + y)).slope
+    >>> x, y = multi_dual(3.0, np.array([1.0, 0.0])), multi_dual(2.0, np.array([0.0, 1.0]))
+    >>> slope_of(x * y / (x + y))
     array([0.16, 0.36])
     """
-
-    value: float
-    slope: Array
-
-    def __float__(self) -> float:
-        return self.value
-
-    def __neg__(self) -> MultiDual:
-        return MultiDual(-self.value, -self.slope)
-
-    def __add__(self, other: MultiDual | float) -> MultiDual:
-        if isinstance(other, MultiDual):
-            return MultiDual(self.value + other.value, self.slope + other.slope)
-        return MultiDual(self.value + other, self.slope)
-
-    __radd__ = __add__
-
-    def __sub__(self, other: MultiDual | float) -> MultiDual:
-        return self + -other
-
-    def __rsub__(self, other: float) -> MultiDual:
-        return -self + other
-
-    def __mul__(self, other: MultiDual | float) -> MultiDual:
-        if isinstance(other, MultiDual):
-            return MultiDual(self.value * other.value, self.value * other.slope + other.value * self.slope)
-        return MultiDual(self.value * other, self.slope * other)
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: MultiDual | float) -> MultiDual:
-        if isinstance(other, MultiDual):
-            quotient = self.value / other.value
-            return MultiDual(quotient, (self.slope - quotient * other.slope) / other.value)
-        return MultiDual(self.value / other, self.slope / other)
-
-    def __pow__(self, count: int) -> MultiDual:
-        return MultiDual(self.value**count, count * self.value ** (count - 1) * self.slope)
-
-    def __abs__(self) -> MultiDual:
-        return -self if self.value < 0.0 else self
-
-    def __gt__(self, other: float) -> bool:
-        return self.value > other
-
-    def __rtruediv__(self, other: float) -> MultiDual:
-        quotient = other / self.value
-        return MultiDual(quotient, -quotient / self.value * self.slope)
+    return Jet(value, (slope,))
 
 
-def square_root(x: MultiDual) -> MultiDual:
+def slope_of(x: Jet) -> Array:
+    """Return its derivatives, shape (k,)."""
+    return np.asarray(x.derivatives[0])
+
+
+def square_root(x: Jet) -> Jet:
     """Square root of a number above 0; that of 0 has no derivative."""
     root = math.sqrt(x.value)
-    return MultiDual(root, x.slope / (2.0 * root))
+    return multi_dual(root, slope_of(x) / (2.0 * root))
 
 
-def sine(x: MultiDual) -> MultiDual:
+def sine(x: Jet) -> Jet:
     """Sine of an angle [rad]."""
-    return MultiDual(math.sin(x.value), math.cos(x.value) * x.slope)
+    return multi_dual(math.sin(x.value), math.cos(x.value) * slope_of(x))
 
 
-def cosine(x: MultiDual) -> MultiDual:
+def cosine(x: Jet) -> Jet:
     """Cosine of an angle [rad]."""
-    return MultiDual(math.cos(x.value), -math.sin(x.value) * x.slope)
+    return multi_dual(math.cos(x.value), -math.sin(x.value) * slope_of(x))
 
 
 # ----------------------------------------------------------------
@@ -136,26 +83,27 @@ SMALL = 0.5
 
 
 class SideNumbers(NamedTuple):
-    """One side of a part, as `limitsets.parameters.design.derivatives.Seeded` holds it; named as in `params.Side`."""
+    """One side of a part, in the scene's unit; named as in `params.Side`."""
 
-    a: MultiDual
-    d: MultiDual
-    rho: MultiDual
-    kappa: MultiDual
-    h: MultiDual
+    a: Jet
+    d: Jet
+    length: Jet
+    rho: Jet
+    kappa: Jet
+    h: Jet
 
     @property
-    def ell(self) -> MultiDual:
+    def ell(self) -> Jet:
         """Distance of the centre of mass from the left vertex."""
         return square_root(self.a**2 + self.d**2)
 
     @property
-    def rho2(self) -> MultiDual:
+    def rho2(self) -> Jet:
         """Squared radius of gyration."""
         return self.rho**2
 
     @property
-    def inertia(self) -> MultiDual:
+    def inertia(self) -> Jet:
         """Moment of inertia about the left vertex, per mass."""
         return self.rho2 + self.a**2 + self.d**2
 
@@ -165,7 +113,7 @@ class DecidingNumber(NamedTuple):
 
     Parameters
     ----------
-    margin : MultiDual
+    margin : Jet
         Positive where the part flips; energies over m w^2 [length^2].
     size : float
         Size of the numbers of which it is the difference.
@@ -173,12 +121,12 @@ class DecidingNumber(NamedTuple):
         df/dphi at the impact, as a share of its two terms: 0 where the vertex only grazes the arm; -1 at small angles.
     """
 
-    margin: MultiDual
+    margin: Jet
     size: float
     steepness: float
 
 
-def decided(flight: str, flip: str, part: SideNumbers, x: MultiDual, phi: float) -> DecidingNumber:
+def decided(flight: str, flip: str, part: SideNumbers, x: Jet, phi: float) -> DecidingNumber:
     """Evaluate what decides for a throw from x that lands at phi.
 
     Parameters
@@ -187,20 +135,18 @@ def decided(flight: str, flip: str, part: SideNumbers, x: MultiDual, phi: float)
         The models, in a scene's words.
     part : SideNumbers
         The side it rests on.
-    x : MultiDual
+    x : Jet
         Where it rests [length].
     phi : float
         The impact angle to rounding [rad]; not used at small angles.
     """
-    steepness = -1.0
-    at = None
+    steepness, at = -1.0, None
     if flight == "exact":
         angle, steepness = _angle(part, x, phi)
         at = Turned(angle, sine(angle), 1.0 - cosine(angle), None)
     omega, barrier = strike(FLIGHTS[flight](), part, x, at)
-    decides: MultiDual = margin(FLIPS[flip](), part.inertia, omega, barrier)
-    kinetic = 0.5 * part.inertia.value * omega.value**2
-    return DecidingNumber(decides, kinetic + abs(barrier.value), steepness)
+    size = 0.5 * part.inertia.value * omega.value**2 + abs(barrier.value)
+    return DecidingNumber(margin(FLIPS[flip](), part.inertia, omega, barrier), size, steepness)
 
 
 def _short_of_arc(phi: float) -> float:
@@ -214,7 +160,7 @@ def _short_of_arc(phi: float) -> float:
     return total
 
 
-def _height(part: SideNumbers, x: MultiDual, phi: float) -> tuple[MultiDual, float, float]:
+def _height(part: SideNumbers, x: Jet, phi: float) -> tuple[Jet, float, float]:
     """Height of the left vertex over the arm, its derivative by phi, and the size of that one's terms."""
     s, v = math.sin(phi), 2.0 * math.sin(0.5 * phi) ** 2
     reach = x - part.a
@@ -224,7 +170,7 @@ def _height(part: SideNumbers, x: MultiDual, phi: float) -> tuple[MultiDual, flo
     return f, up - down, abs(up) + down
 
 
-def _angle(part: SideNumbers, x: MultiDual, phi: float) -> tuple[MultiDual, float]:
+def _angle(part: SideNumbers, x: Jet, phi: float) -> tuple[Jet, float]:
     """Return the impact angle with its derivatives, and how steeply the vertex comes down."""
     f, slope, size = _height(part, x, phi)
     for _ in range(STEPS_OF_ANGLE):
@@ -234,8 +180,8 @@ def _angle(part: SideNumbers, x: MultiDual, phi: float) -> tuple[MultiDual, floa
         phi -= step
         f, slope, size = _height(part, x, phi)
     if not slope < 0.0:
-        return MultiDual(phi, f.slope * math.nan), 0.0
-    return MultiDual(phi, -f.slope / slope), slope / size
+        return multi_dual(phi, slope_of(f) * math.nan), 0.0
+    return multi_dual(phi, -slope_of(f) / slope), slope / size
 
 
 # ----------------------------------------------------------------
@@ -290,7 +236,11 @@ def nearest_miss(scene: Scene, side: int, until: float) -> tuple[float, float] |
     share = np.linspace(0.0, 1.0, BELOW)
     even, graded = lo + (until - lo) * share, a + (lo - a) * ((until - a) / (lo - a)) ** share
     x = np.unique(np.clip(np.concatenate([even, graded]), lo, until))
-    values = _abs(scene, x, side)
+
+    def undrawn(at: Array) -> Array:
+        return np.abs(margins(scene.bare_map, at, side))
+
+    values = undrawn(x)
     here, higher = values[1:-1], np.maximum(values[:-2], values[2:])
     # a parabola through the three falls below the lowest by less than the highest stands above it
     dips = 1 + np.flatnonzero((here < values[:-2]) & (here <= values[2:]) & (here <= higher - here))
@@ -299,16 +249,12 @@ def nearest_miss(scene: Scene, side: int, until: float) -> tuple[float, float] |
     left, right = x[dips - 1], x[dips + 1]
     for _ in range(NARROWINGS):
         c, d = right - GOLDEN * (right - left), left + GOLDEN * (right - left)
-        lower = _abs(scene, c, side) < _abs(scene, d, side)
+        lower = undrawn(c) < undrawn(d)
         left, right = np.where(lower, left, c), np.where(lower, d, right)
     at = 0.5 * (left + right)
-    least = _abs(scene, at, side)
+    least = undrawn(at)
     k = int(least.argmin())
     return float(at[k]), float(least[k])
-
-
-def _abs(scene: Scene, x: npt.NDArray[np.float64], side: int) -> npt.NDArray[np.float64]:
-    return np.abs(margins(scene.bare_map, x, side))
 
 
 # ----------------------------------------------------------------
@@ -319,25 +265,6 @@ def _abs(scene: Scene, x: npt.NDArray[np.float64], side: int) -> npt.NDArray[np.
 
 
 SPEED, KAPPA = "throw.speed", "throw.kappa"
-
-
-class Seeded(NamedTuple):
-    """What the throw map depends on, in the scene's unit.
-
-    Parameters
-    ----------
-    a, d, length : list of MultiDual
-        Per side, in flip order (`limitsets.geometry.RestingSides`).
-    rho, kappa, h : MultiDual
-        Radius of gyration, gravity over squared speed, signed height of the arm's surface.
-    """
-
-    a: list[MultiDual]
-    d: list[MultiDual]
-    length: list[MultiDual]
-    rho: MultiDual
-    kappa: MultiDual
-    h: MultiDual
 
 
 def present(scene: Scene, name: str) -> float:
@@ -361,8 +288,8 @@ def _speed_is_open(scene: Scene, name: str) -> bool:
     return name == SPEED and scene.gravity is None
 
 
-def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Seeded:
-    """Read a scene's numbers with their derivatives.
+def sides_of(scene: Scene, names: Sequence[str], before: int = 0) -> list[SideNumbers]:
+    """Read the numbers of a scene's sides, in flip order, with their derivatives.
 
     Parameters
     ----------
@@ -375,7 +302,7 @@ def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Seeded:
 
     Returns
     -------
-    Seeded
+    list of SideNumbers
 
     Raises
     ------
@@ -383,10 +310,11 @@ def numbers_of(scene: Scene, names: Sequence[str], before: int = 0) -> Seeded:
         An unknown quantity, one that this scene does not give, or two that exclude each other.
     """
     reader = _Duals(scene, names, before)
-    # the throw does not depend on the corners
-    a, d, length, *_ = zip(*reader.sides(lambda y, _x: y), strict=True)
     rho, h = reader.shape.radius_of_gyration, reader.number("arm.surface_height")
-    return Seeded(list(a), list(d), list(length), rho, reader.kappa, h)
+    # the throw does not depend on the corners
+    return [
+        SideNumbers(a, d, length, rho, reader.kappa, h) for a, d, length, *_ in reader.sides(lambda y, _x: y)
+    ]
 
 
 class _Duals(Numbers):
@@ -400,18 +328,18 @@ class _Duals(Numbers):
         super().__init__(self.scene.text, square_root, sine)
         self.names, self.before = list(names), before
 
-    def seeded(self, value: float, name: str = "") -> MultiDual:
+    def seeded(self, value: float, name: str = "") -> Jet:
         """Return a number, the quantity of this name if it is one."""
-        dual = MultiDual(value, np.zeros(self.before + len(self.names)))
+        dual = multi_dual(value, np.zeros(self.before + len(self.names)))
         if name in self.names:
-            dual.slope[self.before + self.names.index(name)] = 1.0
+            slope_of(dual)[self.before + self.names.index(name)] = 1.0
         return dual
 
-    def constant(self, text: str, dimension: str, key: str = "") -> MultiDual:
+    def constant(self, text: str, dimension: str, key: str = "") -> Jet:
         """Return a text of a dimension."""
         return self.seeded(convert(parse(text, dimension), base_unit(dimension, self.scene.unit)))
 
-    def number(self, name: str) -> MultiDual:
+    def number(self, name: str) -> Jet:
         """Return a quantity by its name; kappa by a share of the speed, where nothing else is known of the speed."""
         dual = self.seeded(self.scene.value(name), name)
         if name == KAPPA and self.open_speed:
@@ -479,8 +407,10 @@ class CriticalJacobian:
     @property
     def determinant(self) -> float | None:
         """Determinant of `scaled`, None where it is not square or not known."""
-        whole = self.matrix.shape[0] == self.matrix.shape[1] and bool(np.isfinite(self.matrix).all())
-        return float(np.linalg.det(self.scaled)) if whole else None
+        rows, columns = self.matrix.shape
+        return (
+            float(np.linalg.det(self.scaled)) if rows == columns and np.isfinite(self.matrix).all() else None
+        )
 
     @property
     def condition(self) -> float | None:
@@ -513,11 +443,10 @@ def is_share(name: str) -> bool:
 
 def require_minimal(scene: Scene) -> None:
     """Refuse a scene with effects: their decision has no derivatives here."""
-    on = scene.effects.on()
-    if on:
+    if scene.effects.on():
         raise AnswerError(
             "the scene's effects",
-            ", ".join(on),
+            ", ".join(scene.effects.on()),
             "the minimal model",
             "leave [effects] out: critical points are differentiated and designed in the minimal model",
         )
@@ -556,9 +485,10 @@ def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
     require_minimal(chosen)
     if len(set(names)) != len(names):
         raise AnswerError("the quantities", ", ".join(names), "each named once", "leave the repetition out")
-    numbers = numbers_of(chosen, names, before=1)
-    rows = [_Row(chosen, numbers, side, point) for side, point in enumerate(first_points(chosen))]
-    slack = [number for side in zip(*_slacks(numbers), strict=True) for number in side]
+    sides = sides_of(chosen, names, before=1)
+    points = enumerate(zip(sides, first_points(chosen), strict=True))
+    rows = [_Row(chosen, part, side, point) for side, (part, point) in points]
+    slack = [number for part in sides for number in (part.a, part.length - part.a, part.d)]
     return CriticalJacobian(
         scene=chosen,
         names=names,
@@ -568,22 +498,16 @@ def critical_jacobian(scene: Scene | str, *names: str) -> CriticalJacobian:
         matrix=np.array([row.slope for row in rows]).reshape(len(rows), len(names)),
         reasons=tuple(row.reason for row in rows),
         slack=np.array([float(number) for number in slack]),
-        slack_matrix=np.array([number.slope[1:] for number in slack]).reshape(len(slack), len(names)),
+        slack_matrix=np.array([slope_of(number)[1:] for number in slack]).reshape(len(slack), len(names)),
     )
-
-
-def _slacks(numbers: Seeded) -> tuple[Sequence[MultiDual], ...]:
-    right = [length - a for length, a in zip(numbers.length, numbers.a, strict=True)]
-    return numbers.a, right, numbers.d
 
 
 class _Row:
     """One side: its first critical point, derivatives, or why there are none."""
 
-    def __init__(self, scene: Scene, numbers: Seeded, side: int, point: CriticalPoint | None) -> None:
-        self.scene, self.side = scene, side
-        self.part = SideNumbers(numbers.a[side], numbers.d[side], numbers.rho, numbers.kappa, numbers.h)
-        self.slope = np.full(numbers.h.slope.size - 1, np.nan)
+    def __init__(self, scene: Scene, part: SideNumbers, side: int, point: CriticalPoint | None) -> None:
+        self.scene, self.part, self.side = scene, part, side
+        self.slope = np.full(slope_of(part.h).size - 1, np.nan)
         self.x: float = np.nan if point is None else point.x
         self.kind: str | None = None if point is None else point.kind
         self.reason = "every throw is decided alike" if point is None else self._differentiate(point.x)
@@ -592,7 +516,7 @@ class _Row:
         seed = np.zeros(self.slope.size + 1)
         seed[0] = 1.0
         phi = float(impact_angles(self.scene.bare_map, [x], self.side)[0])
-        return decided(self.scene.flight, self.scene.flip, self.part, MultiDual(x, seed), phi)
+        return decided(self.scene.flight, self.scene.flip, self.part, multi_dual(x, seed), phi)
 
     def _differentiate(self, start: float) -> str | None:
         x = start
@@ -600,9 +524,9 @@ class _Row:
         for _ in range(STEPS):
             if abs(decision.steepness) < TOUCHING:
                 return "the flight only grazes the arm: another impact is about to be the first"
-            if abs(decision.margin.slope[0]) * x < TOUCHING * decision.size:
+            if abs(slope_of(decision.margin)[0]) * x < TOUCHING * decision.size:
                 return "dF/dr = 0: two critical points meet"
-            step = decision.margin.value / decision.margin.slope[0]
+            step = decision.margin.value / slope_of(decision.margin)[0]
             if not abs(step) <= STRAYED * x:
                 return "the decision jumps: the impact, or the way the part turns over, changes there"
             x -= step
@@ -611,5 +535,5 @@ class _Row:
         if miss is not None and miss[1] < DRAWN * self._decision(miss[0]).size:
             return f"another critical point is about to be the first, at x = {miss[0]:.9g}"
         self.x = x
-        self.slope = -decision.margin.slope[1:] / decision.margin.slope[0]
+        self.slope = -slope_of(decision.margin)[1:] / slope_of(decision.margin)[0]
         return None

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from limitsets.base.files import as_json, as_table, picked
-from limitsets.base.tables import Column, Table, Tabled, joined
+from limitsets.base import Column, Progress, Table, Tabled, as_json, as_table, joined, one_by_one, picked
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scene import Scene, dump
 from limitsets.feeder.scene.left_out import Model
@@ -156,7 +155,7 @@ def front_of(
     own: Option,
     side: int,
     seed: int,
-    tell: Callable[[str, int, int], None],
+    tell: Progress,
 ) -> tuple[Option, ...]:
     """Count the throws of designs of every margin, and keep those that nothing beats.
 
@@ -192,27 +191,11 @@ def front_of(
         early = [known[k].estimate.x / known[k].estimate.reach for k in mine]
         chosen += [int(k) for k in mine[np.argsort(early)[:PER_CLASS]]]
     chosen += [int(k) for k in np.argsort(-margins)[:PER_CLASS]]
-    options = [own]
-    for number, k in enumerate(dict.fromkeys(chosen)):
-        tell("throws to feed", number, len(chosen))
-        option = _option(known[k], searches[known[k].order], side, seed)
-        if option is not None:
-            options.append(option)
-    return _sure(options, searches, side, seed, tell)
-
-
-def _sure(
-    options: list[Option],
-    searches: Sequence[DesignSearch],
-    side: int,
-    seed: int,
-    tell: Callable[[str, int, int], None],
-) -> tuple[Option, ...]:
-    """Rate the designs on the front again on all corners, until all of them are rated so; the first one already is.
-
-    The search knew some corners only: a rating from then may be too high, and hides designs that are better on all.
-    """
-    sure = [options[0]]
+    counted = one_by_one("throws to feed", dict.fromkeys(chosen), len(chosen), tell)
+    options = [own, *filter(None, (_option(known[k], searches[known[k].order], side, seed) for k in counted))]
+    # The designs on the front are rated again on all corners, until all of them are: the search knew some corners only,
+    # so that a rating from then may be too high, and hides designs that are better on all.
+    sure = [own]
     for number in range(MOST_SURE):
         option = next((each for each in best_of(options) if each not in sure), None)
         if option is None:
@@ -220,13 +203,12 @@ def _sure(
         tell("designs on all corners", number, MOST_SURE)
         options.remove(option)
         one, search = option.candidate, searches[option.candidate.order]
-        estimate = on_all_corners(
-            search.scene.with_values(dict(one.values)), search.tolerance, side, search.hard
-        )
+        scene = search.scene.with_values(dict(one.values))
+        estimate = on_all_corners(scene, search.tolerance, side, search.hard)
         if estimate is not None and estimate.margin > 0.0:
-            again = _option(replace(one, estimate=estimate), search, side, seed)
-            sure += [] if again is None else [again]
-            options += [] if again is None else [again]
+            again = [_option(replace(one, estimate=estimate), search, side, seed)]
+            sure += filter(None, again)
+            options += filter(None, again)
     return tuple(best_of(sure))
 
 
@@ -320,19 +302,19 @@ class RobustDesign(Tabled):
         """Of which model the design is, and which facts of the scene that leaves out."""
         return Model.of(self.scene)
 
+    @property
+    def _values(self) -> dict[str, tuple[float, float]]:
+        """Of the sides, and of what was varied: before and after."""
+        sides = self.scene.text["part"].get("sides", ())
+        names = (*(f"part.sides[{k}]" for k in range(len(sides))), *self.varied)
+        return {name: (self.before.value(name), self.scene.value(name)) for name in names}
+
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        sides = tuple(
-            f"part.sides[{k}]" for k in range(len(self.scene.sides)) if "sides" in self.scene.text["part"]
-        )
+        before = self.before
         rows = [
-            (
-                name,
-                in_unit_of(self.before, name, self.before.value(name)),
-                in_unit_of(self.before, name, self.scene.value(name)),
-                unit_of(self.before, name),
-            )
-            for name in (*sides, *self.varied)
+            (name, *(in_unit_of(before, name, value) for value in pair), unit_of(before, name))
+            for name, pair in self._values.items()
         ]
         columns = ("quantity", Column("before", show=".6g"), Column("design", show=".6g"), "unit")
         table = Table(columns, rows, f"{self.scene.name}: robust design", self.model.sentence)
@@ -340,13 +322,7 @@ class RobustDesign(Tabled):
 
     def to_json(self) -> dict[str, Any]:
         """Give it as plain tables for JSON; every number is finite or null."""
-        sides = tuple(
-            f"part.sides[{k}]" for k in range(len(self.scene.sides)) if "sides" in self.scene.text["part"]
-        )
-        values, before = (
-            {name: scene.value(name) for name in (*sides, *self.varied)}
-            for scene in (self.scene, self.before)
-        )
+        before, values = ({name: pair[k] for name, pair in self._values.items()} for k in (0, 1))
         return as_table(
             scene=self.scene.as_dict(),
             **picked(self, "x", "side", "tolerance"),

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    one_by_one,
+    picked,
+    shown_in_notebooks,
+)
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
 from limitsets.feeder.scene.quantities import text_at, texts
@@ -25,6 +32,7 @@ from limitsets.parameters.design.derivatives import (
     require_minimal,
     with_present,
 )
+from limitsets.parameters.design.search import design_name
 from limitsets.parameters.design.solving import (
     KEPT,
     REACHED,
@@ -49,8 +57,6 @@ from limitsets.systems.sets.end_points import limit_set
 # ----------------------------------------------------------------
 # Design: find quantities of a scene for which its critical points have given values.
 
-
-Progress = Callable[[str, int, int], None]
 
 # Standard deviations of other starts by turns, in the solver's numbers: shares, or sizes of the part.
 SPREADS = (0.15, 0.3)
@@ -221,22 +227,18 @@ def design(
     chosen = load(scene)
     require_minimal(chosen)
     targets = _targets(chosen, critical_points)
-    unknowns = unknowns_of(chosen, _names(vary), bounds)
+    names = [vary] if isinstance(vary, str) else list(vary)
+    if not names or len(set(names)) != len(names):
+        raise AnswerError(
+            "the quantities to vary", ", ".join(map(str, names)), "one or more, each once", "name them"
+        )
+    unknowns = unknowns_of(chosen, names, bounds)
     with_present(
         chosen, dict(zip(unknowns.names, unknowns.start.tolist(), strict=True))
     )  # refuses what cannot be set
     search = TrialLog(chosen, unknowns, targets, progress)
     outcome, how = _searched(search, unknowns, starts, stages, seed)
     return _answer(search, targets, outcome, how)
-
-
-def _names(vary: Sequence[str]) -> list[str]:
-    names = [vary] if isinstance(vary, str) else list(vary)
-    if not names or len(set(names)) != len(names):
-        raise AnswerError(
-            "the quantities to vary", ", ".join(map(str, names)), "one or more, each once", "name them"
-        )
-    return names
 
 
 def _targets(scene: Scene, wanted: Sequence[float | str | None]) -> tuple[float | None, ...]:
@@ -292,8 +294,7 @@ def _searched(
         if best is None:
             return Solution(None, [], False), "no scene was found that has the critical points wanted"
         near = nearest_to_targets(search, best)
-        reached = search.cost(near) <= REACHED
-        return Solution(near, [*solution.path[:1], near], reached), "least squares"
+        return Solution(near, [*solution.path[:1], near], (search.cost(near) <= REACHED)), "least squares"
     if search.wanted.size < center.size and solution.trial is not None:
         near = nearest_to_start(search, solution.trial, own)
         solution = Solution(
@@ -310,11 +311,14 @@ def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Soluti
         None if target is None or not np.isfinite(x) else float(x - target)
         for target, x in zip(targets, after.x.tolist(), strict=True)
     )
-    scene = _named(after.scene, search.scene) if outcome.trial is not None else search.scene
+    scene, start = search.scene, search.scene
+    if outcome.trial is not None:  # files are named after it
+        changed = [name for name, text in texts(after.scene.text) if text != text_at(start.text, name)]
+        scene = load(in_units_of(after.scene, start, changed).as_dict() | {"name": design_name(start)})
     scenes = [scene if trial is outcome.trial else trial.jacobian.scene for trial in outcome.path]
     return Design(
         scene=scene,
-        start=search.scene,
+        start=start,
         targets=targets,
         reached=outcome.reached,
         residual=residual,
@@ -325,13 +329,6 @@ def _answer(search: TrialLog, targets: tuple[float | None, ...], outcome: Soluti
         how=how,
         message=_message(search, outcome, residual),
     )
-
-
-def _named(scene: Scene, start: Scene) -> Scene:
-    """Give the scene found a name of its own: files are named after it."""
-    name = start.name if start.name.endswith("-design") else f"{start.name}-design"
-    changed = [one for one, text in texts(scene.text) if text != text_at(start.text, one)]
-    return load(in_units_of(scene, start, changed).as_dict() | {"name": name})
 
 
 def _message(search: TrialLog, outcome: Solution, residual: tuple[float | None, ...]) -> str:
@@ -351,22 +348,25 @@ def _message(search: TrialLog, outcome: Solution, residual: tuple[float | None, 
 
 def _in_the_way(search: TrialLog, trial: Trial) -> list[str]:
     """Say which bounds and which edges of the part hold the search."""
-    unknowns, reasons = search.unknowns, []
-    for row, side in enumerate(search.sides):
-        if not trial.slope[row].any():
-            reasons.append(f"the critical point of side {side} does not depend on what is varied")
-    for k, name in enumerate(unknowns.names):
-        for end, word in ((unknowns.lo[k], "lower"), (unknowns.hi[k], "upper")):
-            if np.isfinite(end) and abs(trial.at[k] - end) < 1e-6:
-                reasons.append(f"{name} is at its {word} bound")
+    unknowns = search.unknowns
+    still = [side for side, slope in zip(search.sides, trial.slope, strict=True) if not slope.any()]
+    bounds = {"lower": unknowns.lo, "upper": unknowns.hi}
     size = float(np.ptp(search.scene.vertices, axis=0).max())
     words = ("the left end", "the right end", "the level")
-    for k, slack in enumerate(trial.jacobian.slack.tolist()):
-        if slack < 2.0 * KEPT * size:
-            reasons.append(
-                f"the centre of mass is at {words[k % 3]} of side {k // 3}: beyond it the part tips over"
-            )
-    return reasons
+    tipping = np.flatnonzero(trial.jacobian.slack < 2.0 * KEPT * size).tolist()
+    return [
+        *(f"the critical point of side {side} does not depend on what is varied" for side in still),
+        *(
+            f"{name} is at its {word} bound"
+            for k, name in enumerate(unknowns.names)
+            for word, ends in bounds.items()
+            if np.isfinite(ends[k]) and abs(trial.at[k] - ends[k]) < 1e-6
+        ),
+        *(
+            f"the centre of mass is at {words[k % 3]} of side {k // 3}: beyond it the part tips over"
+            for k in tipping
+        ),
+    ]
 
 
 # ----------------------------------------------------------------
@@ -379,9 +379,7 @@ Extents = dict[int, list[tuple[float, float]]]
 CELLS = 4096
 
 
-def limit_sets_along(
-    found: Design, progress: Callable[[str, int, int], None] | None = None
-) -> tuple[tuple[Extents, ...], ...]:
+def limit_sets_along(found: Design, progress: Progress | None = None) -> tuple[tuple[Extents, ...], ...]:
     """Compute the limit sets of every scene on a design's path.
 
     Parameters
@@ -406,18 +404,10 @@ def limit_sets_along(
     >>> [round(last[0][2][0][end], 3) for end in (0, 1)]
     [8.914, 23.383]
     """
-    sets = []
-    for number, scene in enumerate(found.path):
-        if progress is not None:
-            progress("limit sets", number, len(found.path))
-        sets.append(_limit_sets(scene))
-    return tuple(sets)
+    return tuple(map(_limit_sets, one_by_one("limit sets", found.path, len(found.path), progress)))
 
 
 def _limit_sets(scene: Scene) -> tuple[Extents, ...]:
     graph = transitions(scene.map, grid(scene.domain, cells=CELLS))
-    extents = []
-    for attractor in attractors(graph):
-        limit = limit_set(graph, attractor)
-        extents.append(limit.extents if limit.converged else attractor.extents)
-    return tuple(extents)
+    limits = [(attractor, limit_set(graph, attractor)) for attractor in attractors(graph)]
+    return tuple(limit.extents if limit.converged else attractor.extents for attractor, limit in limits)

@@ -18,10 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.errors import AnswerError, SceneError
-from limitsets.base.files import as_table, picked
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import AnswerError, Column, Progress, Table, Tabled, as_table, picked, silent
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
+from limitsets.feeder.scattering import uniform_starts
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.laid import LaidLike, laid_goal, laid_goals
 from limitsets.feeder.scene.left_out import Model
@@ -32,10 +31,11 @@ from limitsets.parameters.design.search import (
     LOST,
     NO_PART,
     Ends,
-    Tell,
     bounds_of,
+    design_name,
     of_the_arm,
     said,
+    scene_with,
     validity_slack,
 )
 from limitsets.parameters.margins.estimate import invariant_intervals, least_slack
@@ -106,18 +106,15 @@ class GoalDesign(Tabled):
             proof = "proved" if self.verdict == "proved" else "sampled, not proved"
             held = f"the goal holds of the limit set at X = {x:g} {unit} ({proof})"
             return f"{held}, with {self.room:.3g} {unit} to spare (sampled)"
-        why = said(self.ruled_out)
-        return f"no design that meets the goal at X = {x:g} {unit} among {self.evaluations}: {why}"
+        return f"no design that meets the goal at X = {x:g} {unit} among {self.evaluations}: {said(self.ruled_out)}"
 
     @property
     def itself(self) -> str:
         """One sentence: how the scene before stands, and whether it is the design."""
-        if self.lacking_before:
-            said = f"the scene as it is is ruled out, as one of those that {self.lacking_before}"
-        else:
-            said = (
-                f"the scene as it is meets the goal, with {self.room_before:.3g} {self.scene.unit} to spare"
-            )
+        said = f"the scene as it is is ruled out, as one of those that {self.lacking_before}"
+        if not self.lacking_before:
+            spare = f"{self.room_before:.3g} {self.scene.unit} to spare"
+            said = f"the scene as it is meets the goal, with {spare}"
         same = load(self.before.as_dict() | {"name": self.scene.name}) == self.scene
         return f"{said}; no other is better, so that {self.scene.name} has its values" if same else said
 
@@ -161,7 +158,9 @@ class GoalDesign(Tabled):
 class _GoalSearch:
     """Rate designs by their room, and count what rules them out."""
 
-    def __init__(self, scene: Scene, bounds: Mapping[str, tuple[float, float]], tell: Tell, of: int) -> None:
+    def __init__(
+        self, scene: Scene, bounds: Mapping[str, tuple[float, float]], tell: Progress, of: int
+    ) -> None:
         assert isinstance(scene.goal, OrientedBeyond | Reaches)
         self.scene, self.bounds, self.tell, self.of = scene, dict(bounds), tell, of
         self.x, self.side, self.laid = scene.goal.x, scene.goal.side, scene.goal.laid
@@ -198,14 +197,10 @@ class _GoalSearch:
 
     def made(self, shares: Sequence[float]) -> Scene | None:
         """Give the scene of unknowns between 0 and 1, as it would be written."""
-        values: dict[str, float | str] = {
-            name: lo + float(share) * (hi - lo)
-            for share, (name, (lo, hi)) in zip(shares, self.bounds.items(), strict=True)
-        }
-        try:
-            return in_units_of(self.scene.with_values(values), self.scene, self.bounds, DECIMALS)
-        except SceneError:
-            return None
+        ends = zip(shares, self.bounds.items(), strict=True)
+        values = {name: lo + float(share) * (hi - lo) for share, (name, (lo, hi)) in ends}
+        scene = scene_with(self.scene, values)
+        return None if scene is None else in_units_of(scene, self.scene, self.bounds, DECIMALS)
 
     def run(self, bounds: Mapping[str, tuple[float, float]], evaluations: int, seed: int) -> None:
         """Look at so many designs between bounds, the best one so far among the first."""
@@ -213,7 +208,8 @@ class _GoalSearch:
 
         self.bounds = dict(bounds)
         population = np.random.default_rng(seed).random((min(POPULATION, max(evaluations, 5)), len(bounds)))
-        population[0] = [_share(self.best[2].value(name), *pair) for name, pair in bounds.items()]
+        shares = ((self.best[2].value(name) - lo) / (hi - lo) for name, (lo, hi) in bounds.items())
+        population[0] = [min(max(share, 0.0), 1.0) for share in shares]
         differential_evolution(
             self.cost,
             [(0.0, 1.0)] * len(bounds),
@@ -245,7 +241,7 @@ def design_for_goal(
     laid: LaidLike | None = None,
     evaluations: int = 600,
     seed: int = 0,
-    progress: Tell | None = None,
+    progress: Progress | None = None,
 ) -> GoalDesign:
     """Find a scene that meets its own goal at the X and on the side that it asks for.
 
@@ -295,7 +291,7 @@ def design_for_goal(
         raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
     if evaluations < 1:
         raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
-    search = _GoalSearch(start, {}, progress or (lambda what, done, of: None), evaluations)
+    search = _GoalSearch(start, {}, progress or silent, evaluations)
     rating, room_before, why = search.rated(start)
     search.best = rating, room_before, start
     # arm and throw are set in minutes, another part is made: it varies only where they do not meet the goal
@@ -303,25 +299,20 @@ def design_for_goal(
         search.run(bounds_of(start, of_the_arm(start)), evaluations // ALONE, seed)
     if vary is not None or bounds is not None or search.rated(search.best[2])[2]:
         search.run(bounds_of(start, vary, bounds), evaluations - search.evaluations, seed)
-    ends, (_, room, made) = search.bounds, search.best
-    name = start.name if start.name.endswith("-design") else f"{start.name}-design"
-    design = load(made.as_dict() | {"name": name})
-    asked = (
-        start.goal,
-        *([Reaches(start.goal.x, start.goal.side)] if isinstance(start.goal, OrientedBeyond) else []),
-    )
+    _, room, made = search.best
+    design = load(made.as_dict() | {"name": design_name(start)})
+    reaches = Reaches(start.goal.x, start.goal.side)
+    asked = (start.goal, reaches) if isinstance(start.goal, OrientedBeyond) else (start.goal,)
     goals = tuple(laid_goal(goal, start.goal.laid) for goal in asked)
-    verdict = Query.of(design, goals).prove().verdict if room > 0.0 else "undecided"
-    lost = why in (LOST, NO_PART)
     return GoalDesign(
         scene=design,
         before=start,
-        varied=ends,
+        varied=search.bounds,
         room=room,
-        room_before=None if lost else room_before,
+        room_before=None if why in (LOST, NO_PART) else room_before,
         lacking_before=why,
         leaving=_leaving(design, start.goal.laid),
-        verdict=verdict,
+        verdict=(Query.of(design, goals).prove().verdict if room > 0.0 else "undecided"),
         ruled_out=dict(search.ruled_out),
         evaluations=search.evaluations,
         seconds=time.perf_counter() - begin,
@@ -334,12 +325,5 @@ def _leaving(scene: Scene, laid: Laid) -> float | None:
         return None
     whole = [(side, a, scene.arm_length) for side, a in enumerate(scene.sides.a.tolist())]
     side, lo, hi = (np.array(column) for column in zip(*(laid or whole), strict=True))
-    rng = np.random.default_rng(0)
-    drawn = rng.choice(side.size, STARTS, p=(hi - lo) / (hi - lo).sum())
-    starts = lo[drawn] + rng.random(STARTS) * (hi - lo)[drawn]
-    code = advance(scene.bare_map, starts, side[drawn], THROWS)[2]
-    return float((code < 0).mean())
-
-
-def _share(value: float, lo: float, hi: float) -> float:
-    return min(max((value - lo) / (hi - lo), 0.0), 1.0) if hi > lo else 0.0
+    starts = uniform_starts(np.random.default_rng(0), lo, hi, STARTS, side)
+    return float((advance(scene.bare_map, *starts, THROWS)[2] < 0).mean())

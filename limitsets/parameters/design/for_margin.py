@@ -12,27 +12,26 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from itertools import permutations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base import AnswerError, Progress, arguments_checked, shown_in_notebooks, silent
+from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import triangle
 from limitsets.feeder.goals import Goal, Laid, OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.laid import LaidLike, read_laid
-from limitsets.feeder.scene.scene import in_units_of, require_rests
+from limitsets.feeder.scene.scene import require_rests
 from limitsets.parameters.design.design_result import Option, RobustDesign, front_of, throws_to_feed
 from limitsets.parameters.design.search import (
+    POINT,
     POPULATION,
     Candidate,
     DesignSearch,
     Ends,
-    Tell,
     bounds_of,
     counterweight_of,
     said,
@@ -57,7 +56,7 @@ EDGES = (0.02, 0.007, 0.0025)
 class _Best:
     """The best design so far, and the corners at which others failed."""
 
-    def __init__(self, search: DesignSearch, made: Callable[[Scene], Scene], tell: Tell, of: int) -> None:
+    def __init__(self, search: DesignSearch, made: Callable[[Scene], Scene], tell: Progress, of: int) -> None:
         self.search, self.made, self.tell, self.of = search, made, tell, of
         self.hard: list[Signs] = list(search.hard)
         self.unknowns: list[float] = []
@@ -69,8 +68,8 @@ class _Best:
         """Rate a design as it would be made: exactly where it is the best, from above where it is not."""
         self.tried += 1
         self.tell("designs near the best", min(self.tried, self.of), self.of)
-        scene = self.search.scene_of(unknowns)
-        scene = None if scene is None else self.made(scene)
+        drawn = self.search.scene_of(unknowns)
+        scene = None if drawn is None else self.made(drawn)
         rating, estimate = self.search.rated(scene, self._estimate)
         if estimate is not None and (self.estimate is None or estimate.margin > self.estimate.margin):
             self.unknowns, self.scene, self.estimate = [float(u) for u in unknowns], scene, estimate
@@ -92,7 +91,7 @@ def polished(
     unknowns: Sequence[Sequence[float]],
     made: Callable[[Scene], Scene],
     evaluations: int,
-    tell: Tell,
+    tell: Progress,
 ) -> tuple[Scene, Estimate] | None:
     """Improve the best of a few designs, rated as they would be made and on all corners.
 
@@ -136,7 +135,7 @@ def polished(
     return best.scene, best.estimate
 
 
-def _simplex(corner: Sequence[float], edge: float) -> NDArray[np.float64]:
+def _simplex(corner: Sequence[float], edge: float) -> Array:
     """Give a simplex at a place: a step along each axis, towards the middle of its bounds."""
     place = np.array(corner)
     return np.vstack([place, place + edge * np.diag(np.where(place < 0.5, 1.0, -1.0))])
@@ -181,10 +180,10 @@ def tolerance_of(scene: Scene, tolerance: Mapping[str, str] | None) -> dict[str,
         texts |= {f"part.sides[{k}]": share for k in range(len(scene.sides))}
     mass = scene.text["part"]["mass"]
     if not given and "center" not in mass:  # its points instead
-        sizes = {"x": "0.01 in", "y": "0.01 in", "mass": "1 %"}
-        points = [f"part.mass.points[{k}]" for k in range(len(mass.get("points", ())))]
+        sizes = zip(POINT, ("0.01 in", "0.01 in", "1 %"), strict=True)
         texts = {name: text for name, text in texts.items() if not name.startswith("part.mass")}
-        texts |= {f"{point}.{word}": text for point in points for word, text in sizes.items()}
+        points = range(len(mass.get("points", ())))
+        texts |= {f"part.mass.points[{k}].{word}": text for word, text in sizes for k in points}
     return texts
 
 
@@ -205,7 +204,8 @@ def orders_of(scene: Scene) -> list[Scene]:
             mass["center"]["above"] = f"{0.15 * min(left, right):.4f} {scene.unit}"
         elif order != (0, 1, 2):
             # the same shares along each edge: a point on the part stays on the part
-            moved = np.linalg.solve(_edges(scene.vertices), _edges(triangle(scene.sides.length[list(order)])))
+            other = triangle(scene.sides.length[list(order)])
+            moved = np.linalg.solve(scene.vertices[1:] - scene.vertices[0], other[1:] - other[0])
             for k, point in enumerate(mass.get("points", ())):
                 own = np.array([scene.value(f"part.mass.points[{k}].{word}") for word in "xy"])
                 x, y = (own - scene.vertices[0]) @ moved
@@ -214,18 +214,12 @@ def orders_of(scene: Scene) -> list[Scene]:
     return scenes
 
 
-def _edges(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Give the two edges of a triangle from its first corner."""
-    edges: NDArray[np.float64] = corners[1:] - corners[0]
-    return edges
-
-
 def _searched(
-    searches: Sequence[DesignSearch], evaluations: int, seed: int, tell: Tell
+    searches: Sequence[DesignSearch], evaluations: int, seed: int, tell: Progress
 ) -> tuple[DesignSearch, list[list[float]]]:
     """Draw in every order, go on in the best, and give the best search with the unknowns of its best design."""
     rng = np.random.default_rng(seed)
-    drawn: list[tuple[float, int, NDArray[np.float64]]] = []
+    drawn: list[tuple[float, int, Array]] = []
     for strict in (False, True):
         if drawn and drawn[0][0] > 0.0:
             break
@@ -237,19 +231,13 @@ def _searched(
             best = np.argsort(-ratings)[:POPULATION]
             drawn.append((float(ratings[best[0]]), number, unknowns[best]))
         drawn.sort(key=lambda row: -row[0])
-    first = []
+    share, first = evaluations // (2 * min(ORDERS_KEPT, len(drawn))), []
     for _, number, population in drawn[:ORDERS_KEPT]:
-        share = evaluations // (2 * min(ORDERS_KEPT, len(drawn)))
         population, ratings = searches[number].improved(population, share, seed, tell)
         first.append((float(ratings[0]), number, population))
     _, number, population = max(first, key=lambda row: row[0])
     population, _ = searches[number].improved(population, evaluations // 2, seed + 1000, tell)
     return searches[number], population.tolist()
-
-
-def _rounded(scene: Scene, search: DesignSearch) -> Scene:
-    """Write what was varied with few decimals."""
-    return in_units_of(scene, search.scene, search.bounds, DECIMALS)
 
 
 def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str], name: str) -> Scene:
@@ -273,12 +261,11 @@ class NoDesignError(AnswerError):
     def __init__(
         self, evaluations: int, ruled_out: Mapping[str, int], miss: Scene | None, varied: Iterable[str]
     ) -> None:
-        remedy = "widen the bounds, look at more designs, or ask the goal of another side"
         super().__init__(
             "the design",
             f"none that feeds among {evaluations}",
             "one at least",
-            f"{said(ruled_out)}; {remedy}",
+            f"{said(ruled_out)}; {'widen the bounds, look at more designs, or ask the goal of another side'}",
         )
         self.evaluations, self.ruled_out, self.miss, self.varied = evaluations, ruled_out, miss, tuple(varied)
 
@@ -290,7 +277,7 @@ def _none_feeds(
     ruled_out = sum((each.ruled_out for each in searches), Counter[str]())
     count, miss = sum(each.evaluations for each in searches), search.scene_of(nearest)
     if miss is not None:
-        miss = load(_rounded(miss, search).as_dict() | {"name": name})
+        miss = load(search.rounded(miss, DECIMALS).as_dict() | {"name": name})
     return NoDesignError(count, ruled_out, miss, search.bounds)
 
 
@@ -308,7 +295,7 @@ def robust_design(
     evaluations: int = 1200,
     seed: int = 0,
     prove: float = SECONDS,
-    progress: Tell | None = None,
+    progress: Progress | None = None,
     keep: Callable[[Scene], None] | None = None,
 ) -> RobustDesign:
     """Choose a part, a throw and an arm for which parts are fed in spite of large deviations.
@@ -368,7 +355,7 @@ def robust_design(
         raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
     ranges = read_laid(start, laid)
     orders, everywhere = orders and not ranges, everywhere and not ranges
-    tell: Tell = progress if progress is not None else lambda what, done, of: None
+    tell = progress or silent
     texts, begin = tolerance_of(start, tolerance), time.perf_counter()
     vector = Tolerance.of(start, texts)
     names, given = (None, vary) if isinstance(vary, Mapping) else (vary, None)
@@ -398,7 +385,7 @@ def robust_design(
             one.better = better
     search, population = _searched(searches, evaluations, seed, tell)
     polish = max(evaluations // POLISH, 1)
-    best = polished(search, population[:POLISHED], lambda made: _rounded(made, search), polish, tell)
+    best = polished(search, population[:POLISHED], partial(search.rounded, decimals=DECIMALS), polish, tell)
     if best is None:
         raise _none_feeds(searches, search, population[0], f"{start.name}-robust")
     made, estimate = best
@@ -440,21 +427,20 @@ def robust_design(
 
 
 def _proved(
-    scene: Scene, goals: Sequence[Goal], texts: Mapping[str, str], seconds: float, tell: Tell, whose: str
+    scene: Scene, goals: Sequence[Goal], texts: Mapping[str, str], seconds: float, tell: Progress, whose: str
 ) -> tuple[Margin, ...]:
     """Bracket the joint margin of each goal by itself: one may be proved much farther than the other.
 
     Without time for it there are no margins.
     """
-    margins = []
-    for goal in goals if seconds > 0.0 else ():
-        what = f"margin of {whose}, {goal.kind}"
 
-        def told(share: float, what: str = what) -> None:
-            tell(what, math.floor(100 * share), 100)
+    def bracketed(goal: Goal) -> Margin:
+        def told(share: float) -> None:
+            tell(f"margin of {whose}, {goal.kind}", math.floor(100 * share), 100)
 
-        margins.append(joint_margin(scene, (goal,), texts, seconds=seconds / len(goals), tell=told))
-    return tuple(margins)
+        return joint_margin(scene, (goal,), texts, seconds=seconds / len(goals), tell=told)
+
+    return tuple(map(bracketed, goals if seconds > 0.0 else ()))
 
 
 def _side(scene: Scene, side: int | None) -> int:

@@ -12,16 +12,18 @@ import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError, SceneError
+from limitsets.base import AnswerError, Progress, SceneError
+from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import plate_with_points, side_ends
 from limitsets.feeder.geometry.polygon import above_side
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import find
+from limitsets.feeder.scene.scene import in_units_of
 from limitsets.feeder.thrower.assumed_box import assumed
 from limitsets.parameters.margins.deviations import Signs, Tolerance
 from limitsets.parameters.margins.estimate import (
@@ -66,7 +68,7 @@ class Counterweight(NamedTuple):
 
 
 def counterweight_for(
-    vertices: NDArray[np.float64], centre: tuple[float, float], radius_of_gyration: float
+    vertices: Array, centre: tuple[float, float], radius_of_gyration: float
 ) -> Counterweight:
     """Find the point mass that moves a plate's centre of mass and sets its radius of gyration.
 
@@ -182,6 +184,7 @@ USUAL: dict[str, tuple[float, float]] = {
     "arm.surface_height": (-0.2, -0.005),
 }
 """Between what these are sought, in mean side lengths (along: of its side); the speed follows from kappa."""
+POINT = ("x", "y", "mass")
 
 
 def bounds_of(
@@ -231,15 +234,10 @@ def of_the_arm(scene: Scene) -> list[str]:
 
 def _usual(scene: Scene) -> list[str]:
     mass: Mapping[str, Any] = scene.text["part"]["mass"]
-    if "center" in mass:
-        own = [f"part.mass.{word}" for word in ("center.along", "center.above", "radius_of_gyration")]
-    else:
-        own = [
-            f"part.mass.points[{k}].{word}"
-            for k in range(len(mass.get("points", ())))
-            for word in ("x", "y", "mass")
-        ]
-    return [*own, *of_the_arm(scene)]
+    words: tuple[str, ...] = ("center.along", "center.above", "radius_of_gyration")
+    if "center" not in mass:
+        words = tuple(f"points[{k}].{word}" for k in range(len(mass.get("points", ()))) for word in POINT)
+    return [*(f"part.mass.{word}" for word in words), *of_the_arm(scene)]
 
 
 def _own(scene: Scene, name: str) -> tuple[float, float]:
@@ -251,7 +249,8 @@ def _own(scene: Scene, name: str) -> tuple[float, float]:
         lo, hi = (math.sqrt(scene.gravity / (end * size)) for end in reversed(USUAL["throw.kappa"]))
         return lo if lo <= value else half, hi if value <= hi else twice
     if name in USUAL:
-        own = float(scene.sides.length[_side_of_centre(scene)]) if name.endswith("along") else size
+        on = int(scene.text["part"]["mass"].get("center", {}).get("side", 0))
+        own = float(scene.sides.length[on]) if name.endswith("along") else size
         lo, hi = (end * own for end in USUAL[name])
         if name == "throw.kappa":
             return lo if lo <= value else half, hi if value <= hi else twice
@@ -266,11 +265,6 @@ def _own(scene: Scene, name: str) -> tuple[float, float]:
     if dimension == "angle":
         return 0.5 * value, max(value, min(1.5 * value, math.pi / 2))
     return (0.7 * value, 1.4 * value) if name.startswith("part.sides") else (half, twice)
-
-
-def _side_of_centre(scene: Scene) -> int:
-    centre: Any = scene.text["part"]["mass"]["center"]
-    return int(centre.get("side", 0))
 
 
 # ----------------------------------------------------------------
@@ -291,9 +285,6 @@ ASSUMPTION = (
     "break an assumption of the model (another corner lands first, the throw tips the part, or it slips)"
 )
 LEAVES = "lose parts from some starts on the arm"
-
-Tell = Callable[[str, int, int], None]
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -356,27 +347,24 @@ class DesignSearch:
 
     def scene_of(self, unknowns: Sequence[float]) -> Scene | None:
         """Give the scene of scaled unknowns; None where there is none."""
-        values: dict[str, float | str] = {}
-        for value, (name, (lo, hi)) in zip(unknowns, self.bounds.items(), strict=True):
-            values[name] = _scaled(float(value), lo, hi)
-        try:
-            return self.scene.with_values(values)
-        except SceneError:
-            return None
+        ends = zip(unknowns, self.bounds.items(), strict=True)
+        return scene_with(self.scene, {name: _scaled(float(share), *pair) for share, (name, pair) in ends})
+
+    def rounded(self, scene: Scene, decimals: int) -> Scene:
+        """Write what is varied with few decimals."""
+        return in_units_of(scene, self.scene, self.bounds, decimals)
 
     def rate(self, unknowns: Sequence[float], above: float = 0.0) -> float:
         """Rate a design: its margin, or below 0 how far it is from being one."""
         self.evaluations += 1
         scene = self.scene_of(unknowns)
-
-        def quickly(one: Scene) -> Estimate | None:
-            return estimated(one, self.tolerance, self.side, hard=self.hard, above=above)
-
+        quickly = partial(estimated, tolerance=self.tolerance, side=self.side, hard=self.hard, above=above)
         rating, estimate = self.rated(scene, quickly)
         if scene is not None and estimate is not None:
             if self.better is not None:
                 self.better(scene, estimate)
-            self.history.append(Candidate(self._values(scene), estimate, self.order))
+            values = {name: scene.value(name) for name in self.bounds}
+            self.history.append(Candidate(values, estimate, self.order))
         return rating
 
     def rated(
@@ -391,12 +379,12 @@ class DesignSearch:
         if estimated_margin is None or not estimated_margin.margin > 0.0:
             self.ruled_out[LOST if estimated_margin is None else OTHER_SIDE] += 1
             return (-10.0 if estimated_margin is None else estimated_margin.margin - self.strict), None
-        lacking = self.broken(scene, estimated_margin)
-        if lacking < 0.0:
-            self.ruled_out[
-                LEAVES if validity_slack(scene, estimated_margin.invariant) >= 0.0 else ASSUMPTION
-            ] += 1
-            return max(lacking, -1.0) if self.strict else lacking, None
+        valid = validity_slack(scene, estimated_margin.invariant)
+        stays = least_slack(scene.bare_map) / scene.arm_length if self.everywhere else valid
+        broken = max(min(valid, stays), -9.0)
+        if broken < 0.0:
+            self.ruled_out[LEAVES if valid >= 0.0 else ASSUMPTION] += 1
+            return max(broken, -1.0) if self.strict else broken, None
         return estimated_margin.margin, estimated_margin
 
     def lacking(self, scene: Scene) -> float:
@@ -406,16 +394,6 @@ class DesignSearch:
         weight = counterweight_of(scene)
         lacking = max(weight.share - MOST_LEAD, -weight.inside / float(scene.sides.length.mean()))
         return 0.0 if lacking <= 0.0 else -20.0 - min(9.0, lacking)
-
-    def broken(self, scene: Scene, estimate: Estimate) -> float:
-        """Rate a design outside of the model, or one that loses parts: below 0; 0 or above for any other."""
-        spare = validity_slack(scene, estimate.invariant)
-        if self.everywhere:
-            spare = min(spare, least_slack(scene.bare_map) / scene.arm_length)
-        return max(spare, -9.0)
-
-    def _values(self, scene: Scene) -> dict[str, float]:
-        return {name: scene.value(name) for name in self.bounds}
 
     def drawn(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
         """Draw designs evenly, and rate them."""
@@ -432,7 +410,7 @@ class DesignSearch:
         new = [signs for signs in wrong if signs not in self.hard]
         self.hard[:] = (new[: MOST_HARD // 3] + self.hard)[:MOST_HARD]
 
-    def improved(self, population: Array, evaluations: int, seed: int, tell: Tell) -> tuple[Array, Array]:
+    def improved(self, population: Array, evaluations: int, seed: int, tell: Progress) -> tuple[Array, Array]:
         """Move a population for so many evaluations; the population and its ratings, the best first."""
         from scipy.optimize import differential_evolution
 
@@ -458,6 +436,11 @@ class DesignSearch:
         return population, ratings
 
 
+def design_name(start: Scene) -> str:
+    """Name the design that began at a scene."""
+    return start.name if start.name.endswith("-design") else f"{start.name}-design"
+
+
 def said(ruled_out: Mapping[str, int]) -> str:
     """Say which conditions ruled designs out, the most frequent first.
 
@@ -468,6 +451,14 @@ def said(ruled_out: Mapping[str, int]) -> str:
     """
     rows = sorted(ruled_out.items(), key=lambda row: -row[1])
     return "; ".join(f"{count} {words}" for words, count in rows) or "no design was ruled out"
+
+
+def scene_with(scene: Scene, values: dict[str, float]) -> Scene | None:
+    """Give a scene with other values; None where there is none."""
+    try:
+        return scene.with_values(dict(values))
+    except SceneError:
+        return None
 
 
 def _scaled(share: float, lo: float, hi: float) -> float:

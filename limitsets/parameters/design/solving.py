@@ -7,14 +7,14 @@ residual; the trust region treats nan as a step too far and shrinks.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from limitsets.base.errors import AnswerError, LimitsetsError
+from limitsets.base import AnswerError, LimitsetsError, Progress, silent
+from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import find, in_units
 from limitsets.parameters.design.derivatives import (
@@ -33,7 +33,6 @@ from limitsets.parameters.design.derivatives import (
 # well defined.
 
 
-Array = npt.NDArray[np.float64]
 # No search goes farther than by this factor's logarithm.
 FARTHEST = 20.0
 
@@ -60,7 +59,7 @@ class Unknowns:
 
     names: tuple[str, ...]
     start: Array
-    logs: npt.NDArray[np.bool_]
+    logs: Mask
     scale: Array
     lo: Array
     hi: Array
@@ -108,7 +107,7 @@ def unknowns_of(scene: Scene, names: Sequence[str], bounds: Bounds | None) -> Un
             raise AnswerError("the bounds", name, ", ".join(names), "bound a quantity that is varied")
     size = float(np.ptp(scene.vertices, axis=0).max())
     start = np.array([present(scene, name) for name in names])
-    logs = np.array([is_share(name) or _is_size(name) for name in names])
+    logs = np.array([_is_positive(name) for name in names])
     scale = np.array([1.0 if find(name).dimension == "angle" else size for name in names])
     unbounded = Unknowns(tuple(names), start, logs, scale, start, start)
     pairs = [_pair(scene, name, given.get(name)) for name in names]
@@ -116,38 +115,30 @@ def unknowns_of(scene: Scene, names: Sequence[str], bounds: Bounds | None) -> Un
     return Unknowns(tuple(names), start, logs, scale, *ends)
 
 
-def _is_size(name: str) -> bool:
-    return name == "part.mass.radius_of_gyration" or name.startswith("part.sides")
+def _is_positive(name: str) -> bool:
+    return is_share(name) or name == "part.mass.radius_of_gyration" or name.startswith("part.sides")
 
 
 def _pair(scene: Scene, name: str, given: Sequence[Any] | None) -> tuple[float, float]:
     """Read the bounds of one quantity; those that are always there keep it a quantity of its kind."""
     always = {"gravity.tilt": (0.0, 0.5 * math.pi)}
-    least, most = always.get(name, (0.0 if is_share(name) or _is_size(name) else -math.inf, math.inf))
+    least, most = always.get(name, (0.0 if _is_positive(name) else -math.inf, math.inf))
     if given is None:
         return least, most
     if isinstance(given, str) or len(given) != 2:
         raise AnswerError(
             f"the bounds of {name}", given, "(lowest, highest), None for no bound", "give a pair"
         )
-    ends = [_end(scene, name, end, other) for end, other in zip(given, (least, most), strict=True)]
-    lo, hi = max(ends[0], least), min(ends[1], most)
+    ends = [None if end is None else in_units(scene.unit, name, end, key=name) for end in given]
+    lo, hi = (other if end is None else end for end, other in zip(ends, (least, most), strict=True))
+    lo, hi = max(lo, least), min(hi, most)
     if not lo < hi:
         raise AnswerError(f"the bounds of {name}", given, "the lowest below the highest", "correct them")
     return lo, hi
 
 
-def _end(scene: Scene, name: str, value: Any, missing: float) -> float:
-    if value is None:
-        return missing
-    return in_units(scene.unit, name, value, key=name)
-
-
 # ----------------------------------------------------------------
 # The log of a search: each scene is computed once, counted, and stored in order.
-
-
-Progress = Callable[[str, int, int], None]
 
 
 class Trial(NamedTuple):
@@ -169,6 +160,15 @@ class Trial(NamedTuple):
     jacobian: CriticalJacobian
     x: Array
     slope: Array
+
+    @property
+    def whole(self) -> bool:
+        """Whether all that is wanted is there, with derivatives."""
+        return bool(np.isfinite(self.slope).all() and np.isfinite(self.x).all())
+
+    def square_from(self, goal: Array) -> float:
+        """Squared distance of the critical points from where they are wanted."""
+        return float(((self.x - goal) ** 2).sum())
 
 
 class TrialLog:
@@ -196,7 +196,7 @@ class TrialLog:
         self.scene, self.unknowns = scene, unknowns
         self.sides = [side for side, target in enumerate(targets) if target is not None]
         self.wanted = np.array([target for target in targets if target is not None], dtype=np.float64)
-        self.progress, self.step, self.of = progress, "critical points", (0, 1)
+        self.progress, self.step, self.of = progress or silent, "critical points", (0, 1)
         self.trials: list[Trial] = []
         self._known: dict[bytes, Trial | None] = {}
 
@@ -213,17 +213,16 @@ class TrialLog:
         return self._known[key]
 
     def _computed(self, seen: Array) -> Trial | None:
-        if self.progress is not None:
-            self.progress(self.step, *self.of)
+        self.progress(self.step, *self.of)
         values = self.unknowns.values(seen).tolist()
         try:
             scene = with_present(self.scene, dict(zip(self.unknowns.names, values, strict=True)))
         except (LimitsetsError, OverflowError):  # a part that tips over on one of its sides, or cannot be
             return None
         jacobian = critical_jacobian(scene, *self.unknowns.names)
-        slope = jacobian.matrix[self.sides] * self._rates(jacobian)
+        slope = jacobian.matrix[self.sides] * self.rates(jacobian)
         self.trials.append(Trial(seen, jacobian, jacobian.x[self.sides], slope))
-        return self.trials[-1] if self.is_whole(self.trials[-1]) else None
+        return self.trials[-1] if self.trials[-1].whole else None
 
     def require_effect(self, first: Trial | None) -> None:
         """Refuse to vary what no critical point depends on."""
@@ -236,17 +235,9 @@ class TrialLog:
                     "leave it out (where a throw is given by kappa, gravity is part of that)",
                 )
 
-    def _rates(self, jacobian: CriticalJacobian) -> Array:
-        """Return what one step of each of the solver's numbers changes its quantity by."""
-        return np.where(self.unknowns.logs, jacobian.values, self.unknowns.scale)
-
-    def rates(self, trial: Trial) -> Array:
+    def rates(self, jacobian: CriticalJacobian) -> Array:
         """Return the derivatives of the quantities by the solver's numbers."""
-        return self._rates(trial.jacobian)
-
-    def is_whole(self, trial: Trial) -> bool:
-        """Whether all that is wanted is there, with derivatives."""
-        return bool(np.isfinite(trial.slope).all() and np.isfinite(trial.x).all())
+        return np.where(self.unknowns.logs, jacobian.values, self.unknowns.scale)
 
     def cost(self, trial: Trial) -> float:
         """Largest distance of a critical point from its target [length]."""
@@ -254,8 +245,8 @@ class TrialLog:
 
     def best(self) -> Trial | None:
         """Return the trial nearest to the targets by least squares, None where no trial has them all."""
-        whole = [trial for trial in self.trials if self.is_whole(trial)]
-        return min(whole, key=lambda trial: float(((trial.x - self.wanted) ** 2).sum()), default=None)
+        whole = (trial for trial in self.trials if trial.whole)
+        return min(whole, key=lambda trial: trial.square_from(self.wanted), default=None)
 
 
 # ----------------------------------------------------------------
@@ -314,11 +305,10 @@ def solved(
     if first is None:
         return Solution(None, [], False)
     before = search.evaluations
-    none = np.full(goal.size, np.nan)
 
     def residual(seen: Array) -> Array:
         trial = search.at(seen)
-        return none if trial is None else trial.x - goal
+        return np.full(goal.size, np.nan) if trial is None else trial.x - goal
 
     def slope(seen: Array) -> Array:
         trial = search.at(seen)
@@ -339,8 +329,7 @@ def solved(
         )
     path = [first]
     for trial in search.trials[before:]:
-        nearer = ((trial.x - goal) ** 2).sum() < ((path[-1].x - goal) ** 2).sum()
-        if nearer and search.is_whole(trial):
+        if trial.whole and trial.square_from(goal) < path[-1].square_from(goal):
             path.append(trial)
     return Solution(path[-1], path, bool(np.abs(path[-1].x - goal).max() <= within))
 
@@ -363,8 +352,7 @@ def continued(search: TrialLog, first: Trial, step: float) -> Solution:
         to = 1.0 if share + step > 1.0 - 1e-9 else share + step
         last, goal = path[-1], first.x + to * (search.wanted - first.x)
         within = REACHED if to == 1.0 else STAGE
-        ahead = last.at + np.linalg.pinv(last.slope) @ (goal - last.x)
-        start = search.unknowns.inside(ahead)
+        start = search.unknowns.inside(last.at + np.linalg.pinv(last.slope) @ (goal - last.x))
         if search.at(start) is None:
             start = last.at
         solution = solved(search, start, goal, MOST_OF_STAGE, within)
@@ -421,8 +409,7 @@ class _Model:
 
     def look(self, seen: Array) -> tuple[Trial, bool]:
         trial = self.search.at(seen)
-        if trial is not None:
-            self.base = trial
+        self.base = trial or self.base
         return self.base, trial is not None
 
     def x(self, seen: Array) -> Array:
@@ -438,21 +425,20 @@ class _Model:
 
     def slack_slope(self, seen: Array) -> Array:
         base, _ = self.look(seen)
-        return np.asarray(base.jacobian.slack_matrix * self.search.rates(base))
+        return np.asarray(base.jacobian.slack_matrix * self.search.rates(base.jacobian))
 
 
 def _minimised(model: _Model, start: Trial, cost: Any, slope: Any, more: list[dict[str, Any]]) -> None:
     from scipy.optimize import minimize
 
     unknowns = model.search.unknowns
-    rests = {"type": "ineq", "fun": model.slack, "jac": model.slack_slope}
     minimize(
         cost,
         start.at,
         jac=slope,
         method="SLSQP",
         bounds=list(zip(unknowns.lo, unknowns.hi, strict=True)),
-        constraints=[rests, *more],
+        constraints=[{"type": "ineq", "fun": model.slack, "jac": model.slack_slope}, *more],
         options={"maxiter": MOST_NEAREST, "ftol": 1e-14},
     )
 
@@ -460,7 +446,7 @@ def _minimised(model: _Model, start: Trial, cost: Any, slope: Any, more: list[di
 def nearest_to_targets(search: TrialLog, start: Trial) -> Trial:
     """Come as near to targets that are not reached as the constraints let."""
     model = _Model(search, start)
-    worst = 10.0 * float(((start.x - search.wanted) ** 2).sum())
+    worst = 10.0 * start.square_from(search.wanted)
 
     def cost(seen: Array) -> float:
         _, there = model.look(seen)
@@ -488,7 +474,7 @@ def nearest_to_start(search: TrialLog, reached: Trial, center: Array) -> Trial:
     search.step, search.of = "the nearest to the start", (0, 1)
     before = search.evaluations
     _minimised(model, reached, cost, slope, [equal])
-    near = [trial for trial in search.trials[before:] if search.is_whole(trial) and search.cost(trial) < 1e-2]
+    near = [trial for trial in search.trials[before:] if trial.whole and search.cost(trial) < 1e-2]
     for trial in sorted(near, key=lambda each: cost(each.at) + search.cost(each))[:3]:
         nearer = _tightened(search, trial)
         if nearer is not None and cost(nearer.at) < cost(reached.at):

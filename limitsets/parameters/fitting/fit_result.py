@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import AnswerError, Column, Progress, Table, Tabled, as_table, picked
+from limitsets.base.arrays import Array
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.scene import in_unit_of, in_units_of, unit_of
@@ -28,8 +25,6 @@ from limitsets.proofs.prover.query import Query
 
 # A larger share of a value is no tolerance: what is fitted is then not known at all.
 MOST = 0.99
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -159,9 +154,8 @@ class Fit(Tabled):
         own = self.likelihood
         at = self.best.at.copy()
         fixed = [own.names.index(name) for name in values]
-        for k, value in zip(fixed, values.values(), strict=True):
-            at[k] = (value - own.centre[k]) / own.scale[k]
-        free = np.array([k for k in range(at.size) if k not in fixed])
+        at[fixed] = (np.array([*values.values()]) - own.centre[fixed]) / own.scale[fixed]
+        free = np.setdiff1d(np.arange(at.size), fixed)
 
         def function(numbers: Array) -> Array:
             points = np.repeat(at[None], len(numbers), axis=0)
@@ -277,8 +271,12 @@ def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: Scatter, l
 # Throws scatter without a bound; so many standard deviations are taken for one (1 throw in 370 is outside).
 SIGMAS = 3.0
 
-Progress = Callable[[str, int, int], None]
 WORDS = {"throw.speed": "speed repeats", "landing.x": "landings repeat"}
+ALL_OF_IT = {
+    "proved": "The goal is proved for every machine within these intervals with all of this scatter: safe.",
+    "refuted": "A machine within these intervals with this scatter violates the goal: not safe.",
+    "undecided": "For every machine within these intervals with all of this scatter the goal is not decided.",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,7 +377,7 @@ def enough(found: Fit, *, width: float = 0.02, progress: Progress | None = None)
             )
         together = "undecided" if open_ended else _together(scene, noise, progress)
         verdict = "enough" if together == "proved" else "undecided"
-        sentences.append(_all_of_it(together))
+        sentences.append(ALL_OF_IT[together])
     return Enough(verdict, tuple(sentences), repeats, tuple(margins), together, beyond)
 
 
@@ -408,15 +406,6 @@ def _together(scene: Scene, noise: dict[str, str], progress: Progress | None) ->
     tolerance = {name: text for name, text in tolerance.items() if name != "landing.x"}
     proof = certify(scene, ["goal"], noise=noise, tolerance=tolerance, progress=progress)
     return proof.claims[0].verdict if proof.claims[0].verdict in ("proved", "refuted") else "undecided"
-
-
-def _all_of_it(together: str) -> str:
-    said = {
-        "proved": "The goal is proved for every machine within these intervals with all of this scatter: safe.",
-        "refuted": "A machine within these intervals with this scatter violates the goal: not safe.",
-        "undecided": "For every machine within these intervals with all of this scatter the goal is not decided.",
-    }
-    return said[together]
 
 
 def _beyond(scene: Scene, noise: dict[str, str]) -> float | None:

@@ -4,24 +4,30 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError, DataError
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base import (
+    AnswerError,
+    DataError,
+    Progress,
+    arguments_checked,
+    one_by_one,
+    shown_in_notebooks,
+    silent,
+)
+from limitsets.base.arrays import Array
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.feeder.scene.quantities import base_unit, find
 from limitsets.parameters.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
 from limitsets.parameters.fitting.likelihood import (
     SCATTERS,
+    SHARPEST,
     Likelihood,
-    Question,
     Rows,
     as_recorded,
     further_throws,
@@ -47,9 +53,6 @@ from limitsets.systems.maps.pieces import at_points
 READ_TWICE = 10
 # A scatter this small beside the end of its interval is none.
 NOTHING = 1e-3
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 
 @shown_in_notebooks
@@ -107,11 +110,7 @@ def fit(
         )
     film, refused = _film(throws, chosen)
     known, errors = _errors(film, error, chosen)
-
-    def tell(step: str, done: int, of: int) -> None:
-        if progress is not None:
-            progress(step, done, of)
-
+    tell = progress or silent
     tell("robust least squares", 0, 3)
     start = None
     if refused is None:
@@ -193,20 +192,12 @@ def _answer(
     speed, landing = scatters
     new = fitted_scene(scene, fitted, speed, landing)
     told = own.told(values[None])
-    loose = np.sqrt(values[None, -1:] ** 2 + (1e-7 * scene.arm_length) ** 2)
-    misses = own.rows.throws.x_after - told.after[0]
-    sizes = np.sqrt(
-        own.rows.error**2 * (1.0 + told.slope[0] ** 2)
-        + (told.per_log_speed[0] * values[-2]) ** 2
-        + loose[0, 0] ** 2
-    )
-    names = tuple(each.name for each in fitted)
-    error = own.rows.error
-    if not own.rows.known:  # the gain of further throws is then computed with all scatter as one
-        error = np.full(len(error), landing.value / math.sqrt(2.0))
-    throws = own.rows.throws
-    asked = Question(new, names, units_of_change(new, names), (speed.value, landing.value), throws.corner)
-    more = further_throws(asked, throws.x_before, own.rows.side, error)
+    loose = math.hypot(values[-1], SHARPEST * scene.arm_length)
+    names, throws = tuple(each.name for each in fitted), own.rows.throws
+    # where no error is known the gain of further throws is computed with all scatter as one
+    error = own.rows.error if own.rows.known else np.full(len(throws), landing.value / math.sqrt(2.0))
+    units = dict(zip(names, units_of_change(new, names).tolist(), strict=True))
+    scatter = (speed.value, landing.value)
     misread, misread_rate = _misread(own.rows, len(scene.sides))
     return Fit(
         scene=new,
@@ -222,9 +213,9 @@ def _answer(
         misread_rate=misread_rate,
         misfit=misfit_of(scene, start),
         explained=remark,
-        residuals=misses,
-        deviations=sizes,
-        further=more,
+        residuals=throws.x_after - told.after[0],
+        deviations=np.sqrt(told.variance(own.rows.error, values[-2], loose)[0]),
+        further=further_throws(throws, own.rows.side, error, scene=new, units=units, scatter=scatter),
         seconds=time.perf_counter() - begin,
         likelihood=own,
         best=best,
@@ -239,19 +230,19 @@ def _misread(
     from scipy.stats import beta
 
     throws, after = rows.throws, rows.side_after(sides)
+    readings = (
+        ("side_before", throws.side_before, rows.side, rows.misread_before()),
+        ("side_after", throws.side_after, after, rows.misread_after(sides)),
+    )
     lines = [
-        (int(throws.row[k]), "side_before", int(throws.side_before[k]), int(rows.side[k]))
-        for k in np.flatnonzero(rows.misread_before())
-    ]
-    lines += [
-        (int(throws.row[k]), "side_after", int(throws.side_after[k]), int(after[k]))
-        for k in np.flatnonzero(rows.misread_after(sides))
+        (int(throws.row[k]), name, int(recorded[k]), int(fits[k]))
+        for name, recorded, fits, misread in readings
+        for k in np.flatnonzero(misread)
     ]
     wrong, count = rows.misread(sides)
     tail = 0.5 * (1.0 - LEVEL)
     lo = float(beta.ppf(tail, wrong, count - wrong + 1)) if wrong else 0.0
-    hi = float(beta.ppf(1.0 - tail, wrong + 1, count - wrong))
-    return tuple(sorted(lines)), (wrong / count, lo, hi)
+    return tuple(sorted(lines)), (wrong / count, lo, float(beta.ppf(1.0 - tail, wrong + 1, count - wrong)))
 
 
 # ----------------------------------------------------------------
@@ -364,9 +355,7 @@ def bootstrap(found: Fit, count: int = 200, *, seed: int = 0, progress: Progress
     inside = np.clip(read, None, scene.arm_length)
     truth = {name: scene.value(name) for name in own.names}
     covered = dict.fromkeys((each.name for each in found.quantities), 0)
-    for number in range(count):
-        if progress is not None:
-            progress("bootstrap", number, count)
+    for number in one_by_one("bootstrap", range(count), count, progress):
         film = simulated_throws(
             scene,
             inside,
@@ -377,8 +366,7 @@ def bootstrap(found: Fit, count: int = 200, *, seed: int = 0, progress: Progress
             corner=corner,
             seed=seed + number,
         )
-        again = fit(scene, replace(film, row=rows.throws.row))
-        for each in again.quantities:
+        for each in fit(scene, replace(film, row=rows.throws.row)).quantities:
             if each.name in covered:
                 covered[each.name] += each.lo <= truth[each.name] <= each.hi
     return Bootstrap(count, covered)

@@ -14,11 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.parameters.fitting.throws import Throws
@@ -33,8 +34,6 @@ from limitsets.systems.maps.pieces import at_points
 
 
 STEP = 1e-5
-
-Array = NDArray[np.float64]
 
 
 class Predicted(NamedTuple):
@@ -60,15 +59,19 @@ class Predicted(NamedTuple):
     decides: Array
     decides_slope: Array
     decides_per_log_speed: Array
-    possible: NDArray[np.bool_]
+    possible: Mask
+
+    def variance(self, error: Array, speed: Array | float, landing: Array | float) -> Array:
+        """Give that of each landing, by the error of its places and the scatter of the speed and of landings."""
+        return error**2 * (1.0 + self.slope**2) + (self.per_log_speed * speed) ** 2 + landing**2
 
 
 def predicted(
     scene: Scene,
-    values: Mapping[str, Array],
+    values: Mapping[str, Array | float],
     before: Array,
-    side: NDArray[np.int64],
-    branch: NDArray[np.int64],
+    side: Ints,
+    branch: Ints,
     *,
     corner: bool,
 ) -> Predicted:
@@ -77,7 +80,7 @@ def predicted(
     Places are those of the centre of mass, or, with `corner`, of the left corner of the side that the part rests on.
     How far this corner is from the centre of mass is the part's geometry, which varies with the quantities.
     """
-    stack = throw_stack(scene, values)
+    stack = throw_stack(scene, {name: np.atleast_1d(value) for name, value in values.items()})
     params, move = stack.params, STEP * scene.arm_length
     x = before + params.a[:, side] if corner else before
     after, slope, decides = at_points(params, x, side, branch)
@@ -114,8 +117,6 @@ MISREAD, MISLAID = 0.02, 0.0004
 # Critical points are not yet known: to this share of the arm's length.
 CRITICAL = 0.05
 
-Whole = NDArray[np.int64]
-
 
 @dataclass(frozen=True, eq=False)
 class Rows:
@@ -136,25 +137,25 @@ class Rows:
     """
 
     throws: Throws
-    side: Whole
-    branch: Whole
+    side: Ints
+    branch: Ints
     error: Array
     known: bool
 
-    def told(self, scene: Scene, values: Mapping[str, Array]) -> Predicted:
+    def told(self, scene: Scene, values: Mapping[str, Array | float]) -> Predicted:
         """Predict these throws for a scene at m values of its quantities: the places that were read."""
         throws = self.throws
         return predicted(scene, values, throws.x_before, self.side, self.branch, corner=throws.corner)
 
-    def side_after(self, sides: int) -> Whole:
+    def side_after(self, sides: int) -> Ints:
         """Return the side on which each throw ended."""
         return (self.side + self.branch) % sides
 
-    def misread_before(self) -> NDArray[np.bool_]:
+    def misread_before(self) -> Mask:
         """Where the side before is misrecorded, in a reading of its own."""
         return np.asarray((self.side != self.throws.side_before) & ~self.throws.shared)
 
-    def misread_after(self, sides: int) -> NDArray[np.bool_]:
+    def misread_after(self, sides: int) -> Mask:
         """Where the side after is misrecorded."""
         return np.asarray(self.side_after(sides) != self.throws.side_after)
 
@@ -190,7 +191,7 @@ def assigned(rows: Rows, scene: Scene, values: Mapping[str, float], spread: floa
     side, branch = (each.reshape(-1) for each in np.indices((sides, 2)))
     told = predicted(
         scene,
-        {name: np.array([value]) for name, value in values.items()},
+        values,
         np.tile(throws.x_before, side.size),
         np.repeat(side, count),
         np.repeat(branch, count),
@@ -237,13 +238,6 @@ class Whitened(NamedTuple):
     log_variance: Array
 
 
-def _variances(rows: Rows, told: Predicted, speed: Array, landing: Array) -> tuple[Array, Array]:
-    """Variance of each landing, and the covariance with that of the row before; shape (m, n)."""
-    v = rows.error**2 * (1.0 + told.slope**2) + (told.per_log_speed * speed) ** 2 + landing**2
-    before = np.concatenate([[0.0], rows.error[:-1]])
-    return v, np.where(rows.throws.shared, -told.slope * rows.error * before, 0.0)
-
-
 def whitened(
     rows: Rows, told: Predicted, speed: Array, landing: Array, miss: Array | None = None
 ) -> Whitened:
@@ -260,7 +254,10 @@ def whitened(
     miss : ndarray, shape (m, n), optional
         Instead of what was measured less what is predicted [length].
     """
-    variance, covariance = _variances(rows, told, speed, landing)
+    variance = told.variance(rows.error, speed, landing)
+    # with the landing of the row before
+    before = np.concatenate([[0.0], rows.error[:-1]])
+    covariance = np.where(rows.throws.shared, -told.slope * rows.error * before, 0.0)
     residual = rows.throws.x_after - told.after if miss is None else miss
     if covariance.any():
         residual, variance = (each.copy() for each in np.broadcast_arrays(residual, variance))
@@ -306,9 +303,8 @@ class Likelihood:
     def told(self, values: Array) -> Predicted:
         """Return what is predicted at m points."""
         points = dict(zip(self.names, values.T[: len(self.names)], strict=True))
-        if not points:
-            points = {"arm.surface_height": np.full(len(values), self.scene.surface_height)}
-        return self.rows.told(self.scene, points)
+        as_it_is = {"arm.surface_height": np.full(len(values), self.scene.surface_height)}
+        return self.rows.told(self.scene, points or as_it_is)
 
     def decision(self, told: Predicted, speed: Array, landing: Array) -> Array:
         """Return by how many of its standard deviations each decision is on the side where it fell; (m, n)."""
@@ -371,27 +367,26 @@ class Further:
     shrinks: dict[str, float]
 
 
-class Question(NamedTuple):
-    """Quantities of a scene that are to be known, the units of their change, the scatter of speed and place.
+def information(
+    x: Array,
+    side: Ints,
+    error: Array,
+    *,
+    scene: Scene,
+    units: Mapping[str, float],
+    scatter: tuple[float, float],
+    corner: bool,
+) -> Array:
+    """Return the information of single throws about quantities in their units of change; shape (n, p, p).
 
-    With `corner` places are those of the left corner, else of the centre of mass.
+    `scatter` is that of speed and place; with `corner` places are those of the left corner, else of the centre of mass.
     """
-
-    scene: Scene
-    names: tuple[str, ...]
-    units: Array
-    scatter: tuple[float, float]
-    corner: bool
-
-
-def information(asked: Question, x: Array, side: NDArray[np.int64], error: Array) -> Array:
-    """Return the information of single throws about quantities in their units of change; shape (n, p, p)."""
     from scipy.stats import norm
 
-    scene, names, units, scatter, corner = asked
-    centre = np.array([scene.value(name) for name in names])
-    moves = np.concatenate([np.zeros((1, len(names))), np.diag(units), -np.diag(units)]) * STEP_OF_GAIN
-    points = dict(zip(names, (centre + moves).T, strict=True))
+    centre, p = np.array([scene.value(name) for name in units]), len(units)
+    unit = np.diag([*units.values()])
+    moves = np.concatenate([np.zeros((1, p)), unit, -unit]) * STEP_OF_GAIN
+    points = dict(zip(units, (centre + moves).T, strict=True))
     jog, flip = (
         predicted(scene, points, x, side, np.full(side.size, b, np.int64), corner=corner) for b in (0, 1)
     )
@@ -399,32 +394,41 @@ def information(asked: Question, x: Array, side: NDArray[np.int64], error: Array
     size = np.sqrt((jog.decides_slope * error) ** 2 + (jog.decides_per_log_speed * speed) ** 2)[0]
     z = jog.decides / np.maximum(size, 1e-9)
     flips = norm.cdf(z[0])
-    p = len(names)
     total = np.zeros((side.size, p, p))
     for told, share in ((jog, 1.0 - flips), (flip, flips)):
         slope = ((told.after[1 : p + 1] - told.after[p + 1 :]) / (2.0 * STEP_OF_GAIN)).T
-        variance = error**2 * (1.0 + told.slope[0] ** 2) + (told.per_log_speed[0] * speed) ** 2 + landing**2
-        total += (share / variance)[:, None, None] * slope[:, :, None] * slope[:, None, :]
+        total += (
+            (share / told.variance(error, speed, landing)[0])[:, None, None]
+            * slope[:, :, None]
+            * slope[:, None, :]
+        )
     slope = ((z[1 : p + 1] - z[p + 1 :]) / (2.0 * STEP_OF_GAIN)).T
     weight = norm.pdf(z[0]) ** 2 / np.maximum(flips * (1.0 - flips), 1e-30)
     total += weight[:, None, None] * slope[:, :, None] * slope[:, None, :]
     return np.where(np.isfinite(total), total, 0.0)
 
 
-def further_throws(asked: Question, x: Array, side: NDArray[np.int64], error: Array) -> tuple[Further, ...]:
+def further_throws(
+    filmed: Throws,
+    side: Ints,
+    error: Array,
+    *,
+    scene: Scene,
+    units: Mapping[str, float],
+    scatter: tuple[float, float],
+) -> tuple[Further, ...]:
     """Find the start on each side from which a throw tells most beside those filmed; the most telling first."""
-    scene, names = asked.scene, asked.names
-    known = information(asked, x, side, error).sum(axis=0)
-    known += np.eye(len(names)) / BEFORE**2
+    told_by = partial(information, scene=scene, units=units, scatter=scatter, corner=filmed.corner)
+    known = told_by(filmed.x_before, side, error).sum(axis=0) + np.eye(len(units)) / BEFORE**2
     further = []
-    size = float(np.mean(error)) if np.mean(error) > 0 else asked.scatter[1]
+    size = float(np.mean(error)) if np.mean(error) > 0 else scatter[1]
     for own in range(len(scene.sides)):
         near, far = scene.sides.a[own], scene.arm_length
-        places = np.linspace(near + 0.02 * (far - near), far, PLACES) - (near if asked.corner else 0.0)
-        there = information(asked, places, np.full(PLACES, own), np.full(PLACES, size))
+        places = np.linspace(near + 0.02 * (far - near), far, PLACES) - (near if filmed.corner else 0.0)
+        there = told_by(places, np.full(PLACES, own), np.full(PLACES, size))
         gains = np.linalg.slogdet(known + there)[1] - np.linalg.slogdet(known)[1]
         best = int(np.argmax(gains))
         ratio = np.diag(np.linalg.inv(known)) / np.diag(np.linalg.inv(known + MORE * there[best]))
-        shrinks = {name: float(np.sqrt(each)) for name, each in zip(names, ratio, strict=True)}
+        shrinks = {name: float(np.sqrt(each)) for name, each in zip(units, ratio, strict=True)}
         further.append(Further(float(places[best]), own, 0.5 * float(gains[best]), shrinks))
     return tuple(sorted(further, key=lambda each: -each.gain))

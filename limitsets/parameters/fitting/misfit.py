@@ -9,17 +9,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import DataError
+from limitsets.base import DataError
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.units import UNITS, exact_factor
 from limitsets.parameters.fitting.likelihood import MISREAD, Rows, as_recorded, assigned, whitened
 from limitsets.parameters.fitting.searching import (
+    MEDIAN,
     Start,
     jacobian,
     quantities_of,
@@ -42,8 +44,6 @@ NOTHING = 1e-9
 NAMED = 3.5
 # Scatters up to so many robust ones, and how many of them are tried.
 WIDEST, SIZES = 1.5, 16
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,7 @@ class Misfit:
 def misfit_of(scene: Scene, start: Start) -> Misfit:
     """Test the model by the robust fit: the most likely machine leans towards throws that no machine makes."""
     rows = start.rows
-    points = {name: np.array([value]) for name, value in zip(start.names, start.values, strict=True)}
-    told = rows.told(scene, points)
+    told = rows.told(scene, start.known)
     slopes = jacobian(scene, rows, start.names, start.values, units_of_change(scene, start.names))
     # of speed and of landings: the scatter that is most likely for the landings that are not far off
     sizes = start.spread * np.linspace(0.0, WIDEST, SIZES)
@@ -90,17 +89,14 @@ def misfit_of(scene: Scene, start: Start) -> Misfit:
     k = [int(np.argmin(loss.sum(axis=1)))]
 
     def white(miss: Array | None) -> Array:
-        residuals: Array = whitened(rows, told, speed[k], landing[k], miss).residual[0]
-        return residuals
+        return np.asarray(whitened(rows, told, speed[k], landing[k], miss).residual[0])
 
     columns = np.stack([white(column[None]) for column in slopes.T], axis=1)
     throws = rows.throws
     return misfit(white(None), columns, 2 * rows.side + rows.branch, throws.x_before, throws.row)
 
 
-def misfit(
-    residual: Array, slopes: Array, groups: NDArray[np.int64], x: Array, row: NDArray[np.int64]
-) -> Misfit:
+def misfit(residual: Array, slopes: Array, groups: Ints, x: Array, row: Ints) -> Misfit:
     """Test what is left of the landings.
 
     Parameters
@@ -132,10 +128,9 @@ def _cleared(residual: Array, slopes: Array) -> Array:
         normal = np.einsum("mn,np,nq->mpq", weight, slopes, slopes)
         pull = np.einsum("mn,np,mn->mp", weight, slopes, residual)
         left = residual - np.linalg.solve(normal, pull[..., None])[..., 0] @ slopes.T
-        size = np.maximum(np.median(np.abs(left), axis=1, keepdims=True) / 0.6744897501960817, NOTHING)
+        size = np.maximum(np.median(np.abs(left), axis=1, keepdims=True) / MEDIAN, NOTHING)
         weight = np.minimum(1.0, BEND * size / np.maximum(np.abs(left), 1e-300))
-    scaled: Array = left / size
-    return scaled
+    return np.asarray(left / size)
 
 
 def _ratio(z: Array) -> Array:
@@ -149,7 +144,7 @@ def _ratio(z: Array) -> Array:
     return ratio
 
 
-def _structure(residual: Array, slopes: Array, groups: NDArray[np.int64], x: Array) -> float | None:
+def _structure(residual: Array, slopes: Array, groups: Ints, x: Array) -> float | None:
     """F test of a parabola in x for each side and branch, beside the slopes; None for too few throws."""
     from scipy.stats import f as f_law
 
@@ -227,7 +222,7 @@ class _Judged(NamedTuple):
     start: Start | None
 
 
-def impossible(scene: Scene, throws: Throws) -> NDArray[np.bool_]:
+def impossible(scene: Scene, throws: Throws) -> Mask:
     """Say which throws cannot be: from or to places off the arm, on sides that the part does not have; shape (n,)."""
     count, most = len(scene.sides), (1.0 + SLACK) * scene.arm_length
     corner = (
@@ -261,11 +256,10 @@ def explained(
         raise refused
     reading = explanation(scene, throws, error, known, start)
     if reading is not None and (start is None or not reading.fitted):
-        allowed = "throws that this machine can make"
         raise DataError(
             "what the film shows",
             "no throws of this machine",
-            allowed,
+            "throws that this machine can make",
             reading.said,
             file=throws.file or None,
         ) from refused
@@ -301,18 +295,15 @@ def explanation(
 
     def fitted(reading: _Reading) -> _Judged:
         """Return the cost of a reading at its best."""
-        rows = _rows(scene, reading, error, known)
-        try:
-            own = robust_start(scene, rows) if rows is not None else None
-        except DataError:
-            own = None
+        rows, own = _rows(scene, reading, error, known), None
+        with suppress(DataError):
+            own = None if rows is None else robust_start(scene, rows)
         if own is None or doubtful(scene, own):
             return _Judged(math.inf, None)
-        return _Judged(_cost(scene, own.rows, _values(own), reading.scale), own)
+        return _Judged(_cost(scene, own.rows, own.known, reading.scale), own)
 
-    now = math.inf if start is None else _cost(scene, start.rows, _values(start), 1.0)
-    first = sorted(_readings(scene, throws), key=suits)[:FITTED]
-    judged = [(reading, fitted(reading)) for reading in first]
+    now = math.inf if start is None else _cost(scene, start.rows, start.known, 1.0)
+    judged = [(reading, fitted(reading)) for reading in sorted(_readings(scene, throws), key=suits)[:FITTED]]
     plain, best = min(judged, key=lambda pair: pair[1].cost)
     gained = best.start is not None and now - best.cost > EACH * len(throws)
     if gained and _holds(scene, best):
@@ -374,7 +365,7 @@ def _other_sides(count: int, throws: Throws) -> Iterator[_Reading]:
     """Count the sides from another one, or the other way round."""
     both = np.stack([throws.side_before, throws.side_after])
 
-    def counted(sides: NDArray[np.int64], said: str) -> _Reading:
+    def counted(sides: Ints, said: str) -> _Reading:
         return _Reading(said, replace(throws, side_before=sides[0], side_after=sides[1]))
 
     if both.max() < count or (both.min() >= 1 and both.max() == count):
@@ -422,10 +413,9 @@ def _closest(
 
     numbers = np.sort(np.append(grid, 0.0))
     k = int(np.argmin([suits(make(each)) for each in numbers]))
-    ends = numbers[max(k - 1, 0)], numbers[min(k + 1, numbers.size - 1)]
     best = minimize_scalar(
         lambda number: min(fitted(make(number)).cost, WORST),
-        bounds=ends,
+        bounds=(numbers[max(k - 1, 0)], numbers[min(k + 1, numbers.size - 1)]),
         method="bounded",
         options={"maxiter": STEPS},
     )
@@ -442,10 +432,6 @@ def _rough(scene: Scene) -> float:
     return CLOSE * float(np.mean(scene.sides.length))
 
 
-def _values(start: Start) -> dict[str, float]:
-    return dict(zip(start.names, start.values.tolist(), strict=True))
-
-
 def _rows(scene: Scene, reading: _Reading, error: Array, known: bool) -> Rows | None:
     """Return the rows of a reading; None where it has sides that the part does not have, or places off the arm."""
     if impossible(scene, reading.throws).any():
@@ -456,7 +442,7 @@ def _rows(scene: Scene, reading: _Reading, error: Array, known: bool) -> Rows | 
 def _cost(scene: Scene, rows: Rows, values: dict[str, float], scale: float) -> float:
     """Return minus the logarithm of the likelihood: landings by a law of Cauchy, in places as written, and sides."""
     count = len(scene.sides)
-    told = rows.told(scene, {name: np.array([value]) for name, value in values.items()})
+    told = rows.told(scene, values)
     miss = np.nan_to_num(rows.throws.x_after - told.after[0], nan=scene.arm_length) / scale
     least = (1e-6 * scene.arm_length) ** 2
     square = max(float(np.median(miss**2)), least)

@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import DataError
+from limitsets.base import DataError
+from limitsets.base.arrays import Array, Ints
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.fitting.likelihood import SCATTERS, Likelihood, Rows, assigned
 
@@ -34,8 +34,6 @@ LOSSES = ("soft_l1", "cauchy", "huber")
 MEDIAN = 0.6744897501960817
 # Where the landings are first taken apart robustly: what misses by more is treated as an outlier, this share of a side.
 ROUGH = 0.02
-
-Array = NDArray[np.float64]
 
 
 class Start(NamedTuple):
@@ -65,12 +63,16 @@ class Start(NamedTuple):
     undetermined: dict[str, str]
     spread: float
 
+    @property
+    def known(self) -> dict[str, float]:
+        """The values by name."""
+        return dict(zip(self.names, self.values.tolist(), strict=True))
+
 
 def quantities_of(scene: Scene) -> tuple[str, ...]:
     """Name what landings depend on: the speed, or kappa without gravity, and what the scene is written in."""
     thrown = "throw.kappa" if scene.gravity is None else "throw.speed"
-    centre = "center" in scene.text["part"]["mass"]
-    return (thrown, *(QUANTITIES if centre else QUANTITIES[2:]))
+    return (thrown, *(QUANTITIES if ("center" in scene.text["part"]["mass"]) else QUANTITIES[2:]))
 
 
 def units_of_change(scene: Scene, names: tuple[str, ...]) -> Array:
@@ -92,8 +94,7 @@ def jacobian(scene: Scene, rows: Rows, names: tuple[str, ...], values: Array, un
     # a step to an impossible scene is left out: the difference is one-sided there
     after = np.where(told.possible, told.after, told.after[-1])
     steps = STEP * (told.possible[:count] * 1.0 + told.possible[count:-1])
-    derivatives: Array = ((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T
-    return derivatives
+    return np.asarray(((after[:count] - after[count:-1]) / np.maximum(steps, STEP)).T)
 
 
 def _least_squares(
@@ -103,11 +104,9 @@ def _least_squares(
     from scipy.optimize import least_squares
 
     def misses(at: Array) -> Array:
-        points = dict(zip(names, (values + units * at)[:, None], strict=True))
-        told = rows.told(scene, points)
+        told = rows.told(scene, dict(zip(names, values + units * at, strict=True)))
         miss = (rows.throws.x_after - told.after[0]) / scale
-        refused = np.full(miss.size, 1e6)
-        return np.where(np.isfinite(miss), miss, 1e6) if told.possible[0, 0] else refused
+        return np.where(np.isfinite(miss) & told.possible[0], miss, 1e6)
 
     def slopes(at: Array) -> Array:
         slope = -jacobian(scene, rows, names, values + units * at, units) / scale
@@ -136,7 +135,7 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
         for loss in LOSSES:
             values = _least_squares(scene, rows, names, values=values, units=units, scale=spread, loss=loss)
             here = dict(zip(names, values.tolist(), strict=True))
-            told = rows.told(scene, {k: np.array([v]) for k, v in here.items()})
+            told = rows.told(scene, here)
             spread = max(spread_of(rows.throws.x_after - told.after[0]), 1e-9 * scene.arm_length)
             if loss != LOSSES[0]:  # a machine that is not yet near explains nothing
                 rows = assigned(rows, scene, here, spread)
@@ -161,17 +160,14 @@ def robust_start(scene: Scene, rows: Rows) -> Start:
             )
         names, units = tuple(names[k] for k in keep), units[keep]
         values = np.array([scene.value(name) for name in names])
-    covariance = np.linalg.inv(slopes.T @ slopes / spread**2)
-    errors = np.sqrt(np.diag(covariance))
-    known = scene.with_values(dict(zip(names, values.tolist(), strict=True)))
-    undetermined = _undetermined(known, rows, names, together, slopes, errors)
+    errors = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes / spread**2)))
     return Start(
         rows=rows,
         names=names,
         values=values,
         errors=errors * units,
         held=held,
-        undetermined=undetermined,
+        undetermined=_undetermined(scene.with_values(here), rows, names, together, slopes, errors),
         spread=spread,
     )
 
@@ -254,7 +250,7 @@ class Maximum(NamedTuple):
     hessian: Array
 
 
-def _expanded(f: Function, at: Array, free: NDArray[np.int64]) -> tuple[float, Array, Array]:
+def _expanded(f: Function, at: Array, free: Ints) -> tuple[float, Array, Array]:
     """Value, gradient and Hessian with respect to the free numbers."""
     p = free.size
     one = np.zeros((p, at.size))
@@ -416,13 +412,11 @@ def largest(scene: Scene, start: Start) -> tuple[Likelihood, Maximum]:
     # landings that agree better than their errors of measurement by chance tell no more than these errors allow
     sizes[: len(start.names)] *= max(1.0, math.sqrt(float(known.mean())) / start.spread)
     own = replace(own, scale=np.append(sizes, [share, left]))
-    at = np.append(np.zeros(len(names)), [1.0, 1.0])
-    best = maximised(own, _best_radius(own, at))
+    best = maximised(own, _best_radius(own, np.append(np.zeros(len(names)), [1.0, 1.0])))
     for _ in range(ROUNDS):
         best_values = dict(zip(names, own.values(best.at)[0].tolist(), strict=False))
         again = assigned(own.rows, scene, best_values, start.spread)
-        same = (again.side == own.rows.side).all() and (again.branch == own.rows.branch).all()
-        if same:
+        if (again.side == own.rows.side).all() and (again.branch == own.rows.branch).all():
             break
         own = replace(own, rows=again)
         best = maximised(own, _best_radius(own, best.at))
@@ -446,8 +440,7 @@ def largest_radius(scene: Scene) -> float:
 
     arms = scene.vertices - np.array(scene.centre)
     shares = np.vstack([arms.T, np.ones(len(arms))])
-    program = linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0])
-    return math.sqrt(max(-float(program.fun), 0.0))
+    return math.sqrt(max(-float(linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0]).fun), 0.0))
 
 
 def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
@@ -457,8 +450,7 @@ def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
         return abs(float(best.at[k])) if way < 0 else 1e4
     if own.names[k] == RADIUS:
         scene = own.scene.with_values(dict(zip(own.names[:k], values.tolist(), strict=False)))
-        room = values[k] if way < 0 else max(largest_radius(scene) - values[k], 0.0)
-        return float(room / own.scale[k])
+        return float((values[k] if way < 0 else max(largest_radius(scene) - values[k], 0.0)) / own.scale[k])
     return 1e4
 
 

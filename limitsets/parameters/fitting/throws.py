@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import DataError, SceneError, shown
+from limitsets.base import DataError, SceneError, shown
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.units import UNITS, convert, parse
 
@@ -29,9 +29,6 @@ SLACK = 0.05
 LEAST_ROWS = 8
 
 _HEAD = re.compile(r"\s*([A-Za-z_]+)\s*(?:\[\s*([^\]]*?)\s*\])?\s*")
-
-Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +56,12 @@ class Throws:
     """
 
     x_before: Array
-    side_before: Whole
+    side_before: Ints
     x_after: Array
-    side_after: Whole
+    side_after: Ints
     error: Array
-    follows: NDArray[np.bool_]
-    row: Whole
+    follows: Mask
+    row: Ints
     file: str = ""
     corner: bool = False
     unit: str = ""
@@ -73,7 +70,7 @@ class Throws:
         return self.row.size
 
     @property
-    def shared(self) -> NDArray[np.bool_]:
+    def shared(self) -> Mask:
         """Whether the place before is the very reading of the row before, not one of its own."""
         same = np.zeros(len(self), dtype=bool)
         same[1:] = (self.x_before[1:] == self.x_after[:-1]) & (self.side_before[1:] == self.side_after[:-1])
@@ -84,8 +81,7 @@ class Throws:
         """Differences of two readings of one place: a row that follows another with a reading of its own [length]."""
         again = np.flatnonzero(self.follows & ~self.shared)
         again = again[self.side_before[again] == self.side_after[again - 1]]
-        differences: Array = self.x_before[again] - self.x_after[again - 1]
-        return differences
+        return np.asarray(self.x_before[again] - self.x_after[again - 1])
 
 
 def read_throws(file: str | Path, scene: Scene) -> Throws:

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import GridError
-from limitsets.base.files import as_table, picked
-from limitsets.parameters.noise.cell_images import Array, BoxcarOperator, cells_met
+from limitsets.base import GridError, as_table, picked
+from limitsets.base.arrays import Array, Ints, Mask
+from limitsets.parameters.noise.cell_images import BoxcarOperator, cells_met
 from limitsets.parameters.noise.ulam import SubOperator, Transfer
 from limitsets.systems.cells import CellSet, Domain, Grid, grid
-from limitsets.systems.graph.components import Components, strong_components
+from limitsets.systems.graph.components import strong_components
 from limitsets.systems.graph.ranges import RUN, START, Ranges, one_run
 from limitsets.systems.maps import kind_of
 
@@ -30,8 +30,6 @@ from limitsets.systems.maps import kind_of
 # its classes or fail.  The strong components of its graph therefore come first, and each eigenproblem is that of one
 # component. Source of quasi-stationary distributions: Darroch and Seneta, J. Appl. Prob. 2, 1965.
 
-
-Cells = NDArray[np.int64]
 
 # Escapes per step from which a class is not worth a name.
 SLOW = 0.02
@@ -97,21 +95,18 @@ def graph_of(chain: Transfer) -> Ranges:
         side = chain.grid.side_of(matrix.indices)
         new[1:] = (np.diff(source) != 0) | (np.diff(matrix.indices) != 1) | (np.diff(side) != 0)
         begin = np.flatnonzero(new)
-        run = np.diff(np.append(begin, source.size))
+        run = np.diff(begin, append=source.size)
         return _ranges(chain, source[begin], matrix.indices[begin].astype(np.int64), run)
-    rows, starts, runs = [], [], []
+    columns: list[Ints] = []
     for block in chain.throw.blocks:
-        some = block.mass > 0.0
         first, last = _cells_hit(chain, block, chain.throw)
-        some &= last >= first
-        rows.append((block.first + np.arange(some.size))[some])
-        starts.append(first[some] + int(chain.grid.offset[block.target]))
-        runs.append((last - first + 1)[some])
-    order = np.argsort(np.concatenate(rows), kind="stable")
-    return _ranges(chain, *(np.concatenate(column)[order] for column in (rows, starts, runs)))
+        source, start = block.first + np.arange(first.size), first + int(chain.grid.offset[block.target])
+        columns.append(np.stack([source, start, last - first + 1])[:, (block.mass > 0.0) & (last >= first)])
+    table = np.concatenate(columns, axis=1)
+    return _ranges(chain, *table[:, np.argsort(table[0], kind="stable")])
 
 
-def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Cells, Cells]:
+def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Ints, Ints]:
     """First and last cell of a side that boxcars and the noise of the landing place after them can reach."""
     first, last = cells_met(block.lo, block.hi)
     if chain.landing is None:
@@ -124,39 +119,31 @@ def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Cell
     return first, np.where(inside, last, first - 1)
 
 
-def _ranges(chain: Transfer, source: Cells, start: Cells, run: Cells) -> Ranges:
-    counts = np.bincount(source, minlength=chain.n_cells)
-    bits = (chain.sinks > 0.0) @ (1 << np.arange(chain.sinks.shape[1]))
+def _ranges(chain: Transfer, source: Ints, start: Ints, run: Ints) -> Ranges:
     return Ranges(
-        np.cumulative_sum(counts, include_initial=True),
+        np.cumulative_sum(np.bincount(source, minlength=chain.n_cells), include_initial=True),
         one_run(chain.grid.side_of(start), start, run),
         False,
         np.ones(chain.grid.sides, dtype=np.int64),
         np.ones(chain.grid.sides, dtype=np.int64),
-        bits.astype(np.uint8),
+        ((chain.sinks > 0.0) @ (1 << np.arange(chain.sinks.shape[1]))).astype(np.uint8),
     )
 
 
-def _members(parts: Components) -> list[Cells]:
-    """Cells of each recurrent component."""
-    cells = np.split(parts.order.astype(np.int64), np.cumsum(parts.size)[:-1])
-    return [np.sort(each) for each, again in zip(cells, parts.recurrent, strict=True) if again]
-
-
-def _without(r: Ranges, cells: NDArray[np.bool_]) -> Ranges:
+def _without(r: Ranges, cells: Mask) -> Ranges:
     """Return the graph in which the marked cells lead nowhere."""
-    counts = np.where(cells, 0, np.diff(r.first))
-    kept = np.repeat(~cells, np.diff(r.first))
-    first = np.cumulative_sum(counts, include_initial=True)
-    return r._replace(first=first, box=r.box[kept], single=False)
+    counts = np.diff(r.first)
+    first = np.cumulative_sum(np.where(cells, 0, counts), include_initial=True)
+    return r._replace(first=first, box=r.box[np.repeat(~cells, counts)], single=False)
 
 
 def recurrent_classes(
-    chain: Transfer, graph: Ranges, absorbing: NDArray[np.bool_] | None = None
-) -> tuple[list[Cells], list[Cells]]:
+    chain: Transfer, graph: Ranges, absorbing: Mask | None = None
+) -> tuple[list[Ints], list[Ints]]:
     """Recurrent components: those that no step leaves, and the others; marked cells are taken out as absorbing."""
-    gone = np.zeros(chain.n_cells, dtype=bool) if absorbing is None else absorbing
-    sets = _members(strong_components(graph if absorbing is None else _without(graph, gone)))
+    parts = strong_components(graph if absorbing is None else _without(graph, absorbing))
+    cells_of = np.split(parts.order.astype(np.int64), np.cumsum(parts.size)[:-1])
+    sets = [np.sort(cells) for cells, again in zip(cells_of, parts.recurrent, strict=True) if again]
     source = np.repeat(np.arange(chain.n_cells), np.diff(graph.first))
     label = np.full(chain.n_cells, -1)
     for number, cells in enumerate(sets):
@@ -173,17 +160,7 @@ def recurrent_classes(
     return [cells for cells in sets if not leaves[cells].any()], open_
 
 
-class _Counted(SubOperator):
-    """The operator on one component, whose products are counted."""
-
-    products = 0
-
-    def adjoint(self, masses: Array) -> Array:
-        self.products += 1
-        return super().adjoint(masses)
-
-
-def _arnoldi(part: _Counted) -> Array | None:
+def _arnoldi(part: SubOperator) -> Array | None:
     """Leading left eigenvector by Arnoldi's method; None where it does not come out."""
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
@@ -195,18 +172,16 @@ def _arnoldi(part: _Counted) -> Array | None:
         _, vectors = eigs(operator, k=1, which="LR", v0=np.ones(n), tol=1e-12, maxiter=200)
     except ArpackError:
         return None
-    vector = vectors[:, 0].real
-    vector = np.maximum(vector * np.sign(vector.sum()), 0.0)
-    total = float(vector.sum())
-    return vector / total if total > 0.0 else None
+    vector = np.maximum(vectors[:, 0].real * np.sign(vectors[:, 0].real.sum()), 0.0)
+    return vector / vector.sum() if vector.sum() > 0.0 else None
 
 
-def distribution(chain: Transfer, cells: Cells) -> tuple[Array, float, int]:
+def distribution(chain: Transfer, cells: Ints) -> tuple[Array, float, int]:
     """Stationary or quasi-stationary distribution of one component: weights of its cells, residual, products.
 
     Arnoldi's method finds it; steps that stay with probability 1/2, which no period survives, finish it.
     """
-    part = _Counted(chain, cells)
+    part = SubOperator(chain, cells)
     even = chain.grid.measure[cells] / chain.grid.measure[cells].sum()
     eigenvector = _arnoldi(part)
     weight = even if eigenvector is None else eigenvector
@@ -224,15 +199,12 @@ def distribution(chain: Transfer, cells: Cells) -> tuple[Array, float, int]:
     return weight, residual, part.products
 
 
-def _described(chain: Transfer, cells: Cells, closed: bool) -> NoisyClass:
+def _described(chain: Transfer, cells: Ints, closed: bool) -> NoisyClass:
     part, residual, steps = distribution(chain, cells)
-    weight = np.zeros(chain.n_cells)
-    weight[cells] = part
+    weight = chain.marked(cells, part)
     lost = part @ chain.sinks[cells]
     leads_to = {name: float(rate) for name, rate in zip(chain.exits, lost, strict=True)}
-    outside = np.ones(chain.n_cells)
-    outside[cells] = 0.0
-    leads_to["other cells"] = float(part @ np.maximum(chain.apply(outside), 0.0)[cells])
+    leads_to["other cells"] = float(part @ np.maximum(chain.apply(1.0 - chain.marked(cells)), 0.0)[cells])
     sides = {side: float(weight[chain.grid.of_side(side)].sum()) for side in range(chain.grid.sides)}
     names = kind_of(chain.map).branches
     shares = part @ chain.branches[cells]
@@ -248,13 +220,6 @@ def _described(chain: Transfer, cells: Cells, closed: bool) -> NoisyClass:
         residual=residual,
         steps=steps,
     )
-
-
-def _may_be_slow(chain: Transfer, cells: Cells) -> bool:
-    """Whether some cell keeps nearly all its mass in the class: the rate of escape is no less than the least loss."""
-    inside = np.zeros(chain.n_cells)
-    inside[cells] = 1.0
-    return bool(chain.apply(inside)[cells].max() > 1.0 - SLOW)
 
 
 def classes(chain: Transfer) -> tuple[NoisyClass, ...]:
@@ -280,7 +245,9 @@ def classes(chain: Transfer) -> tuple[NoisyClass, ...]:
     """
     closed, open_ = recurrent_classes(chain, graph_of(chain))
     closed_classes = [_described(chain, cells, closed=True) for cells in closed]
-    large = sorted((cells for cells in open_ if _may_be_slow(chain, cells)), key=len, reverse=True)
+    # some cell keeps nearly all its mass in a slow class: the rate of escape is no less than the least loss
+    slow = (cells for cells in open_ if chain.apply(chain.marked(cells))[cells].max() > 1.0 - SLOW)
+    large = sorted(slow, key=len, reverse=True)
     left = [_described(chain, cells, closed=False) for cells in large[:MOST_LEFT]]
     return (
         *closed_classes,
@@ -316,8 +283,8 @@ class Absorption:
 
     probability: dict[str, Array]
     mean: Array
-    goal: NDArray[np.bool_]
-    classes: tuple[NDArray[np.int64], ...]
+    goal: Mask
+    classes: tuple[Ints, ...]
     residual: float
 
 
@@ -337,7 +304,7 @@ def _triangle(matrix: Any) -> Any:
 class _Equations:
     """(I - Q) y = b on the cells where nothing is decided yet."""
 
-    def __init__(self, chain: Transfer, open_: NDArray[np.bool_], label: NDArray[np.int32]) -> None:
+    def __init__(self, chain: Transfer, open_: Mask, label: NDArray[np.int32]) -> None:
         cells = np.flatnonzero(open_)
         if chain.written_out:
             # In the order of the graph's components an edge leads back, or stays in its component: a triangle holds
@@ -353,14 +320,12 @@ class _Equations:
         """Solve for a right side that is given on all cells; 0 elsewhere."""
         from scipy.sparse.linalg import LinearOperator, gmres
 
-        cells, answer = self.part.cells, np.zeros(self.part.chain.n_cells)
-        b = right[cells]
+        b = right[self.part.cells]
         size = float(np.abs(b).max(initial=0.0))
         if size == 0.0:
-            return answer
-        n = cells.size
+            return np.zeros_like(right)
+        n, solution = b.size, np.zeros_like(b)
         operator = LinearOperator((n, n), matvec=self._product, dtype=np.float64)
-        solution = np.zeros(n)
         for _ in range(4):  # once more on what is left over: refines small answers
             rest = b - self._product(solution)
             if np.abs(rest).max() <= RESIDUAL * size:
@@ -368,16 +333,15 @@ class _Equations:
             step, _ = gmres(operator, rest, rtol=1e-12, restart=min(150, n), maxiter=20, M=self.inverse)
             solution = solution + step
         self.worst = max(self.worst, float(np.abs(b - self._product(solution)).max()) / size)
-        answer[cells] = solution
-        return answer
+        return self.part.chain.marked(self.part.cells, solution)
 
 
 def absorption(
     chain: Transfer,
-    goal: NDArray[np.bool_],
+    goal: Mask,
     *,
-    other: NDArray[np.bool_] | None = None,
-    classes: Sequence[NDArray[np.int64]] | None = None,
+    other: Mask | None = None,
+    classes: Sequence[Ints] | None = None,
 ) -> Absorption:
     """Find where the chain ends, and after how many steps it is at the goal.
 
@@ -416,17 +380,12 @@ def absorption(
     for cells in closed:
         open_[cells] = False
     equations = _Equations(chain, open_, strong_components(graph).label)
-    ends: dict[str, Any] = {"goal": np.flatnonzero(goal)}
-    if other is not None:
-        ends["other"] = np.flatnonzero(other & ~goal)
-    ends.update({f"class {number}": cells for number, cells in enumerate(closed)})
-    probability = {}
-    for name, cells in ends.items():
-        mark = np.zeros(chain.n_cells)
-        mark[cells] = 1.0
-        probability[name] = np.clip(mark + equations.solve(np.maximum(chain.apply(mark), 0.0)), 0.0, 1.0)
-    for number, name in enumerate(chain.exits):
-        probability[name] = np.clip(equations.solve(chain.sinks[:, number]), 0.0, 1.0)
+    ends: dict[str, Any] = {"goal": goal} | ({} if other is None else {"other": other & ~goal})
+    ends |= {f"class {number}": cells for number, cells in enumerate(closed)}
+    marks = {name: chain.marked(cells) for name, cells in ends.items()}
+    hits = {name: mark + equations.solve(np.maximum(chain.apply(mark), 0.0)) for name, mark in marks.items()}
+    hits |= {name: equations.solve(rates) for name, rates in zip(chain.exits, chain.sinks.T, strict=True)}
+    probability = {name: np.clip(chances, 0.0, 1.0) for name, chances in hits.items()}
     share = probability["goal"]
     steps = equations.solve(np.where(goal, 0.0, share))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -505,12 +464,11 @@ def cells_for_noise(domain: Domain, cells: int) -> Grid:
     plain = grid(domain, cells=cells, grading="uniform")
     if domain.anchor is None:
         return plain
-    sides = []
-    graded = grid(domain, cells=max(cells // 2, 1), grading="graded")
-    for (equal,), (towards,) in zip(plain.edges, graded.edges, strict=True):
-        narrower = towards[:-1][np.diff(towards) < equal[1] - equal[0]]
-        sides.append((np.union1d(equal, narrower),))
-    return Grid(domain, tuple(sides))
+    both = zip(plain.edges, grid(domain, cells=max(cells // 2, 1), grading="graded").edges, strict=True)
+    narrower = (
+        (equal, towards[:-1][np.diff(towards) < equal[1] - equal[0]]) for (equal,), (towards,) in both
+    )
+    return Grid(domain, tuple((np.union1d(*pair),) for pair in narrower))
 
 
 def with_border(grid: Grid, x: float) -> Grid:
@@ -528,18 +486,17 @@ def with_border(grid: Grid, x: float) -> Grid:
     sides = []
     for (edges,) in grid.edges:
         near = np.abs(edges - x).min() <= 1e-9 * (edges[-1] - edges[0])
-        outside = not edges[0] < x < edges[-1]
-        sides.append((edges if near or outside else np.sort(np.append(edges, x)),))
+        sides.append((edges if near or (not edges[0] < x < edges[-1]) else np.sort(np.append(edges, x)),))
     return Grid(grid.domain, tuple(sides))
 
 
-def random_starts(grid: Grid, lo: NDArray[np.float64], hi: float) -> Array:
+def random_starts(grid: Grid, lo: Array, hi: float) -> Array:
     """Masses of starts that lie anywhere from `lo[side]` to `hi`, equally likely per length on all sides."""
-    parts = []
-    for side, (edges,) in enumerate(grid.edges):
-        overlap = np.minimum(edges[1:], hi) - np.maximum(edges[:-1], lo[side])
-        parts.append(np.maximum(overlap, 0.0))
-    masses = np.concatenate(parts)
+    overlaps = (
+        np.minimum(edges[1:], hi) - np.maximum(edges[:-1], start)
+        for start, (edges,) in zip(lo, grid.edges, strict=True)
+    )
+    masses = np.maximum(np.concatenate([*overlaps]), 0.0)
     if not masses.sum() > 0.0:
         raise GridError("the range of the starts", (lo.tolist(), hi), "places on the arm", "move its ends")
     return masses / masses.sum()  # type: ignore[no-any-return]  # numpy types a quotient as Any
@@ -570,10 +527,9 @@ def feeding(chain: Transfer, ends: Absorption, starts: Array) -> Feeding:
         masses[stopped] = 0.0
     share = min(float(starts @ chance), 1.0)
     known = np.where(np.isfinite(ends.mean), ends.mean, 0.0)
-    mean = float(starts @ (known * chance)) / share if share > 0.0 else None
     return Feeding(
         np.array(arrived),
         share,
-        mean,
+        (float(starts @ (known * chance)) / share if share > 0.0 else None),
         {name: float(starts @ chances) for name, chances in ends.probability.items()},
     )

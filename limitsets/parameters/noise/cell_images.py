@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints
 from limitsets.systems.cells import Domain, Grid
 from limitsets.systems.maps import along, has_slope, images, kind_of, monotone_pieces
 from limitsets.systems.sets.measure import sample_points
@@ -30,8 +31,6 @@ from limitsets.systems.sets.measure import sample_points
 # A boxcar has the mean and the variance of the convolution of two uniform densities, the image of the cell and the
 # effect of the stratum: their widths add as squares.
 
-
-Array = NDArray[np.float64]
 
 # Share of a cell that is the least width of a boxcar: the image of a fixed or a turning point may have none.
 NARROWEST = 1e-4
@@ -89,8 +88,7 @@ def _position(edges: Array, x: Array) -> Array:
     """Where x lies, counted in cells; at the nearer end if beyond all edges."""
     k = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
     base = edges[k]
-    share: Array = np.clip((x - base) / (edges[k + 1] - base), 0.0, 1.0)
-    return k + share
+    return np.asarray(k + np.clip((x - base) / (edges[k + 1] - base), 0.0, 1.0))
 
 
 def _over(pieces: Array, running: Array, lo: Array, hi: Array) -> Array:
@@ -104,16 +102,14 @@ def _over(pieces: Array, running: Array, lo: Array, hi: Array) -> Array:
     between = (
         (first + 1 - lo) * pieces[first] + (hi - last) * pieces[last] + (running[last] - running[first + 1])
     )
-    value: Array = np.where(first == last, (hi - lo) * pieces[first], between)
-    return value
+    return np.where(first == last, (hi - lo) * pieces[first], between)
 
 
 def _running(values: Array) -> Array:
-    running: Array = np.cumulative_sum(values, include_initial=True)
-    return running
+    return np.asarray(np.cumulative_sum(values, include_initial=True))
 
 
-def cells_met(lo: Array, hi: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def cells_met(lo: Array, hi: Array) -> tuple[Ints, Ints]:
     """First and last cell that intervals of positions meet."""
     first = lo.astype(np.int64)
     return first, np.maximum(np.ceil(hi).astype(np.int64) - 1, first)
@@ -121,8 +117,8 @@ def cells_met(lo: Array, hi: Array) -> tuple[NDArray[np.int64], NDArray[np.int64
 
 def laid(boxcars: Boxcars, edges: Array) -> tuple[BoxcarBlock, Array, Array]:
     """Lay boxcars on the edges of their target: the sheet, and the mass that lands below and above all edges."""
-    lo, hi = boxcars.lo, boxcars.hi
-    least = NARROWEST * float(np.min(np.diff(edges)))
+    lo, hi, extent = boxcars.lo, boxcars.hi, np.diff(edges)
+    least = NARROWEST * float(extent.min())
     middle, half = 0.5 * (lo + hi), 0.5 * np.maximum(hi - lo, least)
     lo, hi = np.where(hi - lo < least, middle - half, lo), np.where(hi - lo < least, middle + half, hi)
     per_width = boxcars.weight / (hi - lo)
@@ -131,7 +127,6 @@ def laid(boxcars: Boxcars, edges: Array) -> tuple[BoxcarBlock, Array, Array]:
     mass = np.maximum(boxcars.weight - below - above, 0.0)
     at_lo, at_hi = _position(edges, lo), _position(edges, hi)
     # The length as the operator will find it: the rows then add up to the mass exactly.
-    extent = np.diff(edges)
     length = _over(extent, _running(extent), at_lo, at_hi)
     some = length > 0.0
     per_length = np.where(some, mass / np.where(some, length, 1.0), 0.0)
@@ -142,7 +137,7 @@ def laid(boxcars: Boxcars, edges: Array) -> tuple[BoxcarBlock, Array, Array]:
     )
 
 
-def mass_rows(block: BoxcarBlock, edges: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+def mass_rows(block: BoxcarBlock, edges: Array) -> tuple[Ints, Ints, Array]:
     """Write the entries of a sheet out: source, cell of the target side, mass."""
     lo, hi = block.lo, np.minimum(block.hi, edges.size - 1.0)
     first, last = cells_met(lo, hi)
@@ -151,11 +146,10 @@ def mass_rows(block: BoxcarBlock, edges: Array) -> tuple[NDArray[np.int64], NDAr
     cell = np.arange(owner.size) - np.repeat(np.cumsum(count) - count, count) + first[owner]
     part = np.maximum(np.minimum(hi[owner], cell + 1.0) - np.maximum(lo[owner], cell), 0.0)
     cell = np.minimum(cell, edges.size - 2)
-    mass = block.per_length[owner] * part * np.diff(edges)[cell]
-    return owner + block.first, cell, mass
+    return owner + block.first, cell, (block.per_length[owner] * part * np.diff(edges)[cell])
 
 
-def first_cells(edges: tuple[Array, ...]) -> NDArray[np.int64]:
+def first_cells(edges: tuple[Array, ...]) -> Ints:
     """Return the number of the first cell of each side, and last that of all."""
     return np.cumulative_sum([each.size - 1 for each in edges], include_initial=True)
 
@@ -215,16 +209,13 @@ class BoxcarOperator:
         from scipy.sparse import coo_array
 
         offset = first_cells(self.edges)
-        rows, columns, masses = [], [], []
+        entries = []
         for block in self.blocks:
             source, cell, mass = mass_rows(block, self.edges[block.target])
-            some = mass > 0.0
-            rows.append(source[some].astype(np.int32))
-            columns.append((cell[some] + offset[block.target]).astype(np.int32))
-            masses.append(mass[some])
-        place = (np.concatenate(rows), np.concatenate(columns))
-        whole = coo_array((np.concatenate(masses), place), shape=(self.rows, int(offset[-1])))
-        return whole.tocsr()
+            some, column = mass > 0.0, cell + offset[block.target]
+            entries.append((source[some].astype(np.int32), column[some].astype(np.int32), mass[some]))
+        rows, columns, masses = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+        return coo_array((masses, (rows, columns)), shape=(self.rows, int(offset[-1]))).tocsr()
 
 
 # ----------------------------------------------------------------
@@ -254,15 +245,10 @@ Pieces = dict[int, tuple[BranchInterval, ...]]
 def _cut(params: Any, domain: Domain) -> Pieces:
     by_side = {}
     for side, pieces in monotone_pieces(params, domain).items():
-        ends = [*(piece.lo for piece in pieces[1:]), np.inf]
         # The last float of a piece and the first of the next are neighbours: the gap between them is nothing.
-        tops = [
-            end if np.nextafter(piece.hi, np.inf) == end else piece.hi
-            for piece, end in zip(pieces, ends, strict=True)
-        ]
-        by_side[side] = tuple(
-            BranchInterval(p.lo, float(top), p.branch) for p, top in zip(pieces, tops, strict=True)
-        )
+        ends = zip(pieces, [*(piece.lo for piece in pieces[1:]), np.inf], strict=True)
+        tops = ((p, end if np.nextafter(p.hi, np.inf) == end else p.hi) for p, end in ends)
+        by_side[side] = tuple(BranchInterval(p.lo, float(top), p.branch) for p, top in tops)
     return by_side
 
 
@@ -283,7 +269,7 @@ class InterpolatedPieces:
         Values that will be asked for.
     """
 
-    def __init__(self, map_of: Callable[[float], Any], domain: Domain, values: NDArray[np.float64]) -> None:
+    def __init__(self, map_of: Callable[[float], Any], domain: Domain, values: Array) -> None:
         self.map_of, self.domain = map_of, domain
         self.nodes = np.empty(0)
         lo, hi = float(values.min()), float(values.max())

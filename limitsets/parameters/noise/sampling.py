@@ -9,18 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
-from limitsets.feeder.scattering import Gaussian, Scattering, Uniform, still_map
+from limitsets.base import AnswerError
+from limitsets.base.arrays import Array, Ints, Mask
+from limitsets.feeder.scattering import Gaussian, Scattering, Uniform, still_map, uniform_starts
+from limitsets.feeder.scene import Scene
 from limitsets.systems.maps import advance, kind_of
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-
 
 # ----------------------------------------------------------------
 # The interval of a probability that was counted: successes of independent trials.
@@ -78,9 +75,9 @@ class SampledStatistics:
     throws: int
     numbers: dict[str, float]
     errors: dict[str, float]
-    density: tuple[NDArray[np.float64], ...]
-    bins: tuple[NDArray[np.float64], ...]
-    arrived: NDArray[np.int64]
+    density: tuple[Array, ...]
+    bins: tuple[Array, ...]
+    arrived: Ints
     parts: int
 
 
@@ -101,38 +98,32 @@ def scattering_map(scene: Scene, scatter: Scattering, seed: int = 0) -> Any:
     from limitsets.feeder.thrower.effects.spread import Even, Normal, Spread
     from limitsets.feeder.thrower.full import with_effects
 
-    laws = [getattr(scatter, name) for name in scatter.given()]
-    alike = {type(law) for law in laws}
-    if not laws:
+    alike = {type(getattr(scatter, name)) for name in scatter.given()}
+    if not alike:
         return still_map(scene)
-    if len(alike) != 1 or not alike <= {Gaussian, Uniform} or scatter.tilt is not None:
+    if alike not in ({Gaussian}, {Uniform}) or scatter.tilt is not None:
         allowed = "Gaussian or Uniform of speed and landing, both of one kind"
         raise AnswerError("the noise to throw with", scatter.words(), allowed, "use the operator for others")
-    scale = {name: _scale(getattr(scatter, name)) for name in ("speed", "landing")}
+    law, size = (Even(), "bound") if alike == {Uniform} else (Normal(), "sigma")
+    speed, landing = (float(getattr(each, size, 0.0)) for each in (scatter.speed, scatter.landing))
     plain = still_map(scene)
     full = plain if hasattr(plain, "bare") else with_effects(plain, {}, None)
-    law = Even() if alike == {Uniform} else Normal()
-    spread = Spread(law, scale["speed"], scale["landing"], float(seed))
-    return full._replace(effects=(*full.effects, spread))
-
-
-def _scale(law: Any) -> float:
-    return 0.0 if law is None else float(law.sigma if isinstance(law, Gaussian) else law.bound)
+    return full._replace(effects=(*full.effects, Spread(law, speed, landing, float(seed))))
 
 
 class ManyParts:
     """Parts under way; every throw of every part draws numbers of its own, the first the one after `drawn` others."""
 
-    def __init__(self, params: Any, x: NDArray[np.float64], side: NDArray[np.int64], drawn: int = 0) -> None:
+    def __init__(self, params: Any, x: Array, side: Ints, drawn: int = 0) -> None:
         self.params, self.x, self.side, self.drawn = params, x, side, drawn
 
-    def throw(self) -> NDArray[np.int64]:
+    def throw(self) -> Ints:
         """Throw each once; what happened to them."""
         self.x, self.side, code, _ = advance(self.params, self.x, self.side, 1, first=self.drawn)
         self.drawn += self.x.size
         return code
 
-    def keep(self, some: NDArray[np.bool_]) -> None:
+    def keep(self, some: Mask) -> None:
         """Go on with some of them."""
         self.x, self.side = self.x[some], self.side[some]
 
@@ -141,7 +132,7 @@ def throw_many(
     scene: Scene,
     scatter: Scattering,
     goal: tuple[float, int],
-    starts_from: NDArray[np.float64],
+    starts_from: Array,
     *,
     throws: int = 10_000_000,
     parts: int = 20_000,
@@ -192,26 +183,12 @@ def throw_many(
     )
 
 
-def uniform_starts(
-    random: np.random.Generator,
-    lo: NDArray[np.float64],
-    hi: float | NDArray[np.float64],
-    count: int,
-    sides: NDArray[np.int64] | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Draw starts from ranges `lo` to `hi` on some sides, by default one on each, equally likely per length."""
-    length = np.maximum(hi - lo, 0.0)
-    drawn = random.choice(lo.size, size=count, p=length / length.sum())
-    side = drawn if sides is None else sides[drawn]
-    return random.uniform(lo[drawn], np.broadcast_to(hi, lo.shape)[drawn]), side.astype(np.int64)
-
-
-def _mean(per_part: NDArray[np.float64]) -> tuple[float, float]:
+def _mean(per_part: Array) -> tuple[float, float]:
     """Mean over parts and its standard error."""
     return float(per_part.mean()), float(per_part.std(ddof=1)) / math.sqrt(per_part.size)
 
 
-def _ratio(over: NDArray[np.float64], under: NDArray[np.float64]) -> tuple[float, float]:
+def _ratio(over: Array, under: Array) -> tuple[float, float]:
     """Ratio of two means over parts and its standard error, to first order."""
     if not under.sum() > 0.0:
         return float("nan"), float("nan")
@@ -238,12 +215,11 @@ def _long_run(
         far = (many.x >= goal[0]) & alive
         beyond += far
         wrong += far & (many.side != goal[1])
-        for k in range(sides):
-            here = (many.side == k) & alive
-            on_side[k] += here
-            histograms[k] += np.histogram(many.x[here], borders[k])[0]
-        for k in range(len(names)):
-            by_branch[k] += (code == k) & alive
+        here = (many.side == np.arange(sides)[:, None]) & alive
+        on_side += here
+        by_branch += (code == np.arange(len(names))[:, None]) & alive
+        for histogram, on_it, edges in zip(histograms, here, borders, strict=True):
+            histogram += np.histogram(many.x[on_it], edges)[0]
         if progress is not None:
             progress(done + 1, rounds)
     total = on_side.sum(axis=0)
@@ -261,7 +237,7 @@ def _share(count: int, parts: int) -> tuple[float, float]:
     return share, math.sqrt(max(share * (1.0 - share), 1.0 / parts) / parts)
 
 
-def _to_goal(many: ManyParts, goal: tuple[float, int]) -> tuple[Answers, NDArray[np.int64]]:
+def _to_goal(many: ManyParts, goal: tuple[float, int]) -> tuple[Answers, Ints]:
     """Throw until all are at the goal or gone: shares, throws that it takes, and those of each part."""
     parts = many.x.size
     arrived, first_wrong, first_far = [], 0, 0

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled, how_found
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    how_found,
+    picked,
+    shown_in_notebooks,
+    silent,
+)
+from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scattering import (
     Scattering,
@@ -26,6 +34,7 @@ from limitsets.feeder.scattering import (
     still_map,
     thrown,
 )
+from limitsets.feeder.scene import Scene, load
 from limitsets.parameters.noise.absorbing import (
     Absorption,
     Feeding,
@@ -40,10 +49,6 @@ from limitsets.parameters.noise.absorbing import (
 from limitsets.parameters.noise.cell_images import InterpolatedPieces, uses_pieces
 from limitsets.parameters.noise.ulam import STRATA, Transfer, transfer
 from limitsets.systems.cells import Grid
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-
 
 # ----------------------------------------------------------------
 # Solution of the chain of a scene at one level of the noise: numbers, errors, and sensitivities to the level.
@@ -78,7 +83,7 @@ class ChainProblem:
 
     scene: Scene
     goal: tuple[float, int]
-    starts: NDArray[np.float64]
+    starts: Array
     cells: int
     strata: int
     # By range of the factor on kappa: found once, used at every solution.
@@ -142,46 +147,36 @@ def solve(problem: ChainProblem, scatter: Scattering) -> ChainSolution:
     ends = absorption(chain, goal)
     fed = feeding(chain, ends, starts)
     first = absorption(chain, goal, other=beyond & ~goal).probability["other"]
-    numbers = {**_long_run(chain, parts, settles, beyond, goal), **_from_starts(chain, fed)}
-    numbers["first beyond is wrong"] = float(starts @ first)
+    numbers = _long_run(parts, settles, beyond, goal) | {
+        "fed": fed.share,
+        "mean throws": math.nan if fed.mean is None else fed.mean,
+        "95 % throws": fed.crossing(0.95),
+        "lost": sum(fed.ends[name] for name in chain.exits),
+        "first beyond is wrong": float(starts @ first),
+    }
     return ChainSolution(
         grid=cover, cut=chain.cut, classes=parts, settles=settles, ends=ends, feeding=fed, numbers=numbers
     )
 
 
-def _main(parts: Sequence[NoisyClass], settles: dict[str, float]) -> NoisyClass | None:
-    # Classes come with those first that are not left, or least: they bear the numbers in `settles`.
-    kept = sum(part.escape < KEPT for part in parts)
-    if kept:
-        return parts[max(range(kept), key=lambda number: settles[f"class {number}"])]
-    return min(parts, key=lambda part: part.escape, default=None)
-
-
 def _long_run(
-    chain: Transfer,
     parts: Sequence[NoisyClass],
     settles: dict[str, float],
-    beyond: NDArray[np.bool_],
-    goal: NDArray[np.bool_],
+    beyond: Mask,
+    goal: Mask,
 ) -> dict[str, float]:
-    main = _main(parts, settles)
-    if main is None:
+    if not parts:
         return {}
+    # Classes come with those first that are not left, or least: they bear the numbers in `settles`.
+    kept = range(sum(part.escape < KEPT for part in parts))
+    most = max(kept, key=lambda number: settles[f"class {number}"], default=None)
+    main = min(parts, key=lambda part: part.escape) if most is None else parts[most]
     far, wrong = float(main.weight[beyond].sum()), float(main.weight[beyond & ~goal].sum())
     numbers = {f"time on side {side}": share for side, share in main.sides.items()}
     numbers |= {f"share of {name}": share for name, share in main.branches.items()}
     numbers |= {"time beyond": far, "wrong beyond": wrong / far if far > 0.0 else math.nan}
     numbers["escape"] = main.escape
     return numbers
-
-
-def _from_starts(chain: Transfer, fed: Feeding) -> dict[str, float]:
-    return {
-        "fed": fed.share,
-        "mean throws": math.nan if fed.mean is None else fed.mean,
-        "95 % throws": fed.crossing(0.95),
-        "lost": sum(fed.ends[name] for name in chain.exits),
-    }
 
 
 def _goal_of(scene: Scene, goal: Any) -> tuple[float, int]:
@@ -200,8 +195,6 @@ def chain_problem_of(
     scene: Scene | str, goal: Any, cells: int, strata: int, offset: float | None
 ) -> ChainProblem:
     """Read what is asked."""
-    from limitsets.feeder.scene import load
-
     read = load(scene)
     return ChainProblem(read, _goal_of(read, goal), starts_from(read, offset), cells, strata)
 
@@ -248,8 +241,6 @@ FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0)
 
 # What the derivatives by one quantity take: four solutions on all cells, two on half as many.
 OF_SLOPES = 5.0
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -306,7 +297,7 @@ class NoiseStatistics(ChainSolution, Tabled):
     unit: str
     scatter: Scattering
     goal: tuple[float, int]
-    starts: NDArray[np.float64]
+    starts: Array
     strata: int
     errors: dict[str, float]
     sensitivity: dict[str, dict[str, LevelSensitivity]]
@@ -349,8 +340,8 @@ class Levels:
         By name.
     """
 
-    factors: NDArray[np.float64]
-    numbers: dict[str, NDArray[np.float64]]
+    factors: Array
+    numbers: dict[str, Array]
 
 
 @shown_in_notebooks
@@ -415,7 +406,7 @@ def noise_statistics(
     noise = scattering_of(problem.scene) if scatter is None else scatter
     names = noise.given() if sensitivity else ()
     stages = 3 + 6 * len(names)
-    tell = progress or (lambda stage, done, total: None)
+    tell = progress or silent
     begin = time.perf_counter()
     tell("noise", 0, stages)
     solution = solve(problem, noise)

@@ -13,16 +13,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
+from limitsets.base.arrays import Array, Ints
 from limitsets.feeder.scattering import Law, Strata, certain
 from limitsets.parameters.noise.cell_images import (
-    Array,
     BoxcarBlock,
     BoxcarOperator,
     Boxcars,
@@ -100,11 +99,11 @@ def _ways_out(params: Any, grid: Grid, exits: tuple[int, ...], otherwise: int) -
     met = np.zeros((grid.n_cells, len(exits)))
     for side in range(grid.sides):
         source, _, _, code, _, _ = rows_of_points(lambda _: params, grid, 0.0, 0.0, 1.0, side)
-        for column, value in enumerate(exits):
-            met[:, column] += np.bincount(source[code == value], minlength=grid.n_cells)
+        met += np.stack(
+            [np.bincount(source[code == exit_], minlength=grid.n_cells) for exit_ in exits], axis=1
+        )
     met[met.sum(axis=1) == 0, otherwise] = 1.0
-    shares: Array = met / met.sum(axis=1, keepdims=True)
-    return shares
+    return np.asarray(met / met.sum(axis=1, keepdims=True))
 
 
 def from_points(
@@ -145,7 +144,7 @@ def from_points(
 
 def _landed(
     grid: Grid, edges: tuple[Array, ...], target: int, x: Array, width: Array, share: Array
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array, Array]:
+) -> tuple[Ints, Ints, Array, Array, Array]:
     """Entries of points that land on one side: which point, cell of that side, mass; and masses below and above."""
     if edges:
         boxcars = Boxcars(0, target, 0, x - 0.5 * width, x + 0.5 * width, share)
@@ -154,8 +153,7 @@ def _landed(
     cell = grid.index(x, target) - grid.offset[target]
     inside = cell >= 0
     outside = np.where(inside, 0.0, share)
-    owner = np.flatnonzero(inside)
-    return owner, cell[inside], share[inside], outside, np.zeros(share.size)
+    return np.flatnonzero(inside), cell[inside], share[inside], outside, np.zeros(share.size)
 
 
 def landing_stage(
@@ -257,6 +255,12 @@ class Transfer:
     def _transposed(self) -> Any:
         return self.matrix.T.tocsr()
 
+    def marked(self, cells: Ints, values: Array | float = 1.0) -> Array:
+        """Give a function that has values on some cells, and is 0 on all others."""
+        function = np.zeros(self.n_cells)
+        function[cells] = values
+        return function
+
     @property
     def written_out(self) -> bool:
         """Whether products use the matrix written out."""
@@ -289,8 +293,8 @@ class SubOperator:
         The cells, in the order in which values and masses are given.
     """
 
-    def __init__(self, chain: Transfer, cells: NDArray[np.int64]) -> None:
-        self.chain, self.cells = chain, cells
+    def __init__(self, chain: Transfer, cells: Ints) -> None:
+        self.chain, self.cells, self.products = chain, cells, 0
 
     @cached_property
     def matrix(self) -> Any:
@@ -301,22 +305,18 @@ class SubOperator:
     def _transposed(self) -> Any:
         return self.matrix.T.tocsr()
 
-    def _whole(self, some: Array) -> Array:
-        whole = np.zeros(self.chain.n_cells)
-        whole[self.cells] = some
-        return whole
-
     def apply(self, values: Array) -> Array:
         """Return a function's expected value one step later; it is 0 on all other cells."""
         if self.matrix is not None:
             return self.matrix @ values  # type: ignore[no-any-return]  # scipy is untyped
-        return self.chain.apply(self._whole(values))[self.cells]
+        return self.chain.apply(self.chain.marked(self.cells, values))[self.cells]
 
     def adjoint(self, masses: Array) -> Array:
-        """Where masses on the cells are one step later."""
+        """Where masses on the cells are one step later; how often that was asked is counted."""
+        self.products += 1
         if self.matrix is not None:
             return self._transposed @ masses  # type: ignore[no-any-return]  # scipy is untyped
-        return self.chain.adjoint(self._whole(masses))[self.cells]
+        return self.chain.adjoint(self.chain.marked(self.cells, masses))[self.cells]
 
 
 def transfer(
@@ -362,34 +362,28 @@ def transfer(
     >>> found.matrix.toarray()[0], found.sinks[0]
     (array([0.4375, 0.4375, 0.0625, 0.    ]), array([0.0625, 0.    ]))
     """
-    fixed = isinstance(map_of, tuple)
-    at: Callable[[float], Any] = (lambda _: map_of) if fixed else map_of
+    at: Callable[[float], Any] = (lambda _: map_of) if isinstance(map_of, tuple) else map_of
     law = certain(1.0) if parameter is None else parameter
     pieces = law if isinstance(law, Strata) else law.strata(strata)
     params = at(float(pieces.mean[0]))
     kind = kind_of(params)
     if kind.dimension != grid.dimension:
-        allowed = f"{kind.dimension}, the map's"
-        raise AnswerError("the dimension of the grid", grid.dimension, allowed, "cut another domain")
+        raise AnswerError(
+            "the dimension of the grid", grid.dimension, f"{kind.dimension}, the map's", "cut another domain"
+        )
     if landing is not None and kind.dimension != 1:
         raise AnswerError("the noise of x", landing, "none in more than one dimension", "leave it out")
     finer = max(strata, min(LANDING_STRATA, LANDING_BOXCARS // grid.n_cells))
     added = None if landing is None else landing.strata(finer)
     reach = (0.0, 0.0) if added is None else (added.lo, added.hi)
     edges = beyond(grid, reach) if kind.dimension == 1 else ()
-    if uses_pieces(params):
-        throw, sinks, branches = from_pieces(at, grid, pieces, edges, cutter)
-    else:
-        throw, sinks, branches = from_points(at, grid, pieces, edges)
-    cut = pieces.cut
-    second = None
+    first_stage = partial(from_pieces, cutter=cutter) if uses_pieces(params) else from_points
+    throw, sinks, branches = first_stage(at, grid, pieces, edges)
+    cut, second = pieces.cut, None
     if added is not None:
         second, late = landing_stage(grid, edges, added, kind.exits)
-        columns = [
-            throw.apply(column) if isinstance(throw, BoxcarOperator) else throw @ column for column in late.T
-        ]
-        sinks = sinks + np.stack(columns, axis=1)
-        cut += added.cut
+        after = throw.apply if isinstance(throw, BoxcarOperator) else throw.__matmul__
+        sinks, cut = sinks + np.stack([after(column) for column in late.T], axis=1), cut + added.cut
     return Transfer(
         map=params,
         grid=grid,

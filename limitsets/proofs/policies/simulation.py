@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.errors import AnswerError
+from limitsets.base.progress import Progress, silent
+from limitsets.feeder.scattering import uniform_starts
 from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
 from limitsets.proofs.policies.policy import NONE
 from limitsets.proofs.policies.synthesis import Synthesis
@@ -56,26 +58,23 @@ class Impossible:
 class _Parts:
     """Where the starts are now: brackets of x, and the side of each."""
 
-    lo: NDArray[np.float64]
-    hi: NDArray[np.float64]
-    side: NDArray[np.int64]
+    lo: Array
+    hi: Array
+    side: Ints
 
-    def some(self, which: NDArray[np.bool_]) -> _Parts:
+    def some(self, which: Mask) -> _Parts:
         return _Parts(self.lo[which], self.hi[which], self.side[which])
 
 
-class _SpentError(Exception):
-    """Time is used up."""
-
-
 class _Enclosed:
+    """A search of policies; it ends with a TimeoutError once its time is used up."""
+
     def __init__(self, synthesis: Synthesis, boxes: Sequence[ParameterBox], until: float) -> None:
         self.synthesis, self.boxes, self.until, self.seen = synthesis, boxes, until, 0
 
-    def may_be_won(self, parts: _Parts) -> NDArray[np.bool_]:
+    def may_be_won(self, parts: _Parts) -> Mask:
         x, side = self.synthesis.goal
-        won: NDArray[np.bool_] = (parts.hi >= x) & (parts.side == side)
-        return won
+        return np.asarray((parts.hi >= x) & (parts.side == side))
 
     def thrown(self, parts: _Parts, box: ParameterBox) -> _Parts | None:
         """Throw all; None where one is certainly lost."""
@@ -83,13 +82,7 @@ class _Enclosed:
         sure = np.zeros(side.size, dtype=bool)
         for own in np.unique(side).tolist():
             some = np.flatnonzero(parts.side == own)
-            boxes = BoxImages(
-                box.lo,
-                box.hi,
-                own,
-                (np.ascontiguousarray(parts.lo[some]),),
-                (np.ascontiguousarray(parts.hi[some]),),
-            )
+            boxes = BoxImages(box.lo, box.hi, own, (parts.lo[some],), (parts.hi[some],))
             lo[some], hi[some] = boxes.slots[0][0][0], boxes.slots[0][1][0]
             side[some], sure[some] = boxes.to[0], boxes.count == DECIDED
         bare_lo, bare_hi = box.bare
@@ -129,11 +122,8 @@ class _Enclosed:
             return False
         self.seen += 1
         if self.seen % BEAT == 0 and time.monotonic() > self.until:
-            raise _SpentError
-        for box in self.boxes:
-            after = self.thrown(parts, box)
-            if after is None:
-                continue
+            raise TimeoutError
+        for after in filter(None, (self.thrown(parts, box) for box in self.boxes)):
             heard = sorted(self.heard(after), key=lambda each: -each.side.size)
             if all(self.won(each, left - 1) for each in heard):
                 return True
@@ -146,7 +136,7 @@ def not_within(
     throws: int | None = None,
     *,
     seconds: float = 60.0,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Impossible:
     """Show that no policy of so many throws serves some starts; without noise, which makes it no easier.
 
@@ -184,13 +174,12 @@ def not_within(
     run, shown, decided = _Enclosed(synthesis, boxes, time.monotonic() + seconds), -1, True
     try:
         for left in range(most + 1):
-            if progress is not None:
-                progress(f"enclosed starts, {left} throws", left, most + 1)
+            (progress or silent)(f"enclosed starts, {left} throws", left, most + 1)
             if all(run.won(each, left) for each in run.heard(begin)):
                 decided = False
                 break
             shown = left
-    except _SpentError:
+    except TimeoutError:
         decided = False
     return Impossible(shown, tuple((float(at), int(side)) for at, side in starts), decided, run.seen)
 
@@ -198,8 +187,6 @@ def not_within(
 # ----------------------------------------------------------------
 # A policy thrown many times: random starts, noise anywhere in its bounds and at them, errors of the sensor too.
 
-
-Floats = NDArray[np.float64]
 
 # Kappas drawn for each throw, the two ends of its noise among them.
 KAPPAS = 16
@@ -224,7 +211,7 @@ class Simulated:
     parts: int
     reached: int
     failures: dict[str, int]
-    throws: NDArray[np.int64]
+    throws: Ints
 
     @property
     def mean(self) -> float:
@@ -266,7 +253,7 @@ def simulate(synthesis: Synthesis, parts: int = 10_000, seed: int = 0) -> Simula
         unknown = moving & (state == NONE)
         ends[unknown] = "an answer that cannot come"
         stops = moving & ~unknown & (policy.throw[state] == NONE)
-        ends[stops & ~_inside(synthesis, x, side)] = "stopped elsewhere"
+        ends[stops & ~((x >= synthesis.goal[0]) & (side == synthesis.goal[1]))] = "stopped elsewhere"
         moving &= ~(unknown | stops)
         if not moving.any():
             break
@@ -292,22 +279,14 @@ def simulate(synthesis: Synthesis, parts: int = 10_000, seed: int = 0) -> Simula
     )
 
 
-def _drawn(synthesis: Synthesis, parts: int, random: np.random.Generator) -> tuple[Floats, NDArray[np.int64]]:
+def _drawn(synthesis: Synthesis, parts: int, random: np.random.Generator) -> tuple[Array, Ints]:
     """Draw starts, equally likely per length."""
     spans = [(side, lo, hi) for side, pairs in synthesis.starts.extents().items() for lo, hi in pairs]
-    length = np.array([hi - lo for _, lo, hi in spans])
-    which = random.choice(len(spans), size=parts, p=length / length.sum())
-    at = np.array([(lo, hi) for _, lo, hi in spans])[which]
-    side = np.array([side for side, _, _ in spans])[which]
-    return random.uniform(at[:, 0], at[:, 1]), side.astype(np.int64)
+    side, lo, hi = (np.array(column) for column in zip(*spans, strict=True))
+    return uniform_starts(random, lo, hi, parts, side)
 
 
-def _inside(synthesis: Synthesis, x: Floats, side: NDArray[np.int64]) -> NDArray[np.bool_]:
-    inside: NDArray[np.bool_] = (x >= synthesis.goal[0]) & (side == synthesis.goal[1])
-    return inside
-
-
-def _heard(synthesis: Synthesis, x: Floats, side: NDArray[np.int64], random: np.random.Generator) -> Any:
+def _heard(synthesis: Synthesis, x: Array, side: Ints, random: np.random.Generator) -> Any:
     """Read the sensor: the numbers of the answers."""
     if synthesis.sensor is None:
         return np.zeros(x.size, np.int64)
@@ -316,14 +295,11 @@ def _heard(synthesis: Synthesis, x: Floats, side: NDArray[np.int64], random: np.
     return np.where(yes, words.index("yes"), words.index("no"))
 
 
-def _thrown(
-    box: Any, x: Floats, side: NDArray[np.int64], random: np.random.Generator
-) -> tuple[Floats, NDArray[np.int64], NDArray[np.int64]]:
+def _thrown(box: Any, x: Array, side: Ints, random: np.random.Generator) -> tuple[Array, Ints, Ints]:
     """Throw parts, each with a kappa of the box; where they come to rest, and the codes."""
     low, high = box.bare[0].kappa, box.bare[1].kappa
-    kappas: Sequence[float] = [box.middle_kappa]
-    if box.kappa_varies:
-        kappas = [low, high, *random.uniform(low, high, KAPPAS - 2).tolist()]
+    between = random.uniform(low, high, KAPPAS - 2).tolist() if box.kappa_varies else []
+    kappas: Sequence[float] = [low, high, *between] if between else [box.middle_kappa]
     drawn = random.integers(len(kappas), size=x.size)
     after, to, code = x.copy(), side.copy(), np.zeros(x.size, np.int64)
     for k, kappa in enumerate(kappas):
@@ -332,6 +308,5 @@ def _thrown(
             landed = images(box.at_kappa(kappa), x[some], own)
             after[some], to[some], code[some] = landed.x, landed.side, landed.code
     if box.landing:
-        offset = box.landing * np.clip(random.uniform(-1.25, 1.25, x.size), -1.0, 1.0)
-        after = after + offset
+        after += box.landing * np.clip(random.uniform(-1.25, 1.25, x.size), -1.0, 1.0)
     return after, to, code

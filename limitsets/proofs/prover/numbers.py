@@ -379,6 +379,16 @@ class Jet:
         ratio = other / self.value
         return Jet(ratio, tuple(-(ratio * d) / self.value for d in self.derivatives))
 
+    def __pow__(self, count: int) -> Jet:
+        rate = count * self.value ** (count - 1)
+        return Jet(self.value**count, tuple(rate * d for d in self.derivatives))
+
+    def __abs__(self) -> Jet:
+        return self if self > 0.0 else -self
+
+    def __gt__(self, other: float) -> bool:
+        return bool(self.value > other)
+
 
 def _each(one: Sequence[Number], two: Sequence[Number]) -> tuple[Number, ...]:
     return tuple(a + b for a, b in zip(one, two, strict=True))
