@@ -51,36 +51,18 @@ def slope_of(x: Any) -> Any:
     return x.slope if isinstance(x, Dual) else 0.0
 
 
-def _value(x: Any) -> Any:
-    return x.value
-
-
-def _slope(x: Any) -> Any:
-    return x.slope
-
-
-def _itself(x: Any) -> Any:
-    return x
-
-
-def _nothing(x: Any) -> Any:
-    return 0.0
-
-
 def seed(x: Any, slope: float) -> Dual:
     """Return a coordinate with its derivative."""
     return Dual(x, slope)
 
 
-def _seed_of_box(x: Any, slope: float) -> Dual:
-    return Dual(x, Interval(slope, slope))
-
-
 operation(seed, float, seed)
-operation(seed, Interval, _seed_of_box)
-for _cls, _val, _der in ((Dual, _value, _slope), (Interval, _itself, _nothing), (float, _itself, _nothing)):
-    operation(value_of, _cls, _val)
-    operation(slope_of, _cls, _der)
+operation(seed, Interval, lambda x, slope: Dual(x, Interval(slope, slope)))
+operation(value_of, Dual, lambda x: x.value)
+operation(slope_of, Dual, lambda x: x.slope)
+for _cls in (Interval, float):
+    operation(value_of, _cls, lambda x: x)
+    operation(slope_of, _cls, lambda x: 0.0)
 
 
 # ---------------------------------------------------------------- what floats and intervals do each in their way
@@ -132,66 +114,14 @@ for _plain, _enclosed in (
 # ---------------------------------------------------------------- the operators
 
 
-def _neg(a: Any) -> Dual:
-    return Dual(-a.value, -a.slope)
-
-
-def _add(a: Any, b: Any) -> Dual:
-    return Dual(a.value + b.value, a.slope + b.slope)
-
-
-def _add_left(a: Any, b: Any) -> Dual:
-    return Dual(a.value + b, a.slope)
-
-
-def _add_right(a: Any, b: Any) -> Dual:
-    return Dual(a + b.value, b.slope)
-
-
-def _sub(a: Any, b: Any) -> Dual:
-    return Dual(a.value - b.value, a.slope - b.slope)
-
-
-def _sub_left(a: Any, b: Any) -> Dual:
-    return Dual(a.value - b, a.slope)
-
-
-def _sub_right(a: Any, b: Any) -> Dual:
-    return Dual(a - b.value, -b.slope)
-
-
-def _mul(a: Any, b: Any) -> Dual:
-    return Dual(a.value * b.value, a.value * b.slope + a.slope * b.value)
-
-
-def _mul_left(a: Any, b: Any) -> Dual:
-    return Dual(a.value * b, a.slope * b)
-
-
-def _mul_right(a: Any, b: Any) -> Dual:
-    return Dual(a * b.value, a * b.slope)
-
-
 def _div(a: Any, b: Any) -> Dual:
     ratio = a.value / b.value
     return Dual(ratio, (a.slope - ratio * b.slope) / b.value)
 
 
-def _div_left(a: Any, b: Any) -> Dual:
-    return Dual(a.value / b, a.slope / b)
-
-
 def _div_right(a: Any, b: Any) -> Dual:
     ratio = a / b.value
     return Dual(ratio, -(ratio * b.slope) / b.value)
-
-
-def _pow(a: Any, count: Any) -> Dual:
-    return Dual(a.value**count, count * a.value ** (count - 1) * a.slope)
-
-
-def _abs(a: Any) -> Dual:
-    return Dual(abs(a.value), _where_negative(a.value, -a.slope, a.slope))
 
 
 def _min(a: Any, b: Any) -> Dual:
@@ -222,18 +152,6 @@ def _exp(a: Any) -> Dual:
     return Dual(power, power * a.slope)
 
 
-def _log(a: Any) -> Dual:
-    return Dual(math.log(a.value), a.slope / a.value)
-
-
-def _sin(a: Any) -> Dual:
-    return Dual(math.sin(a.value), math.cos(a.value) * a.slope)
-
-
-def _cos(a: Any) -> Dual:
-    return Dual(math.cos(a.value), -(math.sin(a.value) * a.slope))
-
-
 def _tan(a: Any) -> Dual:
     ratio = math.tan(a.value)
     return Dual(ratio, (1.0 + ratio**2) * a.slope)
@@ -250,23 +168,49 @@ def _atan2(a: Any, b: Any) -> Dual:
     return Dual(math.atan2(y, x), _but_at_the_cut(y, x, slope))
 
 
+# Stubs; the method of two numbers that change, of one beside a plain one on its right, and on its left.
 for _stubs, _method, _left, _right in (
-    ((operator.pos,), _itself, None, None),
-    ((operator.neg,), _neg, None, None),
-    ((operator.add,), _add, _add_left, _add_right),
-    ((operator.sub,), _sub, _sub_left, _sub_right),
-    ((operator.mul,), _mul, _mul_left, _mul_right),
-    ((operator.truediv,), _div, _div_left, _div_right),
-    ((operator.pow,), _pow, None, None),
-    ((abs, math.fabs, np.abs), _abs, None, None),
+    ((operator.pos,), lambda a: a, None, None),
+    ((operator.neg,), lambda a: Dual(-a.value, -a.slope), None, None),
+    (
+        (operator.add,),
+        lambda a, b: Dual(a.value + b.value, a.slope + b.slope),
+        lambda a, b: Dual(a.value + b, a.slope),
+        lambda a, b: Dual(a + b.value, b.slope),
+    ),
+    (
+        (operator.sub,),
+        lambda a, b: Dual(a.value - b.value, a.slope - b.slope),
+        lambda a, b: Dual(a.value - b, a.slope),
+        lambda a, b: Dual(a - b.value, -b.slope),
+    ),
+    (
+        (operator.mul,),
+        lambda a, b: Dual(a.value * b.value, a.value * b.slope + a.slope * b.value),
+        lambda a, b: Dual(a.value * b, a.slope * b),
+        lambda a, b: Dual(a * b.value, a * b.slope),
+    ),
+    ((operator.truediv,), _div, lambda a, b: Dual(a.value / b, a.slope / b), _div_right),
+    (
+        (operator.pow,),
+        lambda a, count: Dual(a.value**count, count * a.value ** (count - 1) * a.slope),
+        None,
+        None,
+    ),
+    (
+        (abs, math.fabs, np.abs),
+        lambda a: Dual(abs(a.value), _where_negative(a.value, -a.slope, a.slope)),
+        None,
+        None,
+    ),
     ((min, np.minimum), _min, None, None),
     ((max, np.maximum), _max, None, None),
     ((math.sqrt, np.sqrt), _sqrt, None, None),
     ((math.floor, np.floor), _floor, None, None),
     ((math.exp, np.exp), _exp, None, None),
-    ((math.log, np.log), _log, None, None),
-    ((math.sin, np.sin), _sin, None, None),
-    ((math.cos, np.cos), _cos, None, None),
+    ((math.log, np.log), lambda a: Dual(math.log(a.value), a.slope / a.value), None, None),
+    ((math.sin, np.sin), lambda a: Dual(math.sin(a.value), math.cos(a.value) * a.slope), None, None),
+    ((math.cos, np.cos), lambda a: Dual(math.cos(a.value), -(math.sin(a.value) * a.slope)), None, None),
     ((math.tan, np.tan), _tan, None, None),
     ((math.tanh, np.tanh), _tanh, None, None),
     ((math.atan2, np.arctan2), _atan2, None, None),

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from limitsets.numbers.interval.arithmetic import Ends, holds, or_empty
-from limitsets.numbers.interval.rounding import down, up
+from limitsets.numbers.interval.rounding import clamped, down, up
 from limitsets.numbers.jit import mark_undefined, proof_kernel
 
 LARGEST = 2.0**17
@@ -54,24 +54,17 @@ def sin_cos(x: float) -> tuple[float, float, float]:
 
 
 @proof_kernel
-def _reduced(x: float) -> float:
-    """X moved to the nearer end of the range; no nan, for what is made an integer must be a number."""
-    x = x if x > -LARGEST else -LARGEST
-    return x if x < LARGEST else LARGEST
-
-
-@proof_kernel
 def _sine(x: float) -> Ends:
-    """Enclosure of sin at one double of the range."""
-    s, _, n = sin_cos(x)
+    """Enclosure of sin at one double, beyond the range at the end of it."""
+    s, _, n = sin_cos(clamped(x, -LARGEST, LARGEST))
     error = RELATIVE * abs(s) if n == 0.0 else NEAR
     return max(down(s - error), -1.0), min(up(s + error), 1.0)
 
 
 @proof_kernel
 def _cosine(x: float) -> Ends:
-    """Enclosure of cos at one double of the range."""
-    _, c, _ = sin_cos(x)
+    """Enclosure of cos at one double, beyond the range at the end of it."""
+    _, c, _ = sin_cos(clamped(x, -LARGEST, LARGEST))
     return max(down(c - NEAR), -1.0), min(up(c + NEAR), 1.0)
 
 
@@ -92,7 +85,7 @@ def _waves(a: Ends, u: Ends, v: Ends, bottom: float, top: float) -> Ends:
     far = (a[0] < -LARGEST) | (a[1] > LARGEST)
     # A sine of an infinite end is a nan in plain numbers, so that what leads here is not defined on all of the cell.
     mark_undefined((a[0] == -math.inf) | (a[1] == math.inf))
-    x, y = _reduced(a[0]), _reduced(a[1])
+    x, y = clamped(a[0], -LARGEST, LARGEST), clamped(a[1], -LARGEST, LARGEST)
     lo = -1.0 if far | _meets(x, y, bottom) else min(u[0], v[0])
     hi = 1.0 if far | _meets(x, y, top) else max(u[1], v[1])
     return or_empty(holds(a), lo, hi)
@@ -101,13 +94,13 @@ def _waves(a: Ends, u: Ends, v: Ends, bottom: float, top: float) -> Ends:
 @proof_kernel
 def sin(a: Ends) -> Ends:
     """Sine of an interval."""
-    return _waves(a, _sine(_reduced(a[0])), _sine(_reduced(a[1])), 3.0, 1.0)
+    return _waves(a, _sine(a[0]), _sine(a[1]), 3.0, 1.0)
 
 
 @proof_kernel
 def cos(a: Ends) -> Ends:
     """Cosine of an interval."""
-    return _waves(a, _cosine(_reduced(a[0])), _cosine(_reduced(a[1])), 2.0, 0.0)
+    return _waves(a, _cosine(a[0]), _cosine(a[1]), 2.0, 0.0)
 
 
 PI_ABOVE = math.nextafter(math.pi, 4.0)

@@ -17,7 +17,7 @@ import sys
 import numpy as np
 
 from limitsets.numbers.interval.arithmetic import Ends, add, div, holds, mul, or_empty, power, sqr, sub
-from limitsets.numbers.interval.rounding import down, up
+from limitsets.numbers.interval.rounding import clamped, down, up
 from limitsets.numbers.jit import mark_undefined, proof_kernel
 
 LARGEST = 700.0
@@ -48,16 +48,10 @@ def exponential(x: float) -> float:
 
 
 @proof_kernel
-def _clamped(x: float) -> float:
-    """X moved to the nearer end of the range; no nan, for what is made an integer must be a number."""
-    x = x if x > -LARGEST else -LARGEST
-    return x if x < LARGEST else LARGEST
-
-
-@proof_kernel
 def exp(a: Ends) -> Ends:
     """Exponential of an interval."""
-    y, z = exponential(_clamped(a[0])), exponential(_clamped(a[1]))
+    y = exponential(clamped(a[0], -LARGEST, LARGEST))
+    z = exponential(clamped(a[1], -LARGEST, LARGEST))
     lo, hi = down(y - RELATIVE * y), up(z + RELATIVE * z)
     return or_empty(holds(a), 0.0 if a[0] < -LARGEST else lo, math.inf if a[1] > LARGEST else hi)
 
@@ -120,20 +114,14 @@ def _logarithm(x: float) -> Ends:
 
 
 @proof_kernel
-def _positive(x: float) -> float:
-    """X moved to the nearer end of the positive numbers; no nan."""
-    x = x if x > TINIEST else TINIEST
-    return x if x < LARGEST_FLOAT else LARGEST_FLOAT
-
-
-@proof_kernel
 def log(a: Ends) -> Ends:
     """Natural logarithm of the part of a that is positive; the empty set where there is none.
 
     Where another part is not positive the cell whose image is computed is undecided, see `limitsets.interval`.
     """
     mark_undefined(a[0] <= 0.0)
-    lo, hi = _logarithm(_positive(a[0])), _logarithm(_positive(a[1]))
+    lo = _logarithm(clamped(a[0], TINIEST, LARGEST_FLOAT))
+    hi = _logarithm(clamped(a[1], TINIEST, LARGEST_FLOAT))
     return or_empty(
         holds(a) & (a[1] > 0.0), -math.inf if a[0] <= 0.0 else lo[0], math.inf if a[1] == math.inf else hi[1]
     )

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 
 from limitsets.numbers.interval import arithmetic, elementary, exponential
-from limitsets.numbers.interval import exponential as logarithm
 from limitsets.numbers.interval.rounding import down, up
 from limitsets.numbers.jit import corners_as_numbers, mark_undefined, number, operation
 
@@ -47,6 +47,9 @@ class Interval:
     def __neg__(self) -> Interval:
         return _neg(self)
 
+    def __abs__(self) -> Interval:
+        return _abs(self)
+
     def __add__(self, other: Interval | float) -> Interval:
         return _add(self, other)
 
@@ -59,14 +62,8 @@ class Interval:
     def __truediv__(self, other: Interval | float) -> Interval:
         return _div(self, other)
 
-    def __radd__(self, other: float) -> Interval:
-        return _add(other, self)
-
     def __rsub__(self, other: float) -> Interval:
         return _sub(other, self)
-
-    def __rmul__(self, other: float) -> Interval:
-        return _mul(other, self)
 
     def __rtruediv__(self, other: float) -> Interval:
         return _div(other, self)
@@ -74,109 +71,45 @@ class Interval:
     def __pow__(self, count: int) -> Interval:
         return _pow(self, count)
 
-    def __abs__(self) -> Interval:
-        return _abs(self)
+    __radd__, __rmul__ = __add__, __mul__
 
 
 # ---------------------------------------------------------------- the operators, on the kernels of pairs
 
-# One function for each: code that takes a kernel as an argument, or keeps one in a closure, is not cached on disk.
-
 
 def ends_of(x: Any) -> Any:
     """Return an interval, or a plain number, as a pair."""
-    return _ends_of_interval(x) if isinstance(x, Interval) else _ends_of_number(x)
+    return (x.lo, x.hi) if isinstance(x, Interval) else (float(x), float(x))
 
 
-def _ends_of_interval(x: Any) -> Any:
-    return x.lo, x.hi
+def _of_one(kernel: Callable[[Any], Any]) -> Callable[[Any], Interval]:
+    """Make the method of intervals and plain numbers of a kernel of one pair."""
+
+    def method(a: Any) -> Interval:
+        lo, hi = kernel(ends_of(a))
+        return Interval(lo, hi)
+
+    return method
 
 
-def _ends_of_number(x: Any) -> Any:
-    return float(x), float(x)
+def _of_two(kernel: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Interval]:
+    """Likewise of a kernel of two pairs."""
+
+    def method(a: Any, b: Any) -> Interval:
+        lo, hi = kernel(ends_of(a), ends_of(b))
+        return Interval(lo, hi)
+
+    return method
 
 
-def _itself(a: Any) -> Any:
-    return a
-
-
-def _neg(a: Any) -> Interval:
-    lo, hi = arithmetic.neg(ends_of(a))
-    return Interval(lo, hi)
-
-
-def _add(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.add(ends_of(a), ends_of(b))
-    return Interval(lo, hi)
-
-
-def _sub(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.sub(ends_of(a), ends_of(b))
-    return Interval(lo, hi)
-
-
-def _mul(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.mul(ends_of(a), ends_of(b))
-    return Interval(lo, hi)
-
-
-def _div(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.div(ends_of(a), ends_of(b))
-    return Interval(lo, hi)
+_neg, _abs, _sqrt = _of_one(arithmetic.neg), _of_one(arithmetic.absolute), _of_one(arithmetic.sqrt)
+_add, _sub = _of_two(arithmetic.add), _of_two(arithmetic.sub)
+_mul, _div = _of_two(arithmetic.mul), _of_two(arithmetic.div)
+_min, _max = _of_two(arithmetic.minimum), _of_two(arithmetic.maximum)
 
 
 def _pow(a: Any, count: Any) -> Interval:
     lo, hi = arithmetic.power(ends_of(a), count)
-    return Interval(lo, hi)
-
-
-def _abs(a: Any) -> Interval:
-    lo, hi = arithmetic.absolute(ends_of(a))
-    return Interval(lo, hi)
-
-
-def _min(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.minimum(ends_of(a), ends_of(b))
-    return Interval(lo, hi)
-
-
-def _max(a: Any, b: Any) -> Interval:
-    lo, hi = arithmetic.maximum(ends_of(a), ends_of(b))
-    return Interval(lo, hi)
-
-
-def _sqrt(a: Any) -> Interval:
-    lo, hi = arithmetic.sqrt(ends_of(a))
-    return Interval(lo, hi)
-
-
-def _floor(a: Any) -> Interval:
-    lo, hi = arithmetic.floor(ends_of(a))
-    return Interval(lo, hi)
-
-
-def _exp(a: Any) -> Interval:
-    lo, hi = exponential.exp(ends_of(a))
-    return Interval(lo, hi)
-
-
-def _log(a: Any) -> Interval:
-    lo, hi = logarithm.log(ends_of(a))
-    return Interval(lo, hi)
-
-
-def _sin(a: Any) -> Interval:
-    lo, hi = elementary.sin(ends_of(a))
-    return Interval(lo, hi)
-
-
-def _cos(a: Any) -> Interval:
-    lo, hi = elementary.cos(ends_of(a))
-    return Interval(lo, hi)
-
-
-def _tanh(a: Any) -> Interval:
-    lo, hi = exponential.tanh(ends_of(a))
     return Interval(lo, hi)
 
 
@@ -185,15 +118,10 @@ def _tan(a: Any) -> Interval:
     return ratio  # type: ignore[no-any-return]  # `math` has types for floats alone; this is an interval
 
 
-def _atan2(a: Any, b: Any) -> Interval:
-    lo, hi = elementary.atan2(ends_of(a), ends_of(b))
-    return Interval(lo, hi)
-
-
-operation(ends_of, Interval, _ends_of_interval)
-operation(ends_of, float, _ends_of_number)
+operation(ends_of, Interval, lambda x: (x.lo, x.hi))
+operation(ends_of, float, lambda x: (float(x), float(x)))
 for _stubs, _method in (
-    ((operator.pos,), _itself),
+    ((operator.pos,), lambda a: a),
     ((operator.neg,), _neg),
     ((operator.add,), _add),
     ((operator.sub,), _sub),
@@ -204,14 +132,14 @@ for _stubs, _method in (
     ((min, np.minimum), _min),
     ((max, np.maximum), _max),
     ((math.sqrt, np.sqrt), _sqrt),
-    ((math.floor, np.floor), _floor),
-    ((math.exp, np.exp), _exp),
-    ((math.log, np.log), _log),
-    ((math.sin, np.sin), _sin),
-    ((math.cos, np.cos), _cos),
+    ((math.floor, np.floor), _of_one(arithmetic.floor)),
+    ((math.exp, np.exp), _of_one(exponential.exp)),
+    ((math.log, np.log), _of_one(exponential.log)),
+    ((math.sin, np.sin), _of_one(elementary.sin)),
+    ((math.cos, np.cos), _of_one(elementary.cos)),
     ((math.tan, np.tan), _tan),
-    ((math.tanh, np.tanh), _tanh),
-    ((math.atan2, np.arctan2), _atan2),
+    ((math.tanh, np.tanh), _of_one(exponential.tanh)),
+    ((math.atan2, np.arctan2), _of_two(elementary.atan2)),
 ):
     for _stub in _stubs:
         operation(_stub, Interval, _method)
@@ -244,16 +172,8 @@ class PerSide:
     hi: Any
 
 
-def _of_side(ends: Any, side: Any) -> Interval:
-    return Interval(ends.lo[side], ends.hi[side])
-
-
-def _sides(ends: Any) -> int:
-    return len(ends.lo)
-
-
-operation(operator.getitem, PerSide, _of_side)
-operation(len, PerSide, _sides)
+operation(operator.getitem, PerSide, lambda ends, side: Interval(ends.lo[side], ends.hi[side]))
+operation(len, PerSide, lambda ends: len(ends.lo))
 
 intervals_between = corners_as_numbers(Interval, PerSide)
 """The parameters between two corners, each an interval: `lo` and `hi` are of one NamedTuple class; in compiled code."""
@@ -296,14 +216,8 @@ def where_positive(x: Number, yes: Number, no: Number) -> Number:
     return yes if x > 0.0 else no
 
 
-def hull_of(x: Interval, y: Interval) -> Interval:
-    """Return the smallest interval that holds both."""
-    lo, hi = arithmetic.hull(ends_of(x), ends_of(y))
-    return Interval(lo, hi)
-
-
-def _signed_square(x: Any) -> Interval:
-    return Interval(down(x.lo * abs(x.lo)), up(x.hi * abs(x.hi)))
+hull_of = _of_two(arithmetic.hull)
+"""Return the smallest interval that holds both."""
 
 
 def _with_sign_of(x: Any, size: Any) -> Interval:
@@ -321,7 +235,7 @@ for _plain, _enclosed in (
     (square_root, _sqrt),
     (smaller, _min),
     (larger, _max),
-    (signed_square, _signed_square),
+    (signed_square, lambda x: Interval(down(x.lo * abs(x.lo)), up(x.hi * abs(x.hi)))),
     (with_sign_of, _with_sign_of),
     (where_positive, _where_positive),
 ):

@@ -45,6 +45,13 @@ def above(y: float) -> float:
 
 
 @proof_kernel
+def clamped(x: float, least: float, most: float) -> float:
+    """X moved to the nearer end of a range; no nan, for what is made an integer must be a number."""
+    x = x if x > least else least
+    return x if x < most else most
+
+
+@proof_kernel
 def below_sum(y: float) -> float:
     """As `below`, of a sum or a difference: below the normal range these are exact, so that 0 stays 0."""
     y = LARGEST if y > LARGEST else y

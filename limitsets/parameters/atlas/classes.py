@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from limitsets.base.errors import AnswerError
+from limitsets.parameters.atlas.plan import codes_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -317,9 +318,7 @@ def numbers_of(dataset: xr.Dataset) -> tuple[npt.NDArray[np.int64], Mapping[int,
     if "class" not in dataset:
         return classes(dataset)
     stored = dataset["class"]
-    words, values = stored.attrs.get("flag_meanings", "").split(), stored.attrs.get("flag_values", [])
-    pairs = zip(np.atleast_1d(values).tolist(), words, strict=True)
-    return np.asarray(stored.values), dict(pairs)
+    return np.asarray(stored.values), {code: name for name, code in codes_of(stored.attrs).items()}
 
 
 def _jogs(dataset: xr.Dataset, here: npt.NDArray[np.bool_]) -> str:

@@ -198,17 +198,15 @@ def topology(
     answers: dict[str, npt.NDArray[Any] | Coded] = {
         name: fields[name]
         if name in ("undecided", "checked")
-        else _kept(fields[name], decided, variables[name].empty)
+        else np.where(
+            decided.reshape(-1, *[1] * (fields[name].ndim - 1)), fields[name], variables[name].empty
+        )
         for name in block.wanted - {"class"}
     }
     if "class" in block.wanted:
         numbers, names = classes(told)
         answers["class"] = Coded(numbers, {name: number for number, name in names.items()})
     return answers
-
-
-def _kept(values: npt.NDArray[Any], decided: npt.NDArray[np.bool_], empty: float) -> npt.NDArray[Any]:
-    return np.where(decided.reshape(-1, *[1] * (values.ndim - 1)), values, empty)
 
 
 def _entropies(block: Block, told: Topologies) -> npt.NDArray[np.float64]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
 from limitsets.parameters.atlas.classes import UNDECIDED_NAME
-from limitsets.parameters.atlas.plan import Plan, chunk_shape, code_of, named, resolved
+from limitsets.parameters.atlas.plan import Plan, chunk_shape, code_of, codes_of, named, resolved
 from limitsets.parameters.atlas.store import CHECKSUM, SEAL, Store
 from limitsets.parameters.atlas.subjects import Axis, MapSubject, SceneSubject, Subject, axis_of
 from limitsets.parameters.atlas.work import STEP, answer
@@ -86,7 +87,7 @@ class Atlas(Tabled):
             data = data.isel(attractor=slice(max(int(data["attractors"].max()), 1)))
         for name, variable in data.data_vars.items():
             more = [dim for dim in variable.dims if dim not in self.axes]
-            for places in _entries([data.sizes[dim] for dim in more]):
+            for places in product(*(range(data.sizes[dim]) for dim in more)):
                 label = f"{name}[{','.join(map(str, places))}]" if places else str(name)
                 columns[label] = variable.isel(dict(zip(more, places, strict=True))).values.ravel()
         names = [str(axis) for axis in self.axes]
@@ -114,8 +115,10 @@ class Atlas(Tabled):
         variable = self.dataset[name]
         values, attributes = np.asarray(variable.values), variable.attrs
         if "flag_meanings" in attributes:
-            codes = zip(attributes["flag_meanings"].split(), attributes["flag_values"], strict=True)
-            counts = [(word.replace("_", " "), int((values == code).sum())) for word, code in codes]
+            counts = [
+                (word.replace("_", " "), int((values == code).sum()))
+                for word, code in codes_of(attributes).items()
+            ]
             if name == "class":  # their names are codes: the legend has words for them
                 met = {word: count for word, count in counts if count}
                 doubt = met.pop(UNDECIDED_NAME, 0)
@@ -205,27 +208,11 @@ class Atlas(Tabled):
         return certified(load(plan["scene"]), x, y, depth=depth, executor=executor, progress=progress)
 
 
-def _entries(lengths: Sequence[int]) -> Iterator[tuple[int, ...]]:
-    if not lengths:
-        yield ()
-        return
-    for k in range(lengths[0]):
-        for rest in _entries(lengths[1:]):
-            yield (k, *rest)
-
-
 def _table(variable: xr.DataArray) -> dict[str, Any]:
-    attributes = variable.attrs
-    codes = dict(
-        zip(
-            attributes.get("flag_meanings", "").split(),
-            as_plain(attributes.get("flag_values", [])),
-            strict=True,
-        )
-    )
+    codes = codes_of(variable.attrs)
     table = {
         "dims": list(variable.dims),
-        "unit": attributes.get("units", ""),
+        "unit": variable.attrs.get("units", ""),
         "values": as_plain(variable.values),
     }
     return table | ({"codes": codes} if codes else {})
@@ -409,20 +396,12 @@ def _own_domain(params: Any) -> Domain | None:
 
 def _work(plan: Plan) -> Work:
     """Give the chunks of a plan to be computed."""
-
-    def size(number: int) -> int:
-        return math.prod(part.stop - part.start for part in plan.region(number))
-
-    def place(number: int) -> str:
-        return plan.words(plan.region(number))
-
-    chunks = math.prod(plan.chunks)
     return Work(
-        chunks=chunks,
+        chunks=math.prod(plan.chunks),
         function=answer,
         given=(plan,),
-        size=size,
-        place=place,
+        size=lambda number: math.prod(part.stop - part.start for part in plan.region(number)),
+        place=lambda number: plan.words(plan.region(number)),
         task=f"the task {plan.task}",
         name="atlas",
         points="points",

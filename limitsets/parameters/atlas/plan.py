@@ -29,6 +29,11 @@ from limitsets.parameters.atlas.subjects import Axis, Points, Subject, source_of
 Task = TypeVar("Task", bound=Callable[..., Any])
 
 
+def all_are(values: npt.NDArray[Any], fill: Any) -> bool:
+    """Whether an array holds nothing but what marks points without an answer: nan, of integers `fill`."""
+    return bool((np.isnan(values) if values.dtype.kind == "f" else values == fill).all())
+
+
 @dataclass(frozen=True)
 class Variable:
     """What a task answers of every point.
@@ -69,8 +74,13 @@ class Variable:
 
     def is_empty(self, values: npt.NDArray[Any]) -> bool:
         """Whether an array holds nothing."""
-        none = np.isnan(values) if values.dtype.kind == "f" else values == self.fill
-        return bool(none.all())
+        return all_are(values, self.fill)
+
+
+def codes_of(attributes: Mapping[str, Any]) -> dict[str, int]:
+    """Read the names of a variable's codes from its attributes; empty for a variable without."""
+    values = np.atleast_1d(attributes.get("flag_values", [])).tolist()
+    return dict(zip(attributes.get("flag_meanings", "").split(), values, strict=True))
 
 
 class Block(NamedTuple):
@@ -265,11 +275,6 @@ class Plan:
         return tuple(axis.values.size for axis in self.axes)
 
     @property
-    def size(self) -> int:
-        """How many points there are."""
-        return math.prod(self.shape)
-
-    @property
     def chunks(self) -> tuple[int, ...]:
         """Chunks along each axis."""
         return tuple(-(-n // step) for n, step in zip(self.shape, self.chunk, strict=True))
@@ -289,12 +294,7 @@ class Plan:
 
     def numbers(self, region: Region) -> npt.NDArray[np.int64]:
         """Return the numbers of the points of a region."""
-        index = np.indices(tuple(part.stop - part.start for part in region))
-        shifted = [index[k] + part.start for k, part in enumerate(region)]
-        flat: npt.NDArray[np.int64] = (
-            np.ravel_multi_index(tuple(shifted), self.shape).ravel().astype(np.int64)
-        )
-        return flat
+        return np.ravel_multi_index(tuple(np.ogrid[region]), self.shape).ravel().astype(np.int64)
 
     @cached_property
     def base(self) -> dict[str, npt.NDArray[np.float64]]:

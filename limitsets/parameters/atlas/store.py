@@ -23,7 +23,7 @@ import numpy.typing as npt
 from limitsets.base.campaign import imported
 from limitsets.base.errors import LimitsetsError
 from limitsets.base.files import replaced
-from limitsets.parameters.atlas.plan import Plan, differences, digest_of
+from limitsets.parameters.atlas.plan import Plan, all_are, codes_of, differences, digest_of
 from limitsets.parameters.atlas.subjects import SceneSubject
 
 if TYPE_CHECKING:
@@ -130,15 +130,12 @@ class Store:
             for axis in self.plan.axes
             if axis.name not in axes or not _holds(axes[axis.name], axis.values, _unit(axis.unit))
         ]
-        wrong += [f"what {name} says of itself" for name, array in self._sealed() if not _is_sealed(array)]
+        sealed = (*self.arrays.items(), (CHECKSUM, self.marks))
+        wrong += [f"what {name} says of itself" for name, array in sealed if not _is_sealed(array)]
         if dict(self.group.attrs) != _attributes(self.plan):
             wrong.append("its attributes")
         if wrong:
             raise _damaged(self.path, ", ".join(wrong))
-
-    def _sealed(self) -> Iterator[tuple[str, Any]]:
-        yield from self.arrays.items()
-        yield CHECKSUM, self.marks
 
     def _opened(self, library: Any) -> zarr.Group:
         """Open a store of this very plan."""
@@ -179,7 +176,7 @@ class Store:
                 return False
             for name, array in self.arrays.items():
                 values = np.asarray(array[region])
-                if not _is(values, array.fill_value):
+                if not all_are(values, array.fill_value):
                     arrays[name] = values
         except (OSError, ValueError, RuntimeError):  # what codecs make of bytes that were cut off
             return False
@@ -219,8 +216,7 @@ class Store:
         """Add the names of codes that were not met before; in order, so that the last chunk written is not seen."""
         array = self.arrays[name]
         attributes = array.attrs
-        words = attributes.get("flag_meanings", "").split()
-        known = dict(zip(words, attributes.get("flag_values", []), strict=True))
+        known = codes_of(attributes)
         if codes.items() <= known.items():
             return
         both = known | dict(codes)
@@ -312,10 +308,6 @@ def _holds(array: Any, values: npt.NDArray[Any], attributes: dict[str, Any]) -> 
 
 def _unit(unit: str) -> dict[str, Any]:
     return {"units": unit} if unit else {}
-
-
-def _is(values: npt.NDArray[Any], fill: Any) -> bool:
-    return bool((np.isnan(values) if values.dtype.kind == "f" else values == fill).all())
 
 
 def _difference(name: str, here: Any, there: Any) -> str:

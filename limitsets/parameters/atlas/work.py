@@ -94,7 +94,7 @@ def refined(shape: tuple[int, ...], step: int, ask: Callable[[Ints], Ints]) -> R
     depth = np.zeros(len(cells), np.int64)
     new = cells
     while True:
-        corners = _corners(new, columns)
+        corners = np.concatenate([new[:, i] * columns + new[:, j] for i in (0, 1) for j in (2, 3)])
         wanted = np.unique(corners[source.ravel()[corners] < 0])
         if wanted.size:
             source.ravel()[wanted] = points.size + np.arange(wanted.size)
@@ -120,11 +120,6 @@ def refined(shape: tuple[int, ...], step: int, ask: Callable[[Ints], Ints]) -> R
 def _parts(length: int, step: int) -> list[tuple[int, int]]:
     ends = [*range(0, length - 1, step), length - 1]
     return list(pairwise(ends)) if len(ends) > 1 else [(0, 0)]
-
-
-def _corners(cells: Ints, columns: int) -> Ints:
-    """Numbers of the points at the corners of cells, the first corner of all cells first."""
-    return np.concatenate([cells[:, i] * columns + cells[:, j] for i in (0, 1) for j in (2, 3)])
 
 
 def _halved(cells: Ints, depth: Ints) -> tuple[Ints, Ints]:

@@ -64,6 +64,31 @@ def _is_smooth(place: Place, border: Border) -> bool:
     return bool(side[0] == side[1] and near)
 
 
+class Tracked(NamedTuple):
+    """A point to track.
+
+    Attributes
+    ----------
+    start : Border or None
+        The critical point that its orbit begins at; None for a point of a cycle.
+    from_above : bool
+        Which limit there.
+    x, side : float, int
+        Of a cycle: the point.
+    word : tuple of int
+        The branches.
+    to_side : int
+        Side on which the tracked point lies.
+    """
+
+    start: Border | None
+    from_above: bool
+    x: float
+    side: int
+    word: tuple[int, ...]
+    to_side: int
+
+
 class Approach(NamedTuple):
     """A tracked point and a critical point, between two places.
 
@@ -73,35 +98,22 @@ class Approach(NamedTuple):
         The path.
     span : (float, float)
         Both t.
+    tracked : Tracked
+        The point.
     start : (Border, Border) or None
         The critical point of its orbit at both; None for a point of a cycle.
-    from_above : bool
-        Which limit there.
-    x, side : (float, float), int
-        Of a cycle: the point, as far as it is known at both.
-    word : tuple of int
-        The branches.
-    to_side : int
-        Side on which the tracked point lies.
     target : (Border, Border)
         The critical point it may meet, at both.
     """
 
     path: Path
     span: tuple[float, float]
+    tracked: Tracked
     start: tuple[Border, Border] | None
-    from_above: bool
-    x: tuple[float, float]
-    side: int
-    word: tuple[int, ...]
-    to_side: int
     target: tuple[Border, Border]
 
-    def _share(self, t: float) -> float:
-        return (t - self.span[0]) / (self.span[1] - self.span[0])
-
     def _border(self, place: Place, pair: tuple[Border, Border]) -> Border | None:
-        share = self._share(place.t)
+        share = (place.t - self.span[0]) / (self.span[1] - self.span[0])
         return _again(place, pair[0], (1.0 - share) * pair[0].x_above + share * pair[1].x_above)
 
     def point(self, place: Place) -> tuple[float, int] | None:
@@ -110,19 +122,18 @@ class Approach(NamedTuple):
             border = self._border(place, self.start)
             if border is None:
                 return None
-            return (border.x_above if self.from_above else border.x_below), border.side
-        share = self._share(place.t)
-        guess = np.array([(1.0 - share) * self.x[0] + share * self.x[1]])
-        root, _, good = on_itinerary(place, guess, np.array([self.side]), np.array([self.word]))
-        return (float(root[0]), self.side) if good[0] else None
+            return (border.x_above if self.tracked.from_above else border.x_below), border.side
+        _, _, x, side, word, _ = self.tracked
+        root, _, good = on_itinerary(place, np.array([x]), np.array([side]), np.array([word]))
+        return (float(root[0]), side) if good[0] else None
 
     def gap(self, place: Place) -> float:
         """Tracked point minus critical point; nan where one of them is not there."""
         begin, border = self.point(place), self._border(place, self.target)
         if begin is None or border is None:
             return float("nan")
-        x, side, _ = along(place.params, [begin[0]], begin[1], self.word)
-        return float(x[0] - border.x_above) if side[0] == self.to_side else float("nan")
+        x, side, _ = along(place.params, [begin[0]], begin[1], self.tracked.word)
+        return float(x[0] - border.x_above) if side[0] == self.tracked.to_side else float("nan")
 
     def at(self, t: float) -> float:
         """`gap` at t."""
@@ -136,11 +147,11 @@ class Approach(NamedTuple):
         x, side = begin
         leaves = self.target[0].kind in LEAVING
         error = 4.0 * EPS * place.extent
-        for j, branch in enumerate(self.word):
+        for j, branch in enumerate(self.tracked.word):
             # The first branch of a one-sided limit is forced by its side; the tracked point of a cycle is the one
             # that passes the border.
             # What happens in the last step to a point that leaves is the event itself.
-            if j > 0 and not (leaves and j == len(self.word) - 1):
+            if j > 0 and not (leaves and j == len(self.tracked.word) - 1):
                 around = np.array([x - 4.0 * error, x + 4.0 * error])
                 if (images(place.params, around, side).code != branch).any():
                     return False
@@ -154,7 +165,7 @@ class Approach(NamedTuple):
         begin = self.point(snapshot.place)
         if begin is None:
             return None
-        x, side, _ = along(snapshot.place.params, [begin[0]], begin[1], self.word)
+        x, side, _ = along(snapshot.place.params, [begin[0]], begin[1], self.tracked.word)
         near = 1e-9 * snapshot.place.extent
         for position, attractor in enumerate(snapshot.attractors):
             if (attractor.cycle is None) == (self.start is not None):
@@ -172,15 +183,15 @@ class Approach(NamedTuple):
         change = f"{names[border.below]}->{names[border.above]}"
         if border.kind != "critical":
             change = {"domain": "end of the domain"}.get(border.kind, border.kind)
-        itinerary = tuple(names[branch] for branch in self.word)
-        limit = "cycle" if self.start is None else ("c+" if self.from_above else "c-")
+        itinerary = tuple(names[branch] for branch in self.tracked.word)
+        limit = "cycle" if self.start is None else ("c+" if self.tracked.from_above else "c-")
         start = None if self.start is None else begin[0] * (abs(begin[0]) >= TINY)
         at = border.x_above if abs(border.x_above) >= TINY else 0.0
         return Collision(
             x=at,
             side=border.side,
             change=change,
-            k=len(self.word),
+            k=len(itinerary),
             start=start,
             start_side=begin[1],
             limit=limit,
@@ -188,27 +199,14 @@ class Approach(NamedTuple):
         )
 
 
-class _Tracked(NamedTuple):
-    """A point to track: the critical point that its orbit begins at, or where it is on its cycle."""
-
-    start: Border | None
-    from_above: bool
-    x: float
-    side: int
-    word: tuple[int, ...]
-    to_side: int
-
-
-def _tracked(
-    attractor: AttractorAtPlace, borders: list[Border], names: tuple[str, ...]
-) -> Iterator[_Tracked]:
+def _tracked(attractor: AttractorAtPlace, borders: list[Border], names: tuple[str, ...]) -> Iterator[Tracked]:
     """Points to track of one attractor."""
     if attractor.cycle is not None:
         word = attractor.cycle.branches.tolist()
         for k, (x, side) in enumerate(
             zip(attractor.cycle.x.tolist(), attractor.cycle.side.tolist(), strict=True)
         ):
-            yield _Tracked(None, False, x, side, tuple(word[k:] + word[:k]), side)
+            yield Tracked(None, False, x, side, tuple(word[k:] + word[:k]), side)
     for end in attractor.ends:
         x, side, word = (
             end.origin.x,
@@ -217,7 +215,7 @@ def _tracked(
         )
         for border in borders:
             if border.side == side and x in (border.x_below, border.x_above):
-                yield _Tracked(border, x == border.x_above, x, side, word, end.side)
+                yield Tracked(border, x == border.x_above, x, side, word, end.side)
 
 
 def _at_both(border: Border, others: list[Border], which: int) -> tuple[Border, Border] | None:
@@ -252,17 +250,7 @@ def approaches(path: Path, lo: Snapshot, hi: Snapshot) -> Iterator[Approach]:
                 key = (point.word, point.from_above, where, pair[0])
                 if target.side == point.to_side and key not in seen:
                     seen.add(key)
-                    yield Approach(
-                        path,
-                        (lo.t, hi.t),
-                        start,
-                        from_above=point.from_above,
-                        x=(point.x, point.x),
-                        side=point.side,
-                        word=point.word,
-                        to_side=point.to_side,
-                        target=pair,
-                    )
+                    yield Approach(path, (lo.t, hi.t), point, start, pair)
 
 
 def _solved(gap: Callable[[float], float], lo: float, hi: float) -> float | None:

@@ -98,13 +98,8 @@ def _overlap(one: AttractorAtPlace, other: AttractorAtPlace, reach: float) -> bo
 
 def _share(coarse: CellSet, fine: CellSet) -> bool:
     """Whether the middle of a cell of one set lies in the other."""
-    numbers = fine.numbers()
-    owner = fine.grid.side_of(numbers)
-    for side in np.unique(owner).tolist():
-        lo, hi = fine.grid.boxes(numbers[owner == side], side)
-        if coarse.holds(0.5 * (lo + hi), side).any():
-            return True
-    return False
+    lo, hi, side = fine.grid.corners(fine.numbers())
+    return bool(coarse.holds(0.5 * (lo + hi), side).any())
 
 
 def _alike(one: AttractorAtPlace, other: AttractorAtPlace, reach: float) -> bool:
@@ -415,22 +410,10 @@ def events_of(follower: Follower, numbers: list[list[int]]) -> tuple[Event, ...]
             events += [event for met in mine or [None] if (event := pair.of_group(group, met)) is not None]
     for met in follower.met:
         if place_of[met.t[1]] != place_of[met.t[0]] + 1:  # a touch, with steps in its bracket
-            number = numbers[place_of[met.owner[0]]][met.owner[1]]
-            one, other = (follower.at(t).place for t in met.t)
-            values, words = (one.values, other.values), between(one, other)
-            events.append(
-                Event(
-                    kind=met.kind,
-                    t=met.t,
-                    values=values,
-                    before=(number,),
-                    after=(number,),
-                    change="",
-                    jump=0.0,
-                    collision=met.collision,
-                    words=words,
-                )
-            )
+            number = [numbers[place_of[met.owner[0]]][met.owner[1]]]
+            one, other = (follower.at(t) for t in met.t)
+            pair = _Between(one, other, number, number)
+            events.append(pair.event(met.kind, Group((0,), (0,)), "", 0.0, met))
     return tuple(sorted(events, key=lambda event: event.t))
 
 

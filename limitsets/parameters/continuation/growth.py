@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from limitsets.parameters.continuation.path import Place
-from limitsets.systems.maps import advance, along, images
+from limitsets.systems.maps import advance, along
 from limitsets.systems.maps.critical import Array, Flags
-from limitsets.systems.sets.closing import Cycle, Ints
+from limitsets.systems.sets.closing import Cycle, Ints, stepped
 from limitsets.systems.sets.end_points import BORDER, EPS, IntervalMap, Union, read, same
 
 # Of the extent: half the length of the first pieces, the length at which their images are kept, what counts as none.
@@ -223,9 +223,8 @@ def _as_cycle(place: Place, x: float, side: int, word: Ints) -> Cycle | None:
     multiplier = float(np.prod(slopes))
     if not abs(multiplier) < 1.0:
         return None
-    for s in np.unique(sides):
-        if (images(place.params, xs[sides == s], int(s)).code != word[sides == s]).any():
-            return None
+    if (stepped(place.params, xs[:, None], sides)[2] != word).any():
+        return None
     first = int(np.lexsort((xs, sides))[0])
     ahead = (np.arange(sides.size) + first) % sides.size
     rounding = 16.0 * EPS * place.extent * (1.0 + float(np.abs(slopes).max()))
@@ -262,7 +261,10 @@ def attracting_cycles(place: Place, orbits: Recorded) -> tuple[list[Cycle], Flag
             x, slope, good = on_itinerary(place, orbits.x[k, 0].copy(), orbits.side[k, 0], words)
             for j in np.flatnonzero(good & (np.abs(slope) < 1.0 + 1e-6)).tolist():
                 side = int(orbits.side[k[j], 0])
-                if not any(_passes(cycle, float(x[j]), side, place.extent) for cycle in cycles):
+                if not any(
+                    (np.abs(cycle.x[cycle.side == side] - x[j]) <= ONE * place.extent).any()
+                    for cycle in cycles
+                ):
                     cycle = _as_cycle(place, float(x[j]), side, words[j])
                     if cycle is None:
                         continue
@@ -286,7 +288,3 @@ def _told_apart(place: Place, cycles: list[Cycle]) -> list[Cycle]:
             twin |= bool((np.abs(y - x) <= noise).all())
         kept += [] if twin else [cycle]
     return kept
-
-
-def _passes(cycle: Cycle, x: float, side: int, extent: float) -> bool:
-    return bool((np.abs(cycle.x[cycle.side == side] - x) <= ONE * extent).any())

@@ -124,14 +124,10 @@ def between(lo: Place, hi: Place) -> str:
             continue
         digits = 1 - math.floor(math.log10(width))
         step = 10.0**-digits
-        ends = (way(each / step) * step for way, each in _outward(one, other))
+        ways = (math.floor, math.ceil) if one < other else (math.ceil, math.floor)
+        ends = (way(each / step) * step for way, each in zip(ways, (one, other), strict=True))
         parts.append(f"{name} = {' to '.join(f'{each:.{max(digits, 0)}f}' for each in ends)}{unit}")
     return ", ".join(parts)
-
-
-def _outward(one: float, other: float) -> list[tuple[Callable[[float], int], float]]:
-    ways = (math.floor, math.ceil) if one < other else (math.ceil, math.floor)
-    return list(zip(ways, (one, other), strict=True))
 
 
 class Path(NamedTuple):
@@ -157,22 +153,15 @@ def _wrong(path: Any) -> AnswerError:
     return AnswerError("the path", path, allowed, "pass one of these")
 
 
-def _straight(ends: Mapping[str, tuple[float, float]]) -> Callable[[float], dict[str, float]]:
-    def values(t: float) -> dict[str, float]:
-        return {name: (1.0 - t) * first + t * last for name, (first, last) in ends.items()}
-
-    return values
-
-
-def _ends(path: Curve) -> dict[str, tuple[Any, Any]] | None:
-    """Read first and last values of a straight path; None for a function."""
+def _curve(path: Curve, read: Callable[[Any], dict[str, Any]]) -> Callable[[float], Any]:
+    """Give the function of a path: of a straight one the values between its ends, each end read as values are."""
     if callable(path):
-        return None
-    if not isinstance(path, Mapping) or not path:
+        return path
+    pairs = isinstance(path, Mapping) and path.values()
+    if not pairs or not all(isinstance(pair, tuple | list) and len(pair) == 2 for pair in pairs):
         raise _wrong(path)
-    if not all(isinstance(pair, tuple | list) and len(pair) == 2 for pair in path.values()):
-        raise _wrong(path)
-    return {name: (pair[0], pair[1]) for name, pair in path.items()}
+    first, last = (read({name: pair[k] for name, pair in path.items()}) for k in (0, 1))
+    return lambda t: {name: (1.0 - t) * first[name] + t * last[name] for name in first}
 
 
 def _of_scene(scene: Scene, path: Curve) -> Path:
@@ -181,12 +170,7 @@ def _of_scene(scene: Scene, path: Curve) -> Path:
             raise _wrong(values)
         return {name: in_units(scene.unit, name, value) for name, value in values.items()}
 
-    ends = _ends(path)
-    if ends is None:
-        curve: Any = path
-    else:
-        first, last = (read({name: pair[k] for name, pair in ends.items()}) for k in (0, 1))
-        curve = _straight({name: (first[name], last[name]) for name in ends})
+    curve = _curve(path, read)
 
     def at(t: float) -> Place:
         values = read(curve(t))
@@ -204,8 +188,7 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
     kind_of(params)
     box = as_domain(domain_of(params) if domain is None else domain)
     require_dimension(params, "domain", box.dimension)
-    ends = _ends(path)
-    curve: Any = path if ends is None else _straight(ends)
+    curve = _curve(path, dict)
 
     def at(t: float) -> Place:
         given = curve(t)

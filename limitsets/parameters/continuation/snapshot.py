@@ -134,11 +134,9 @@ def _starts(place: Place, sets: Iterable[CellSet]) -> tuple[Array, Ints]:
     for cells in sets:
         numbers = cells.numbers()
         chosen = numbers[np.linspace(0, numbers.size - 1, STARTS_PER_SET).astype(np.int64)]
-        owner = cells.grid.side_of(chosen)
-        for cell, side in zip(chosen.tolist(), owner.tolist(), strict=True):
-            low, high = cells.grid.boxes(np.array([cell]), side)
-            xs.append(0.5 * float(low[0, 0] + high[0, 0]))
-            sides.append(side)
+        low, high, owner = cells.grid.corners(chosen)
+        xs += (0.5 * (low + high))[:, 0].tolist()
+        sides += owner.tolist()
     return np.array(xs), np.array(sides, dtype=np.int64)
 
 
@@ -253,10 +251,7 @@ def _rested(snapshot: Snapshot) -> tuple[Array, Ints, Ints]:
     x = np.concatenate([starts.centres(side) for side in range(domain.sides)])
     side = starts.side_of(np.arange(len(x)))
     x, side, code, _ = advance(snapshot.place.params, x, side, RESTED)
-    inside = code >= 0
-    for s in range(domain.sides):
-        here = side == s
-        inside[here] &= ((x[here] >= domain.lo[s]) & (x[here] <= domain.hi[s])).all(axis=1)
+    inside = (code >= 0) & (starts.index(x, side) >= 0)
     x, side = x[inside], side[inside]
     return x, side, _label(snapshot, x, side, 0.0)
 
@@ -266,11 +261,7 @@ def _visited(place: Place, cover: Grid, x: Array, side: Ints, sets: list[CellSet
     rows = []
     for _ in range(TRANSIENT):
         x, side, code, _ = advance(place.params, x, side, 1)
-        cells = np.full(side.size, -1)
-        for s in np.unique(side[code >= 0]).tolist():
-            here = np.flatnonzero((side == s) & (code >= 0))
-            cells[here] = cover.index(x[here], s)
-        rows.append(cells)
+        rows.append(np.where(code >= 0, cover.index(x, side), -1))
     merged: list[CellSet] = []
     for orbit in np.stack(rows, axis=1):
         if (orbit < 0).any():
@@ -311,12 +302,8 @@ def _sampled(attractor: AttractorAtPlace, count: int = 9) -> tuple[Array, Ints]:
         cover = attractor.cells.grid
         numbers = attractor.cells.numbers()
         numbers = numbers[:: max(1, numbers.size // 64)]
-        sides = cover.side_of(numbers)
-        x = np.empty((numbers.size, cover.dimension))
-        for side in np.unique(sides).tolist():
-            lo, hi = cover.boxes(numbers[sides == side], side)
-            x[sides == side] = 0.5 * (lo + hi)
-        return x, sides
+        lo, hi, sides = cover.corners(numbers)
+        return 0.5 * (lo + hi), sides
     parts = [(side, *pair) for side, pairs in attractor.extents.items() for pair in pairs]
     width = 1 if attractor.cycle is not None else count
     x = np.concatenate([np.linspace(lo, hi, width + 2)[1:-1] for _, lo, hi in parts])
@@ -331,9 +318,7 @@ def _label(snapshot: Snapshot, x: Any, side: Ints, reach: float) -> Ints:
     if snapshot.attractors[0].cells is not None:
         for number, each in enumerate(snapshot.attractors):
             if each.cells is not None:
-                for s in np.unique(side).tolist():
-                    here = np.flatnonzero(side == s)
-                    label[here[each.cells.holds(x[here], s)]] = number
+                label[each.cells.holds(x, side)] = number
         return label
     away = np.stack([each.distance(x, side) for each in snapshot.attractors])
     return np.where(away.min(axis=0) <= reach, away.argmin(axis=0), -1)
@@ -528,7 +513,7 @@ class Continuation(Tabled):
         events = [
             picked(e, "kind", "t", "values")
             | picked(e, "before", "after", "change", "jump")
-            | {"collision": _table(e.collision)}
+            | {"collision": None if e.collision is None else e.collision._asdict()}
             for e in self.events
         ]
         return as_table(**picked(self, "name", "unit", "evaluations"), steps=steps, events=events)
@@ -560,7 +545,3 @@ class Continuation(Tabled):
         rows = [(each.kind, each.t, each.change or None, each.jump) for each in self.events]
         columns = ("event", Column("t", show=".10g", ends=True), "change", Column("jump", show=".4g"))
         return Table(columns, rows, f"{self.name}: events", "sampled, not proved"), self.table()
-
-
-def _table(collision: Collision | None) -> dict[str, Any] | None:
-    return None if collision is None else collision._asdict()

@@ -218,15 +218,15 @@ class Grid(Tabled):
         """Side of each cell."""
         return np.searchsorted(self.offset, np.asarray(cells), side="right").astype(np.int64) - 1
 
-    def index(self, x: ArrayLike, side: int) -> NDArray[np.int64]:
-        """Cells that hold the given states of one side; -1 outside, the upper one on a shared border.
+    def index(self, x: ArrayLike, side: int | NDArray[np.int64]) -> NDArray[np.int64]:
+        """Cells that hold the given states; -1 outside, the upper one on a shared border.
 
         Parameters
         ----------
         x : array_like, shape (n,) or (n, dimension)
             States.
-        side : int
-            Their side.
+        side : int or ndarray of int, shape (n,)
+            Their side, or the side of each.
 
         Returns
         -------
@@ -234,6 +234,11 @@ class Grid(Tabled):
             Numbers of the cells.
         """
         states = np.asarray(x, dtype=np.float64).reshape(-1, self.dimension)
+        if isinstance(side, np.ndarray):
+            cells = np.full(len(states), -1)
+            for s in range(self.sides):
+                cells[side == s] = self.index(states[side == s], s)
+            return cells
         inside = np.ones(len(states), dtype=bool)
         number = np.zeros(len(states), dtype=np.int64)
         for axis, edges in enumerate(self.edges[side]):
@@ -253,6 +258,15 @@ class Grid(Tabled):
         position = self.axes(cells, side)
         pairs = [(edges[k], edges[k + 1]) for edges, k in zip(self.edges[side], position, strict=True)]
         return np.stack([lo for lo, _ in pairs], axis=-1), np.stack([hi for _, hi in pairs], axis=-1)
+
+    def corners(
+        self, cells: NDArray[np.integer]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+        """Corners of cells of any sides, two arrays of shape (n, dimension), and their sides."""
+        side, (lo, hi) = self.side_of(cells), np.empty((2, cells.size, self.dimension))
+        for s in np.unique(side).tolist():
+            lo[side == s], hi[side == s] = self.boxes(cells[side == s], s)
+        return lo, hi, side
 
     def centres(self, side: int) -> NDArray[np.float64]:
         """Middles of all cells of one side, shape (n,) in one dimension, (n, dimension) otherwise."""
@@ -482,9 +496,9 @@ class CellSet:
         """Length, area or volume of the set."""
         return float(self.grid.measure[self.mask].sum())
 
-    def holds(self, x: ArrayLike, side: int) -> NDArray[np.bool_]:
+    def holds(self, x: ArrayLike, side: int | NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whether the cell of each state (`Grid.index`) is in the set; x of shape (n,) or (n, dimension)."""
-        if self.grid.dimension > 1:
+        if self.grid.dimension > 1 or isinstance(side, np.ndarray):
             cell = self.grid.index(x, side)
             return self.mask[cell] & (cell >= 0)
         # The borders of the set are fewer than those of the cells.

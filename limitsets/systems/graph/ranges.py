@@ -129,24 +129,12 @@ def _row_of_box(r: Ranges, box: Any, row: Any) -> Any:
     return start + (row % rows) * r.row_stride[side] + (row // rows) * r.plane_stride[side]
 
 
-def _box_of_its_own(r: Runs, cell: Any) -> tuple[Any, Any]:
-    return np.int64(cell), np.int64(cell) + 1
-
-
-def _whole_run(r: Runs, box: Any) -> tuple[Any, Any, Any, Any, Any]:
-    return r.first[box], r.last[box] - r.first[box] + 1, 1, 1, 0
-
-
-def _start_of_run(r: Runs, box: Any, row: Any) -> Any:
-    return r.first[box]
-
-
 boxes_of.on(Ranges, _boxes_of_cell)
-boxes_of.on(Runs, _box_of_its_own)
+boxes_of.on(Runs, lambda r, cell: (np.int64(cell), np.int64(cell) + 1))
 box_at.on(Ranges, _box_of_ranges)
-box_at.on(Runs, _whole_run)
+box_at.on(Runs, lambda r, box: (r.first[box], r.last[box] - r.first[box] + 1, 1, 1, 0))
 row_start.on(Ranges, _row_of_box)
-row_start.on(Runs, _start_of_run)
+row_start.on(Runs, lambda r, box, row: r.first[box])
 
 
 @kernel(entry=True, counting=False)

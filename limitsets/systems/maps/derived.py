@@ -75,29 +75,15 @@ def _formula(form: Any, params: Any, x: Any) -> Any:
     """Value of a formula, and the side that it leads to."""
 
 
-def _decision(form: Decision, params: Any, x: Any) -> Any:
-    return margin(params, x, form.side), form.side
-
-
-def _on_branch(form: OnBranch, params: Any, x: Any) -> Any:
-    forced_image = forced(params, x, form.side, form.branch)
-    return forced_image[0], forced_image[1]
-
-
 def _by_image(params: Any, x: Any, side: int, branch: int) -> Any:
     """Return the image of a map of one branch that has `image` alone: method of `forced`."""
     after, to, _ = image(params, x, side)
     return after, to
 
 
-def _whole(form: Whole, params: Any, x: Any) -> Any:
-    after, to, _ = image(params, x, form.side)
-    return after, to
-
-
-_formula.on(Decision, _decision)
-_formula.on(OnBranch, _on_branch)
-_formula.on(Whole, _whole)
+_formula.on(Decision, lambda form, params, x: (margin(params, x, form.side), form.side))
+_formula.on(OnBranch, lambda form, params, x: forced(params, x, form.side, form.branch)[:2])
+_formula.on(Whole, lambda form, params, x: image(params, x, form.side)[:2])
 
 
 # ---------------------------------------------------------------- numbers of a box
@@ -202,25 +188,9 @@ def _box(lo: Any, hi: Any) -> Any:
     return _intervals(entries_of(lo), entries_of(hi))
 
 
-def _any_sign(params: Any, x: Any, side: int) -> Interval:
-    return Interval(-math.inf, math.inf)
-
-
-def _one_branch(params: Any, x: Any, side: int) -> Interval:
-    return Interval(-1.0, -1.0)
-
-
 def _margin(params: Any, x: Any, side: int) -> Interval:
     form = Decision(side)
     return _component(form, params, x, _columns(x, form, params, x), 0)
-
-
-def _on_branch_form(params: Any, side: int, branch: int) -> OnBranch:
-    return OnBranch(side, branch)
-
-
-def _whole_form(params: Any, side: int, branch: int) -> Whole:
-    return Whole(side)
 
 
 def _as_intervals(params_lo: Any, params_hi: Any, side: int) -> Any:
@@ -253,12 +223,12 @@ def _box_of_two(params: Any, _: Any, lo: Any, hi: Any, side: int) -> Any:
 # ---------------------------------------------------------------- branch by branch, with slopes
 
 
-@generic(proof=True, default=_any_sign)
+@generic(proof=True, default=lambda params, x, side: Interval(-math.inf, math.inf))
 def _sign(params: Any, x: Any, side: int) -> Any:
     """Enclose `margin`; everything where a map has none."""
 
 
-@generic(proof=True, default=_on_branch_form)
+@generic(proof=True, default=lambda params, side, branch: OnBranch(side, branch))
 def _form(params: Any, side: int, branch: int) -> Any:
     """Return the formula of one branch."""
 
@@ -363,9 +333,9 @@ def derive(cls: type, *, forced: bool, decided: bool, branches: int, boxes: bool
     """
     if not forced and branches == 1:
         kernels.forced.on(cls, _by_image)
-        _form.on(cls, _whole_form)
+        _form.on(cls, lambda params, side, branch: Whole(side))
     if branches == 1:
-        _sign.on(cls, _one_branch)
+        _sign.on(cls, lambda params, x, side: Interval(-1.0, -1.0))
     elif decided:
         _sign.on(cls, _margin)
     enough = branches == 1 or (branches == 2 and decided and forced)

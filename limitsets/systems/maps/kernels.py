@@ -12,30 +12,6 @@ from limitsets.numbers.jit import generic, kernel, of_entries
 from limitsets.systems.maps import codes
 
 
-def _same(params: Any, side: int) -> Any:
-    return params
-
-
-def _both(lo: Any, hi: Any, side: int) -> Any:
-    return lo, hi
-
-
-def _as_they_are(params: Any, start: int, step: int) -> Any:
-    return params
-
-
-def _no_fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
-    return image_box(params_lo, params_hi, lo, hi, side)
-
-
-def _no_fallback(params: Any, x: Any, side: int) -> Any:
-    return x, side, codes.OUTSIDE_MODEL
-
-
-def _first_branch(params: Any, x: Any, side: int) -> Any:
-    return -1.0
-
-
 @generic
 def image(params: Any, x: Any, side: int) -> Any:
     """One step: ``(x', side', code)``."""
@@ -51,27 +27,31 @@ def image_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> An
     """Boxes that contain the image of a box, for every parameter between the two."""
 
 
-@generic(proof=True, inlined=False, default=_no_fallback_box)
+@generic(
+    proof=True,
+    inlined=False,
+    default=lambda lo_map, hi_map, lo, hi, side: image_box(lo_map, hi_map, lo, hi, side),
+)
 def fallback_box(params_lo: Any, params_hi: Any, lo: Any, hi: Any, side: int) -> Any:
     """As `image_box`, slow and sure."""
 
 
-@generic(proof=True, default=_both)
+@generic(proof=True, default=lambda lo, hi, side: (lo, hi))
 def on_side_box(params_lo: Any, params_hi: Any, side: int) -> Any:
     """Return what `image_box` needs to know of one side, for both corners."""
 
 
-@generic(default=_same)
+@generic(default=lambda params, side: params)
 def on_side(params: Any, side: int) -> Any:
     """Return what the kernels need to know of one side."""
 
 
-@generic(inlined=False, default=_no_fallback)
+@generic(inlined=False, default=lambda params, x, side: (x, side, codes.OUTSIDE_MODEL))
 def fallback(params: Any, x: Any, side: int) -> Any:
     """One step, slow and sure."""
 
 
-@generic(default=_first_branch)
+@generic(default=lambda params, x, side: -1.0)
 def margin(params: Any, x: Any, side: int) -> Any:
     """Return a number whose sign decides between branches 0 and 1; of a map without one -1, which is branch 0."""
 
@@ -81,7 +61,7 @@ def displacement(params: Any, x: Any, side: int) -> Any:
     """x' - x without cancellation."""
 
 
-@generic(default=_as_they_are)
+@generic(default=lambda params, start, step: params)
 def scattered(params: Any, start: int, step: int) -> Any:
     """Return the parameters of one step of one start."""
 
@@ -112,18 +92,6 @@ def put(xs: Any, k: int, x: Any) -> None:
     """Store state number k."""
 
 
-def _pick1(xs: Any, k: int) -> Any:
-    return xs[0][k]
-
-
-def _pick2(xs: Any, k: int) -> Any:
-    return xs[0][k], xs[1][k]
-
-
-def _pick3(xs: Any, k: int) -> Any:
-    return xs[0][k], xs[1][k], xs[2][k]
-
-
 def _put1(xs: Any, k: int, x: Any) -> None:
     xs[0][k] = x
 
@@ -136,7 +104,11 @@ def _put3(xs: Any, k: int, x: Any) -> None:
     xs[0][k], xs[1][k], xs[2][k] = x
 
 
-for _n, _get, _set in ((1, _pick1, _put1), (2, _pick2, _put2), (3, _pick3, _put3)):
+for _n, _get, _set in (
+    (1, lambda xs, k: xs[0][k], _put1),
+    (2, lambda xs, k: (xs[0][k], xs[1][k]), _put2),
+    (3, lambda xs, k: (xs[0][k], xs[1][k], xs[2][k]), _put3),
+):
     pick.on(_n, _get)
     put.on(_n, _set)
 
@@ -144,33 +116,17 @@ for _n, _get, _set in ((1, _pick1, _put1), (2, _pick2, _put2), (3, _pick3, _put3
 # ---------------------------------------------------------------- slopes of maps that do not give them
 
 
-def _itself(x: Any) -> Any:
-    return x
-
-
-def _alone(x: Any) -> Any:
-    return (x,)
-
-
-def _first(x: Any) -> Any:
-    return x[0]
-
-
-@generic(default=_itself)
+@generic(default=lambda x: x)
 def state_of(entries: Any) -> Any:
     """Return what kernels take, from a tuple of coordinates: a number in one dimension, the tuple in more."""
 
 
-@generic(default=_alone)
+@generic(default=lambda x: (x,))
 def entries_of(x: Any) -> Any:
     """Undo `state_of`."""
 
 
-def _as_given(image_on_branch: Any, params: Any, x: Any, side: int, branch: int) -> Any:
-    return image_on_branch
-
-
-@generic(default=_as_given)
+@generic(default=lambda given, params, x, side, branch: given)
 def _with_slope(image_on_branch: Any, params: Any, x: Any, side: int, branch: int) -> Any:
     """Return ``(x', side', slope)``, whether the slope is there or not."""
 
@@ -209,9 +165,9 @@ def _with_derivative(image_on_branch: Any, params: Any, x: Any, side: int, branc
     return image_on_branch[0], image_on_branch[1], state_of(_row(columns[0], columns))
 
 
-state_of.on(1, _first)
-entries_of.on(2, _itself)
-entries_of.on(3, _itself)
+state_of.on(1, lambda entries: entries[0])
+for _n in (2, 3):
+    entries_of.on(_n, lambda x: x)
 _with_slope.on(2, _with_derivative)
 
 

@@ -7,7 +7,6 @@ back: one has left for good where it ends beyond the border and was there for th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +16,9 @@ from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.components import reach
 from limitsets.systems.graph.target import Target
-from limitsets.systems.maps import codes, images
+from limitsets.systems.maps import codes
 from limitsets.systems.sets import Attractor, Basins, basins
+from limitsets.systems.sets.closing import stepped
 
 # ----------------------------------------------------------------
 # Inner and outer basins: in which basin each cell lies, and in which ones an undecided cell may lie.
@@ -77,14 +77,9 @@ class Colours:
         return self.basins.labels
 
     @property
-    def proved(self) -> bool:
-        """Whether the images of the cells are enclosures."""
-        return self.graph.method == "boxes"
-
-    @property
     def how(self) -> str:
         """How inner and outer basins were obtained: "proved", or "cells" whose images are sampled."""
-        return "proved" if self.proved else "cells"
+        return self.graph.how
 
     @property
     def names(self) -> tuple[int | str, ...]:
@@ -152,13 +147,8 @@ STEPS = 10_000
 
 def starts_in(grid: Grid, cells: Integers, rng: np.random.Generator) -> tuple[Floats, Integers]:
     """Draw a start in each of the given cells, evenly: states of shape (n, dimension), and their sides."""
-    side, x = grid.side_of(cells), np.empty((cells.size, grid.dimension))
-    part = rng.random(x.shape)
-    for s in range(grid.sides):
-        here = np.flatnonzero(side == s)
-        lo, hi = grid.boxes(cells[here], s)
-        x[here] = lo + part[here] * (hi - lo)
-    return x, side
+    lo, hi, side = grid.corners(cells)
+    return lo + rng.random(lo.shape) * (hi - lo), side
 
 
 def random_starts(grid: Grid, count: int, rng: np.random.Generator) -> tuple[Floats, Integers]:
@@ -177,16 +167,6 @@ def random_cells(
     return cells, starts_in(grid, cells, rng)
 
 
-def _next(params: Any, x: Floats, side: Integers) -> tuple[Floats, Integers, Integers]:
-    """One step of states on several sides."""
-    after, to, code = np.empty_like(x), np.empty_like(side), np.empty_like(side)
-    for s in np.unique(side).tolist():
-        here = np.flatnonzero(side == s)
-        there = images(params, x[here], s)
-        after[here], to[here], code[here] = there.x.reshape(here.size, -1), there.side, there.code
-    return after, to, code
-
-
 def leaves_by_the_border(graph: TransitionGraph) -> bool:
     """Whether the image of some cell's centre lies beyond a border at which the grid ends, and not the map.
 
@@ -195,13 +175,9 @@ def leaves_by_the_border(graph: TransitionGraph) -> bool:
     grid = graph.grid
     if grid.domain.anchor is not None:
         return False
-    for s in range(grid.sides):
-        x = grid.boxes(np.arange(grid.n_cells)[grid.of_side(s)], s)
-        after, to, code = _next(graph.map, 0.5 * (x[0] + x[1]), np.full(len(x[0]), s))
-        for into in np.unique(to[code >= 0]).tolist():
-            if (grid.index(after[(code >= 0) & (to == into)], into) < 0).any():
-                return True
-    return False
+    lo, hi, side = grid.corners(np.arange(grid.n_cells))
+    after, to, code = stepped(graph.map, 0.5 * (lo + hi), side)
+    return bool((grid.index(after[code >= 0], to[code >= 0]) < 0).any())
 
 
 def follow(
@@ -250,21 +226,20 @@ def follow(
     gone, inside = np.zeros_like(made), np.zeros_like(made)  # first step beyond the border, last one within
     for step in range(steps + 1):
         if step:
-            x, side, code = _next(graph.map, x, side)
+            x, side, code = stepped(graph.map, x, side)
             made[going] = step
         label = np.where(code < 0, code, codes.UNDECIDED)
-        for s in np.unique(side[code >= 0]).tolist():
-            here = np.flatnonzero((side == s) & (code >= 0))
-            cell = grid.index(x[here], s)
-            low = (x[here] < grid.domain.lo[s]).any(axis=1)
-            label[here] = np.where(cell >= 0, stops[cell], np.where(low, below, above))
-            if returning:
-                out, finite = cell < 0, np.isfinite(x[here]).all(axis=1)
-                first = here[out & (gone[going[here]] == 0)]
-                gone[going[first]] = step
-                inside[going[here[~out]]] = step
-                on_their_way = here[out & finite & ((step < steps) | (2 * inside[going[here]] > steps))]
-                label[on_their_way] = codes.UNDECIDED
+        here = np.flatnonzero(code >= 0)
+        cell = grid.index(x[here], side[here])
+        low = (x[here] < grid.domain.lo[side[here]]).any(axis=1)
+        label[here] = np.where(cell >= 0, stops[cell], np.where(low, below, above))
+        if returning:
+            out, finite = cell < 0, np.isfinite(x[here]).all(axis=1)
+            first = here[out & (gone[going[here]] == 0)]
+            gone[going[first]] = step
+            inside[going[here[~out]]] = step
+            on_their_way = here[out & finite & ((step < steps) | (2 * inside[going[here]] > steps))]
+            label[on_their_way] = codes.UNDECIDED
         end[going] = label
         on = np.flatnonzero(label == codes.UNDECIDED)
         going, x, side = going[on], x[on], side[on]

@@ -192,7 +192,7 @@ def convergence_times(
 
 def _bounds(parted: Colours) -> list[tuple[int | None, float | None]]:
     """Bound the steps from each inner basin, at most and in the mean."""
-    if not parted.proved:
+    if parted.how != "proved":
         return [(None, None)] * parted.codes.size
     graph, parts = parted.graph, parted.graph.components()
     sets, attracting, stays = (
@@ -543,7 +543,7 @@ def minimal_fatal_shock(
         nearest = int(np.flatnonzero(fatal & decided)[distance[fatal & decided].argmin()])
         into = int(parted.labels[number[nearest]]) if distance[nearest] <= beyond else into
     cut = far == beyond and graph.grid.domain.anchor is None
-    if parted.proved:
+    if parted.how == "proved":
         least, far = least * (1.0 - ROUNDING), far * (1.0 + ROUNDING)
     else:
         width = CELLS * float(np.sqrt(((hi - lo) ** 2).sum(axis=1)).max())

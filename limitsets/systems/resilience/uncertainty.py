@@ -236,15 +236,12 @@ def _sampled(
     for distance in apart:
         cell, (x, side) = random_cells(grid, starts // count, rng)
         axis, row = rng.integers(grid.dimension, size=side.size), np.arange(side.size)
-        width = np.empty_like(x)
-        for s in np.unique(side).tolist():
-            lo, hi = grid.boxes(cell[side == s], s)
-            width[side == s] = hi - lo
+        lo, hi, _ = grid.corners(cell)
         own, _ = follow(parted.graph, parted.blocks, x, side, steps, returning=True)
         known, differs = own != codes.UNDECIDED, np.zeros(side.size, dtype=bool)
         for away in (distance, -distance):
             other = x.copy()
-            other[row, axis] += away * width[row, axis]
+            other[row, axis] += away * (hi - lo)[row, axis]
             within = (other >= grid.domain.lo[side]).all(axis=1) & (other <= grid.domain.hi[side]).all(axis=1)
             label, _ = follow(parted.graph, parted.blocks, other, side, steps, returning=True)
             known &= ~within | (label != codes.UNDECIDED)
@@ -462,7 +459,8 @@ def wada(
     shares = []
     for parts in REFINEMENTS:
         if parts == 1:
-            _see(graph.grid, middle, seen, here)
+            for box, places in _neighbours(graph.grid, middle):
+                here[box] |= seen[:, places].T
         else:
             left = np.flatnonzero(~here[:, met].all(axis=1))
             _look(
@@ -514,12 +512,6 @@ def _neighbours(
             inside = np.all([(k >= 0) & (k < n) for k, n in zip(at, shape, strict=True)], axis=0)
             cell = np.ravel_multi_index([k[inside] for k in at], shape)
             yield mine[inside], grid.offset[s] + cell
-
-
-def _see(grid: Grid, middle: NDArray[np.int64], seen: NDArray[np.bool_], here: NDArray[np.bool_]) -> None:
-    """Mark the basins that the first starts met."""
-    for box, cell in _neighbours(grid, middle):
-        here[box] |= seen[:, cell].T
 
 
 def _look(

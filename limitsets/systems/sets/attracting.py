@@ -162,11 +162,9 @@ def _visits(side: NDArray[np.int64]) -> tuple[tuple[int, ...] | None, dict[int, 
 def _start(cells: CellSet) -> tuple[Any, int]:
     """Middle of the middle cell, and its side."""
     numbers = cells.numbers()
-    cell = numbers[numbers.size // 2]
-    side = int(cells.grid.side_of(cell))
-    lo, hi = cells.grid.boxes(np.array([cell]), side)
+    lo, hi, side = cells.grid.corners(numbers[[numbers.size // 2]])
     middle = 0.5 * (lo[0] + hi[0])
-    return (float(middle[0]) if middle.size == 1 else middle), side
+    return (float(middle[0]) if middle.size == 1 else middle), int(side[0])
 
 
 def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor:

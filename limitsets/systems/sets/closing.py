@@ -143,7 +143,7 @@ class Closed(NamedTuple):
     near: float
 
 
-def _stepped(params: Any, x: Array, side: Ints) -> tuple[Array, Ints, Ints]:
+def stepped(params: Any, x: Array, side: Ints) -> tuple[Array, Ints, Ints]:
     """Take one step from states of any shape (..., d): images, sides, codes."""
     flat, sides = x.reshape(-1, x.shape[-1]), side.ravel()
     after, to, code = np.empty_like(flat), np.empty_like(sides), np.empty_like(sides)
@@ -199,7 +199,7 @@ def _beside(params: Any, slopes: Slopes, side: Ints, scale: float) -> Measured:
 
     def measured(x: Array) -> tuple[Array, Array]:
         at = x.copy()
-        after, to, code = _stepped(params, x, side)
+        after, to, code = stepped(params, x, side)
 
         def miss(after: Array, to: Ints, code: Ints) -> Array:
             far = np.abs(after - _ahead(x)).max(axis=-1)
@@ -210,7 +210,7 @@ def _beside(params: Any, slopes: Slopes, side: Ints, scale: float) -> Measured:
             if not (best > FARTHEST * scale).any():
                 break
             tried = x + BESIDE * scale * way
-            step = _stepped(params, tried, side)
+            step = stepped(params, tried, side)
             better = (best > FARTHEST * scale) & (miss(*step) < best)
             at[better], after[better], code[better] = tried[better], step[0][better], step[2][better]
             best = np.where(better, miss(*step), best)
@@ -232,7 +232,7 @@ def _noise(
     """How far images just beside each point are from the tangent: rounding, and jumps, along each coordinate."""
     noise, jumps = np.zeros_like(x), np.zeros_like(x)
     for way in _offsets(x.shape[-1]):
-        there, to, code = _stepped(params, x + BESIDE * scale * way, side)
+        there, to, code = stepped(params, x + BESIDE * scale * way, side)
         off = np.abs(there - after - BESIDE * scale * slope @ way)
         off[~np.isfinite(off) | (code < 0)[..., None] | (to != _ahead(side))[..., None]] = 0.0
         jumps = np.maximum(jumps, np.where(off > NEAR * scale, off, 0.0))
@@ -272,8 +272,8 @@ def _closed(params: Any, x: Array, side: Ints, scale: float, slopes: Slopes, *, 
     for way in (None, np.zeros(x.shape[-1]), *(_offsets(x.shape[-1]) if seams else ())):
         tried = x
         if way is not None:  # what `image` itself calls the points
-            tried = np.roll(_stepped(params, x + 4.0 * EPS * scale * way, side)[0], 1, axis=1)
-        landing, to, code = _stepped(params, tried, side)
+            tried = np.roll(stepped(params, x + 4.0 * EPS * scale * way, side)[0], 1, axis=1)
+        landing, to, code = stepped(params, tried, side)
         miss = np.abs(landing - _ahead(tried))
         good = ((code >= 0) & (to == _ahead(side)) & (miss <= rounding).all(axis=-1)).all(axis=1) & ~done
         points[good], branches[good], missed[good] = tried[good], code[good], miss[good]

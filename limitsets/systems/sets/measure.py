@@ -71,9 +71,8 @@ def _from_points(graph: TransitionGraph, cells: NDArray[np.int64], side: int) ->
     samples = SAMPLES[grid.dimension]
     image = images(graph.map, sample_points(grid, cells, side, samples), side)
     target = np.full(image.code.size, -1)
-    for after in range(grid.sides):
-        lands = (image.side == after) & (image.code >= 0)
-        target[lands] = grid.index(image.x[lands], after)
+    lands = image.code >= 0
+    target[lands] = grid.index(image.x[lands], image.side[lands])
     source = np.repeat(cells, samples**grid.dimension)
     kept = target >= 0
     return UlamMatrix(source[kept], target[kept], np.full(int(kept.sum()), samples ** -float(grid.dimension)))

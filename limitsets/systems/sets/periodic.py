@@ -23,7 +23,6 @@ from limitsets.systems.sets.closing import (
     NEAR,
     Array,
     Closed,
-    Cycle,
     Cycles,
     Ints,
     closed,
@@ -470,20 +469,8 @@ def _middles(cells: CellSet) -> tuple[Array, Ints]:
     """Middles of the cells, of every second, third, ... one where there are very many, and their sides."""
     numbers = cells.numbers()
     numbers = numbers[:: max(1, -(-numbers.size // MOST_STARTS))]
-    sides = cells.grid.side_of(numbers)
-    middles = np.empty((numbers.size, cells.grid.dimension))
-    for side in np.unique(sides).tolist():
-        lo, hi = cells.grid.boxes(numbers[sides == side], side)
-        middles[sides == side] = 0.5 * (lo + hi)
-    return middles, sides
-
-
-def _inside(cycle: Cycle, cells: CellSet) -> bool:
-    """Whether every point of an orbit lies in the cells."""
-    numbers = [
-        int(cells.grid.index(x[None, :], int(side))[0]) for x, side in zip(cycle.x, cycle.side, strict=True)
-    ]
-    return all(number >= 0 and cells.mask[number] for number in numbers)
+    lo, hi, sides = cells.grid.corners(numbers)
+    return 0.5 * (lo + hi), sides
 
 
 @arguments_checked
@@ -531,4 +518,5 @@ def cycles(graph: TransitionGraph, up_to: int, within: Any = None) -> Cycles:
     answer = cycles_from(graph.map, *_middles(cells), up_to)
     if within is None:
         return answer
-    return Cycles((cycle for cycle in answer if _inside(cycle, cells)), complete=False, how=answer.how)
+    inside = (cycle for cycle in answer if cells.holds(cycle.x, cycle.side).all())
+    return Cycles(inside, complete=False, how=answer.how)

@@ -62,16 +62,38 @@ def merge(u: Unions, row: int, gap: float) -> bool:
 
 
 @kernel(entry=True, counting=False)
+def copy(u: Unions, row: int, into: int) -> None:
+    """Make a row what another is."""
+    for i in range(u.size[row]):
+        u.side[into, i], u.lo[into, i], u.hi[into, i] = u.side[row, i], u.lo[row, i], u.hi[row, i]
+    u.size[into] = u.size[row]
+
+
+@kernel(entry=True, counting=False)
+def _length(u: Unions, row: int) -> float:
+    length = 0.0
+    for i in range(u.size[row]):
+        length += u.hi[row, i] - u.lo[row, i]
+    return length
+
+
+@kernel(entry=True, counting=False)
+def _agree(u: Unions, row: int, slack: float) -> bool:
+    """Whether SET and another row hold the same intervals."""
+    if u.size[SET] != u.size[row]:
+        return False
+    for i in range(u.size[SET]):
+        apart = max(abs(u.lo[SET, i] - u.lo[row, i]), abs(u.hi[SET, i] - u.hi[row, i]))
+        if u.side[SET, i] != u.side[row, i] or not apart <= slack:
+            return False
+    return True
+
+
+@kernel(entry=True, counting=False)
 def is_still(u: Unions, rest: float) -> bool:
     """Make SET what IMAGE is; whether no end moved by more than `rest`."""
-    still: bool = u.size[IMAGE] == u.size[SET]
-    for i in range(u.size[IMAGE]):
-        lo, hi, side = u.lo[IMAGE, i], u.hi[IMAGE, i], u.side[IMAGE, i]
-        still = (
-            still and side == u.side[SET, i] and max(abs(lo - u.lo[SET, i]), abs(hi - u.hi[SET, i])) <= rest
-        )
-        u.side[SET, i], u.lo[SET, i], u.hi[SET, i] = side, lo, hi
-    u.size[SET] = u.size[IMAGE]
+    still: bool = _agree(u, IMAGE, rest)
+    copy(u, IMAGE, SET)
     return still
 
 
@@ -129,11 +151,8 @@ def images_of(
 
 
 @kernel(entry=True, counting=False)
-def settle(params: Any, r: Region, p: Pieces, u: Unions) -> int:
+def settle(params: Any, scale: float, r: Region, p: Pieces, u: Unions) -> int:
     """Take images of SET until its ends rest; NOTHING, or why they do not."""
-    scale = 0.0
-    for side in range(r.lo.size):
-        scale = max(scale, r.hi[side] - r.lo[side])
     rest, rested = REST * scale, 0
     for _ in range(MOST_IMAGES):
         u.size[IMAGE] = 0
@@ -207,10 +226,7 @@ def cover_more(u: Unions, scale: float) -> bool:
     if u.size[COVERED] > MANY:
         return False
     if many:  # what was filled has images too
-        u.size[PUSHED] = u.size[COVERED]
-        for i in range(u.size[COVERED]):
-            u.side[PUSHED, i], u.lo[PUSHED, i] = u.side[COVERED, i], u.lo[COVERED, i]
-            u.hi[PUSHED, i] = u.hi[COVERED, i]
+        copy(u, COVERED, PUSHED)
     return True
 
 
@@ -246,13 +262,7 @@ def push_through(
             images_of(params, p, u, PUSHED, IMAGE, 0, ANY, SLIVER * scale)
             if u.size[IMAGE] > MOST_INTERVALS:
                 return TOO_MANY
-            for i in range(u.size[IMAGE]):
-                u.side[PUSHED, i], u.lo[PUSHED, i], u.hi[PUSHED, i] = (
-                    u.side[IMAGE, i],
-                    u.lo[IMAGE, i],
-                    u.hi[IMAGE, i],
-                )
-            u.size[PUSHED] = u.size[IMAGE]
+            copy(u, IMAGE, PUSHED)
             steps += 1
         if least < 0 and u.seen[side] >= 0:
             least = side
@@ -286,30 +296,6 @@ STRETCHES, MOST_VISITS = 200, 20_000
 
 
 @kernel(entry=True, counting=False)
-def _agree(u: Unions, slack: float) -> bool:
-    """Whether SET and COVERED hold the same intervals."""
-    if u.size[SET] != u.size[COVERED]:
-        return False
-    for i in range(u.size[SET]):
-        if u.side[SET, i] != u.side[COVERED, i]:
-            return False
-        if max(abs(u.lo[SET, i] - u.lo[COVERED, i]), abs(u.hi[SET, i] - u.hi[COVERED, i])) > slack:
-            return False
-    return True
-
-
-@kernel(entry=True, counting=False)
-def _take(u: Unions) -> float:
-    """Make PUSHED what IMAGE is; its length."""
-    length = 0.0
-    for i in range(u.size[IMAGE]):
-        u.side[PUSHED, i], u.lo[PUSHED, i], u.hi[PUSHED, i] = u.side[IMAGE, i], u.lo[IMAGE, i], u.hi[IMAGE, i]
-        length += u.hi[IMAGE, i] - u.lo[IMAGE, i]
-    u.size[PUSHED] = u.size[IMAGE]
-    return length
-
-
-@kernel(entry=True, counting=False)
 def _spreads(params: Any, x: float, side: int, length: float, u: Unions) -> bool:
     """Whether an orbit visits all of many equal stretches of SET."""
     missing = STRETCHES
@@ -338,9 +324,7 @@ def fills(params: Any, x: float, side: int, scale: float, p: Pieces, u: Unions) 
         x, side, code = step(params, x, side)
         if code < 0:
             return False
-    length, long = 0.0, 0.0
-    for i in range(u.size[SET]):
-        length += u.hi[SET, i] - u.lo[SET, i]
+    length, long = _length(u, SET), 0.0
     u.size[PUSHED] = 0
     for i in range(u.size[SET]):
         if u.side[SET, i] == side and u.lo[SET, i] <= x <= u.hi[SET, i]:
@@ -351,15 +335,13 @@ def fills(params: Any, x: float, side: int, scale: float, p: Pieces, u: Unions) 
         images_of(params, p, u, PUSHED, IMAGE, ANY, ANY, 0.0)
         if not merge(u, IMAGE, GAP * scale):
             return False
-        long = _take(u)
+        copy(u, IMAGE, PUSHED)
+        long = _length(u, PUSHED)
         if long >= LONG * length:
             break
     if long < LONG * length:
         return _spreads(params, x, side, length, u)
-    u.size[COVERED] = u.size[PUSHED]
-    for i in range(u.size[PUSHED]):
-        u.side[COVERED, i], u.lo[COVERED, i] = u.side[PUSHED, i], u.lo[PUSHED, i]
-        u.hi[COVERED, i] = u.hi[PUSHED, i]
+    copy(u, PUSHED, COVERED)
     for _ in range(MOST_GROWN):
         u.size[IMAGE] = 0
         images_of(params, p, u, PUSHED, IMAGE, ANY, ANY, 0.0)
@@ -367,4 +349,4 @@ def fills(params: Any, x: float, side: int, scale: float, p: Pieces, u: Unions) 
             return False
         if u.size[PUSHED] == 0:
             break
-    return _agree(u, SAME * scale)
+    return _agree(u, COVERED, SAME * scale)

@@ -8,7 +8,7 @@ from typing import Any
 from limitsets.numbers.jit import kernel
 from limitsets.systems.maps.drivers import fill_images, step
 from limitsets.systems.maps.kernels import image_on
-from limitsets.systems.topology.bands import COVERED, PUSHED, SET, merge, put
+from limitsets.systems.topology.bands import COVERED, PUSHED, SET, copy, merge, put
 from limitsets.systems.topology.cells import cell_of
 from limitsets.systems.topology.work import Cells, Components, Pieces, Starts, Unions
 
@@ -240,13 +240,7 @@ def _joins(params: Any, x: float, side: int, known: int, scale: float, u: Unions
     if length == NO_CYCLE:
         return NO_CYCLE
     if known <= NO_CYCLE:
-        u.size[COVERED] = length
-        for i in range(length):
-            u.side[COVERED, i], u.lo[COVERED, i], u.hi[COVERED, i] = (
-                u.side[PUSHED, i],
-                u.lo[PUSHED, i],
-                u.hi[PUSHED, i],
-            )
+        copy(u, PUSHED, COVERED)
         return length
     for i in range(known if length == known else 0):
         if (
@@ -307,9 +301,7 @@ def one_cycle(params: Any, x: float, side: int, scale: float, p: Pieces, u: Unio
     if other == DOUBTFUL or (known == NO_CYCLE and other > NO_CYCLE):
         return DOUBTFUL
     if known > NO_CYCLE:
-        u.size[SET] = 0
-        for i in range(known):
-            put(u, SET, u.side[COVERED, i], u.lo[COVERED, i], u.hi[COVERED, i])
+        copy(u, COVERED, SET)
         if not merge(u, SET, CLOSES * scale) or u.size[SET] != known:
             return DOUBTFUL
     return known

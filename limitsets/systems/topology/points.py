@@ -288,7 +288,7 @@ def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topolog
     """Fill the fields of one attractor of point i; DECIDED, or a doubt."""
     sides, u = r.lo.size, w.unions
     expands = begin_union(sides, a, w.cells, w.components, u)
-    settled, widest, cycle = settle(params, r, w.pieces, u), 0.0, NO_CYCLE
+    settled, widest, cycle = settle(params, scale, r, w.pieces, u), 0.0, NO_CYCLE
     if settled not in (NOTHING, MOVES):
         return MOVING
     for k in range(u.size[SET]):
