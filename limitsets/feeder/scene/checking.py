@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args, get_origin
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -19,14 +19,9 @@ from limitsets.feeder.scene.numbers import hull_of
 from limitsets.feeder.scene.quantities import find
 from limitsets.feeder.scene.reading import can_name, load, replace_file, structure_of
 from limitsets.feeder.scene.scene import Scene, turns
+from limitsets.feeder.scene.schema import ByName, Key, Section, Several, schema
 from limitsets.feeder.scene.units import UNITS, convert, density_dimension, exact_factor, parse
 from limitsets.feeder.scene.validation import Tree, plain, refusals, respelled
-
-if TYPE_CHECKING:
-    from pydantic.fields import FieldInfo
-
-    from limitsets.feeder.scene.schema import Table
-
 
 # ----------------------------------------------------------------
 # What is improbable in a scene: values that most often have a wrong unit.  They are told, and not refused.
@@ -215,18 +210,16 @@ def starting_text(name: str, file: str, unit: str = "in") -> str:
     >>> load(starting_text("mine", "mine.toml")).name
     'mine'
     """
-    from limitsets.feeder.scene.schema import scene_table
-
     given = load(LIKE).as_dict() | {"name": name}
     lines: list[str] = []
-    for key, field in scene_table(with_effects=True).model_fields.items():
-        inner = _model(field.annotation)
-        if inner is not None:
-            lines += _table(key, inner, given.get(key))
-        elif key in given:
-            lines += [*_line(key, given[key], field), ""]
+    for word, key in schema(with_effects=True).keys.items():
+        if isinstance(key.of, Section):
+            lines += _table(word, key.of, given.get(word))
+        elif isinstance(key.of, ByName):
+            lines += [f"# {key.says}", f"# [{word}]"]
+            lines += [*(f"# {_word(name)} = {_toml(value)}" for name, value in key.example.items()), ""]
         else:
-            lines += [*_quantities(key, field), ""]
+            lines += [*_line(word, given[word], key), ""]
     body = (
         _LENGTHS.sub(lambda length: _in_unit(length, unit), "\n".join(lines))
         if unit != "in"
@@ -276,85 +269,58 @@ def example_at(path: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], Any]
     >>> example_at(("goal", "flip_order", 1))
     (('goal', 'flip_order'), [0, 1, 2])
     """
-    from limitsets.feeder.scene.schema import scene_table
-
-    table: Any = scene_table(with_effects=path[0] == "effects")
-    for k, word in enumerate(path):
+    section = schema(with_effects=path[0] == "effects")
+    for depth, word in enumerate(path, 1):
         if isinstance(word, str):
-            field, end = table.model_fields[word], k + 1
-            table = _model(field.annotation)
-            if table is None:
+            key, end = section.keys[word], depth
+            inner = _inner(key)
+            if inner is None:
                 break
-    return path[:end], _example(field)
+            section = inner
+    return path[:end], _example(key)
 
 
-def _table(path: str, table: type[Table], given: Mapping[str, Any] | None) -> Iterator[str]:
+def _table(path: str, table: Section, given: Mapping[str, Any] | None) -> Iterator[str]:
     """Write a table under its heading, all of it commented out where it is not given."""
     off = "" if given is not None else "# "
-    yield f"# {(table.__doc__ or '').strip()}"
+    yield f"# {table.says}"
     yield f"{off}[{path}]"
-    below = []
-    for key, field in table.model_fields.items():
-        inner = _model(field.annotation)
-        if f"{path}.{key}" in HEADED and inner is not None:
-            below.append((f"{path}.{key}", inner, None if given is None else given.get(key)))
+    below, texts = [], given or {}
+    for word, key in table.keys.items():
+        inner, on = _inner(key), word in texts
+        if inner is not None and f"{path}.{word}" in HEADED:
+            below.append((f"{path}.{word}", inner, texts.get(word)))
             continue
-        on = given is not None and key in given
-        yield from _line(key, given[key] if given is not None and on else _example(field), field, on=on)
+        yield from _line(word, texts[word] if on else _example(key), key, on=on)
         if inner is not None:
-            yield from (f"#     {word}: {each.description}" for word, each in inner.model_fields.items())
+            yield from (f"#     {name}: {each.says}" for name, each in inner.keys.items())
     yield ""
     for each in below:
         yield from _table(*each)
 
 
-def _quantities(key: str, field: FieldInfo) -> Iterator[str]:
-    """Write a table whose keys are names of quantities."""
-    yield f"# {field.description}"
-    yield f"# [{key}]"
-    yield from (f"# {_word(name)} = {_toml(value)}" for name, value in _example(field).items())
-
-
-def _line(key: str, value: Any, field: FieldInfo, *, on: bool = True) -> list[str]:
+def _line(word: str, value: Any, key: Key, *, on: bool = True) -> list[str]:
     """Write a key with what it means behind it; above it where the line would be long."""
-    line = ("" if on else "# ") + f"{key} = {_toml(value)}"
-    whole = f"{line}  # {field.description}"
-    return [whole] if len(whole) <= WIDTH else [f"#     {field.description}:", line]
+    line = ("" if on else "# ") + f"{word} = {_toml(value)}"
+    whole = f"{line}  # {key.says}"
+    return [whole] if len(whole) <= WIDTH else [f"#     {key.says}:", line]
 
 
-def _model(annotation: Any) -> type[Table] | None:
-    """Find the table in an annotation: itself, of several, or None."""
-    from limitsets.feeder.scene.schema import Table
-
-    if isinstance(annotation, type) and issubclass(annotation, Table):
-        return annotation
-    return next((model for part in get_args(annotation) if (model := _model(part)) is not None), None)
+def _inner(key: Key) -> Section | None:
+    """Give the table that a key stands for, or each entry of its list."""
+    of = key.of.of if isinstance(key.of, Several) else key.of
+    return of if isinstance(of, Section) else None
 
 
-def _example(field: FieldInfo) -> Any:
-    """Give the example of a key: its own, that of its type, or one made of those of its table."""
-    for examples in (field.examples, *_examples(field.annotation)):
-        if examples:
-            return examples[0]
-    inner = _model(field.annotation)
-    if inner is None:  # a switch
-        return True
-    made = {key: _example(each) for key, each in inner.model_fields.items()}
+def _example(key: Key) -> Any:
+    """Give the example of a key: its own, or one made of those of its table."""
+    inner = _inner(key)
+    if inner is None:
+        return key.example
+    made = {word: _example(each) for word, each in inner.keys.items()}
     for instead in ("side" if "beyond" in made else "", "speed" if "name" in made else ""):
         made.pop(instead, None)  # one of two ways to say it
-    return [made] if _is_list(field.annotation) else made
-
-
-def _examples(annotation: Any) -> Iterator[Any]:
-    """Give the examples that the types in an annotation carry."""
-    for part in get_args(annotation):
-        if (examples := getattr(part, "examples", None)) is not None:
-            yield examples
-        yield from _examples(part)
-
-
-def _is_list(annotation: Any) -> bool:
-    return get_origin(annotation) is list or any(map(_is_list, get_args(annotation)))
+    return [made] if isinstance(key.of, Several) else made
 
 
 def _word(key: str) -> str:
@@ -420,7 +386,7 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
             tree, errors = respelled(tree, file)[0], errors + inner
     except SceneError as error:  # no file, no TOML: there is nothing more to look at
         return (error,), ()
-    refused = refusals(tree, file)[1]
+    refused = refusals(tree, file)
     errors += refused
     blamed = {_path_of(error) for error in refused}
     looked_at = _mended(tree, blamed)

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from limitsets.feeder.geometry.polygon import Scalar, Vector, above_side, side_ends
 from limitsets.feeder.scene.quantities import Resolver
+from limitsets.feeder.scene.validation import Tree
 
 if TYPE_CHECKING:
     from limitsets.feeder.goals import Goal
-    from limitsets.feeder.scene.schema import CavityTable, FeedbackTable, SensorTable, TrayTable
     from limitsets.systems.cells import Grid
 
 
@@ -59,7 +59,7 @@ class Cavity:
 
 
 def resolve_cavity(
-    table: CavityTable,
+    table: Tree,
     feet: Sequence[float],
     lengths: Sequence[float],
     arm_length: float,
@@ -68,49 +68,53 @@ def resolve_cavity(
 ) -> Cavity:
     """Resolve ``[cavity]`` for a part with these a and lengths of its sides."""
     unit = resolver.unit
-    position = resolver.positive(table.position, "length", "cavity.position")
+    position = resolver.positive(table["position"], "length", "cavity.position")
     if position > arm_length:
         allowed = f"up to the arm's length, {arm_length:.9g} {unit}"
         remedy = "the arm ends where the cavity begins; move the cavity, or lengthen the arm"
         raise resolver.refusal(
-            "cavity.position", "the position of the cavity", table.position, allowed, remedy
+            "cavity.position", "the position of the cavity", table["position"], allowed, remedy
         )
     farthest = max(range(len(feet)), key=feet.__getitem__)
     if not position > feet[farthest]:
         allowed = f"more than {feet[farthest]:.6g} {unit}"
         remedy = f"the part resting on side {farthest} needs that much of the arm; move the cavity outward"
         raise resolver.refusal(
-            "cavity.position", "the position of the cavity", table.position, allowed, remedy
+            "cavity.position", "the position of the cavity", table["position"], allowed, remedy
         )
     wanted = getattr(goal, "side", None)
     side = min(range(len(lengths)), key=lengths.__getitem__) if wanted is None else wanted
-    width = resolver.positive(table.width, "length", "cavity.width")
+    width = resolver.positive(table["width"], "length", "cavity.width")
     if width < lengths[side]:
         allowed = f"at least {lengths[side]:.6g} {unit}, the length of side {side}"
         raise resolver.refusal(
             "cavity.width",
             "the width of the cavity",
-            table.width,
+            table["width"],
             allowed,
             "the part cannot lie in it; widen it",
         )
-    angle = resolver.value(table.angle, "angle", "cavity.angle")
+    angle = resolver.value(table["angle"], "angle", "cavity.angle")
     if not 0 < angle < math.pi / 2:
         allowed = "above 0 and below 90 deg"
         raise resolver.refusal(
-            "cavity.angle", "the angle of the ramp", table.angle, allowed, "measure it downwards from the arm"
+            "cavity.angle",
+            "the angle of the ramp",
+            table["angle"],
+            allowed,
+            "measure it downwards from the arm",
         )
-    depth = resolver.positive(table.depth, "length", "cavity.depth")
+    depth = resolver.positive(table["depth"], "length", "cavity.depth")
     if depth / math.tan(angle) > width * (1.0 + ROUNDED):
         allowed = f"at most {width * math.tan(angle):.6g} {unit}, where the ramp meets the far wall"
         raise resolver.refusal(
             "cavity.depth",
             "the depth of the cavity",
-            table.depth,
+            table["depth"],
             allowed,
             "the ramp is longer than the cavity: make it less deep, or wider",
         )
-    return Cavity(position, width, depth, angle, table.tips)
+    return Cavity(position, width, depth, angle, table.get("tips", "moving"))
 
 
 # ----------------------------------------------------------------
@@ -262,52 +266,54 @@ class Feedback:
 
 
 def resolve_feedback(
-    table: FeedbackTable, count: int, arm_length: float, resolver: Resolver, *, gravity: bool
+    table: Tree, count: int, arm_length: float, resolver: Resolver, *, gravity: bool
 ) -> Feedback:
     """Resolve ``[feedback]`` for a part with `count` sides on an arm of this length."""
     throws: list[ChosenThrow] = []
-    for k, each in enumerate(table.throws):
+    for k, each in enumerate(table["throws"]):
         key = f"feedback.throws[{k}]"
-        named = [word for word in ("kappa", "speed") if getattr(each, word) is not None]
+        named = [word for word in ("kappa", "speed") if word in each]
         if len(named) != 1:
             given = " and ".join(named) or "none"
             raise resolver.refusal(key, "this throw", given, "kappa or speed", "give it one of the two")
-        if each.name in [other.name for other in throws]:
-            raise resolver.refusal(
-                f"{key}.name", "the name of this throw", each.name, "a name of its own", "choose another"
-            )
-        (word,) = named
-        text = getattr(each, word)
+        (word,), name = named, each["name"]
+        if name in [other.name for other in throws]:
+            allowed = "a name of its own"
+            raise resolver.refusal(f"{key}.name", "the name of this throw", name, allowed, "choose another")
+        text = each[word]
         resolver.positive(text, "length" if word == "kappa" else "angular speed", f"{key}.{word}")
         if word == "speed" and not gravity:
             remedy = "a speed needs it: add [gravity], or give kappa"
             raise resolver.refusal(f"{key}.speed", "the gravity", "missing", "a table [gravity]", remedy)
-        throws.append(ChosenThrow(each.name, f"throw.{word}", text))
-    sensor = None if table.sensor is None else _sensor(table.sensor, count, arm_length, resolver)
+        throws.append(ChosenThrow(name, f"throw.{word}", text))
+    sensor = _sensor(table["sensor"], count, arm_length, resolver) if "sensor" in table else None
     return Feedback(tuple(throws), sensor)
 
 
-def _sensor(table: SensorTable, count: int, arm_length: float, resolver: Resolver) -> Sensor:
-    key, named = "feedback.sensor", [word for word in ("beyond", "side") if getattr(table, word) is not None]
+def _sensor(table: Tree, count: int, arm_length: float, resolver: Resolver) -> Sensor:
+    key, named = "feedback.sensor", [word for word in ("beyond", "side") if word in table]
     if len(named) != 1:
         given = " and ".join(named) or "none"
         raise resolver.refusal(key, "the sensor", given, "beyond or side", "it answers one question: name it")
-    if table.side is not None:
-        if table.error is not None:
+    if "side" in table:
+        if "error" in table:
             remedy = "the error of a place: leave it out"
-            raise resolver.refusal(f"{key}.error", "the error", table.error, "none with side", remedy)
-        if table.side >= count:
+            raise resolver.refusal(f"{key}.error", "the error", table["error"], "none with side", remedy)
+        if table["side"] >= count:
             allowed = f"0 to {count - 1}"
-            raise resolver.refusal(f"{key}.side", "the side", table.side, allowed, "name a side of this part")
-        return SideSensor(table.side)
-    assert table.beyond is not None
-    x = resolver.value(table.beyond, "length", f"{key}.beyond")
+            raise resolver.refusal(
+                f"{key}.side", "the side", table["side"], allowed, "name a side of this part"
+            )
+        return SideSensor(table["side"])
+    x = resolver.value(table["beyond"], "length", f"{key}.beyond")
     if not 0 <= x <= arm_length:
         allowed = f"from 0 to the arm's length, {arm_length:.9g} {resolver.unit}"
-        raise resolver.refusal(f"{key}.beyond", "the sensor's place", table.beyond, allowed, "correct it")
-    error = 0.0 if table.error is None else resolver.value(table.error, "length", f"{key}.error")
+        raise resolver.refusal(f"{key}.beyond", "the sensor's place", table["beyond"], allowed, "correct it")
+    error = resolver.value(table["error"], "length", f"{key}.error") if "error" in table else 0.0
     if error < 0:
-        raise resolver.refusal(f"{key}.error", "the sensor's error", table.error, "0 or more", "correct it")
+        raise resolver.refusal(
+            f"{key}.error", "the sensor's error", table["error"], "0 or more", "correct it"
+        )
     return BeyondSensor(x, error)
 
 
@@ -353,7 +359,7 @@ def heights_over_sides(
 
 
 def resolve_tray(
-    table: TrayTable,
+    table: Tree,
     vertices: npt.NDArray[np.float64],
     lengths: npt.NDArray[np.float64],
     goal: Goal | None,
@@ -361,9 +367,7 @@ def resolve_tray(
 ) -> Tray:
     """Resolve ``[tray]`` for a part with these vertices and lengths of its sides."""
     names = ("depression_width", "depression_depth", "pitch", "agitation", "wash")
-    sizes = Tray(
-        **{name: resolver.positive(getattr(table, name), "length", f"tray.{name}") for name in names}
-    )
+    sizes = Tray(**{name: resolver.positive(table[name], "length", f"tray.{name}") for name in names})
     corners = [(float(x), float(y)) for x, y in vertices]
     heights, wanted = heights_over_sides(corners), getattr(goal, "side", None)
     fit_for = range(len(heights)) if wanted is None else [wanted]
@@ -374,7 +378,7 @@ def resolve_tray(
         raise resolver.refusal(
             "tray.depression_width",
             "the width of a depression",
-            table.depression_width,
+            table["depression_width"],
             allowed,
             "the part cannot lie in it: widen it",
         )
@@ -384,12 +388,12 @@ def resolve_tray(
         raise resolver.refusal(
             "tray.depression_depth",
             "the depth of a depression",
-            table.depression_depth,
+            table["depression_depth"],
             allowed,
             "the depression is deeper than the part, and nothing would pop out: make it less deep",
         )
     if not sizes.pitch > sizes.depression_width:
         allowed = f"above the width of a depression, {sizes.depression_width:.6g} {unit}"
         remedy = "depressions overlap: set them farther apart"
-        raise resolver.refusal("tray.pitch", "the pitch", table.pitch, allowed, remedy)
+        raise resolver.refusal("tray.pitch", "the pitch", table["pitch"], allowed, remedy)
     return sizes
