@@ -133,33 +133,32 @@ def _wrong(tree: Tree, file: str | None) -> Iterator[Wrong]:
 
 
 def _wrong_in(value: Any, of: Any, key: str, file: str | None) -> Iterator[Wrong]:
-    if isinstance(of, Section) and isinstance(value, dict):
+    if callable(of):
+        try:
+            of(value, key, file)
+        except SceneError as error:
+            yield Wrong(1, error)
+    elif isinstance(of, Section) and isinstance(value, dict):
         yield from _wrong_in_table(value, of, key, file)
     elif isinstance(of, Several) and isinstance(value, list):
         yield from _wrong_in_list(value, of, key, file)
     elif isinstance(of, ByName) and isinstance(value, dict):
         for name, inner in value.items():
             yield from _wrong_in(inner, of.of, _joined(key, name), file)
-    elif isinstance(of, Section | Several | ByName):
+    else:
         wanted = "a list" if isinstance(of, Several) else "a table"
         yield Wrong(1, SceneError("this entry", shown(value), wanted, "write it so", key=key, file=file))
-    else:
-        try:
-            of(value, key, file)
-        except SceneError as error:
-            yield Wrong(1, error)
 
 
 def _wrong_in_table(table: Tree, section: Section, key: str, file: str | None) -> Iterator[Wrong]:
     for name, entry in section.keys.items():
-        inner = _joined(key, name)
         if name in table:
-            yield from _wrong_in(table[name], entry.of, inner, file)
+            yield from _wrong_in(table[name], entry.of, _joined(key, name), file)
         elif entry.needed:
-            missing = SceneError(
-                "a required key", "missing", "a value for it", "add it", key=inner, file=file
+            place = _joined(key, name)
+            yield Wrong(
+                2, SceneError("a required key", "missing", "a value for it", "add it", key=place, file=file)
             )
-            yield Wrong(2, missing)
     for word in [word for word in table if word not in section.keys]:
         unknown = Unknown(word, table, section)
         yield Wrong(0, _refusal(unknown, _joined(key, word), file), unknown)
