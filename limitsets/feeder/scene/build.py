@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
 from limitsets.feeder.geometry import RestingSides
 from limitsets.feeder.goals import GOALS, Goal, words_of
 from limitsets.feeder.scene.facts import (
@@ -35,31 +37,23 @@ def resolve_goal(table: Tree, rests: list[bool], arm_length: float, resolver: Re
         raise resolver.refusal("goal", "the goal", kinds, f"one of {', '.join(GOALS)}", "name exactly one")
 
     def side(value: int, key: str) -> int:
-        if value >= len(rests):
-            allowed = f"0 to {len(rests) - 1}"
-            raise resolver.refusal(key, "the side", value, allowed, "name a side of this part")
-        if not rests[value]:
-            allowed = ", ".join(str(each) for each, good in enumerate(rests) if good)
-            raise resolver.refusal(
-                key, "the side", value, allowed, "the part cannot rest on it; name another"
-            )
+        sides = [each for each, good in enumerate(rests) if good]
+        there, last = value < len(rests), len(rests) - 1
+        resolver.require(there, key, "the side", f"0 to {last}", "name a side of this part")
+        remedy = "the part cannot rest on it; name another"
+        resolver.require(value in sides, key, "the side", ", ".join(map(str, sides)), remedy)
         return value
 
-    def position(text: str, key: str) -> float:
-        x = resolver.value(text, "length", key)
-        if not 0 <= x < arm_length:
-            allowed = f"from 0 to below the arm's length, {arm_length:.9g} {resolver.unit}"
-            raise resolver.refusal(
-                key, "the position", text, allowed, "nothing comes to rest there; correct it"
-            )
-        return x
-
     def read(word: str, value: Any, key: str) -> Any:
-        if word == "place":
-            return position(value, key)
         if word == "sides":
             return tuple(side(each, f"{key}[{i}]") for i, each in enumerate(value))
-        return side(value, key) if word == "side" else value
+        if word != "place":
+            return side(value, key) if word == "side" else value
+        x = resolver.value(key, "length")
+        allowed = f"from 0 to below the arm's length, {arm_length:.9g} {resolver.unit}"
+        remedy = "nothing comes to rest there; correct it"
+        resolver.require(0 <= x < arm_length, key, "the position", allowed, remedy)
+        return x
 
     goal, given, key = GOALS[named[0]], table[named[0]], f"goal.{named[0]}"
     words = words_of(goal)
@@ -75,13 +69,10 @@ def resolve_goal(table: Tree, rests: list[bool], arm_length: float, resolver: Re
 def resolve_world(table: Tree, resolver: Resolver) -> World:
     """Resolve ``[world]``."""
     facts, own = {}, {each.name for each in fields(World)}
-    for name, fact in FACTS.items():
-        if name not in table:
-            continue
-        given, key = table[name], f"world.{name}"
-        facts[name] = resolver.positive(given, fact.dimension, key) if fact.dimension else float(given)
-        if fact.dimension and not facts[name] < fact.most:
-            raise resolver.refusal(key, fact.thing, given, fact.words, "correct it")
+    for name in (name for name in FACTS if name in table):
+        fact, key = FACTS[name], f"world.{name}"
+        facts[name] = resolver.positive(key, fact.dimension) if fact.dimension else float(table[name])
+        resolver.require(not fact.dimension or facts[name] < fact.most, key, fact.thing, fact.words)
     noise, file = {}, resolver.file
     for word, text in table.get("scatter", {}).items():
         key = f"world.scatter.{word}"
@@ -149,10 +140,10 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
     tree = plain(structure, file)
     validate(tree, file)
     unit = parse(tree["arm"]["length"], "length", key="arm.length", file=file).unit
-    resolver = Resolver(unit, file)
-    numbers = Floats(tree, resolver)
+    resolver = Resolver(tree, unit, file)
+    numbers = Floats(resolver)
     arm_length, body = numbers.number("arm.length"), numbers.body
-    _require_reach(body.sides, arm_length, tree, resolver)
+    _require_reach(body.sides, arm_length, resolver)
     gravity, model = numbers.gravity, {"flight": "exact", "flip": "signed"} | tree.get("model", {})
     world = resolve_world(tree.get("world", {}), resolver)
     goal = cavity = tray = feedback = None
@@ -160,17 +151,14 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
         goal = resolve_goal(tree["goal"], body.sides.rests.tolist(), arm_length, resolver)
     if "cavity" in tree:
         feet, lengths = body.sides.a.tolist(), body.sides.length.tolist()
-        cavity = resolve_cavity(tree["cavity"], feet, lengths, arm_length, goal, resolver)
+        cavity = resolve_cavity(feet, lengths, arm_length, goal, resolver)
     if "tray" in tree:
-        tray = resolve_tray(tree["tray"], body.vertices, body.sides.length, goal, resolver)
+        tray = resolve_tray(body.vertices, body.sides.length, goal, resolver)
     effects = resolve_effects(tree.get("effects", {}), world, model["flight"], resolver)
-    _require_tipping(body.sides, effects, tree, model["flip"], resolver)
-    kappa, tolerance = numbers.kappa, _tolerance(tree, resolver)
+    _require_tipping(body.sides, effects, model["flip"], resolver)
+    kappa, tolerance = numbers.kappa, _tolerance(tree.get("tolerance", {}), resolver)
     if "feedback" in tree:
-        count = len(body.sides)
-        feedback = resolve_feedback(
-            tree["feedback"], count, arm_length, resolver, gravity=gravity is not None
-        )
+        feedback = resolve_feedback(len(body.sides), arm_length, resolver, gravity=gravity is not None)
     return {
         "name": tree["name"],
         "unit": unit,
@@ -192,44 +180,37 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
     }
 
 
-def _require_reach(sides: RestingSides, arm_length: float, tree: Tree, resolver: Resolver) -> None:
-    for side, (a, rests) in enumerate(zip(sides.a.tolist(), sides.rests.tolist(), strict=True)):
-        if rests and not arm_length > a:
-            raise resolver.refusal(
-                "arm.length",
-                "the length of the arm",
-                tree["arm"]["length"],
-                f"more than {a:.6g} {resolver.unit}",
-                f"the part resting on side {side} needs that much before any throw can lift it; lengthen the arm",
-            )
+def _require_reach(sides: RestingSides, arm_length: float, resolver: Resolver) -> None:
+    for side in np.flatnonzero(sides.rests).tolist():
+        needed, remedy = float(sides.a[side]), f"the part resting on side {side} needs that much"
+        remedy = f"{remedy} before any throw can lift it; lengthen the arm"
+        allowed = f"more than {needed:.6g} {resolver.unit}"
+        resolver.require(arm_length > needed, "arm.length", "the length of the arm", allowed, remedy)
 
 
-def _require_tipping(
-    sides: RestingSides, effects: Effects, tree: Tree, flip: str, resolver: Resolver
-) -> None:
+def _require_tipping(sides: RestingSides, effects: Effects, flip: str, resolver: Resolver) -> None:
     """Refuse what says nothing of a part that tips over on one of its sides."""
     tips = [str(side) for side, rests in enumerate(sides.rests.tolist()) if not rests]
     if not tips:
         return
     where = f"the part cannot rest on side {' and '.join(tips)}"
-    if flip != "signed":
-        allowed = 'flip = "signed" in [model]'
-        remedy = f"{where}, and tips from there the way it turns; correct it"
-        raise resolver.refusal("model.flip", "the criterion of a flip", flip, allowed, remedy)
+    remedy = f"{where}, and tips from there the way it turns; correct it"
+    allowed = 'flip = "signed" in [model]'
+    resolver.require(flip == "signed", "model.flip", "the criterion of a flip", allowed, remedy)
     for effect in NOT_TIPPING:
         if effect in effects.on():
             remedy = f"{where}, but may on an arm that leans; leave it out"
             raise resolver.refusal(f"effects.{effect}", "this effect", effect, "another effect", remedy)
     for key in ("cavity", "tray", "feedback"):
-        if key in tree:
+        if key in resolver.tree:
             allowed = "a part that rests on each of its sides"
             raise resolver.refusal(key, "the part", where, allowed, f"leave [{key}] out, or, {WITHOUT_EDGE}")
 
 
-def _tolerance(tree: Tree, resolver: Resolver) -> dict[str, Deviation]:
+def _tolerance(table: Tree, resolver: Resolver) -> dict[str, Deviation]:
     scales = {}
-    for name, text in tree.get("tolerance", {}).items():
+    for name, text in table.items():
         key = f'tolerance."{name}"'
         scales[name] = deviation(text, name, resolver.unit, key=key, file=resolver.file)
-        require(tree, name, key, resolver.file)
+        require(resolver.tree, name, key, resolver.file)
     return scales

@@ -16,7 +16,7 @@ from limitsets.base.errors import SceneError, TipsError
 from limitsets.feeder.geometry.polygon import mass_of
 from limitsets.feeder.scene.facts import TIPPING
 from limitsets.feeder.scene.numbers import hull_of
-from limitsets.feeder.scene.quantities import find
+from limitsets.feeder.scene.quantities import Words, at, find, words_of
 from limitsets.feeder.scene.reading import can_name, load, replace_file, structure_of
 from limitsets.feeder.scene.scene import Scene, turns
 from limitsets.feeder.scene.schema import ByName, Key, Section, Several, schema
@@ -349,11 +349,6 @@ SHAPES = (("part",), ("arm", "length"))
 # What stands for a table that is refused, since others need one.
 INSTEAD = {"throw": {"kappa": "25 in"}, "gravity": {"tilt": "30 deg"}}
 
-# The words of a key: in quotation marks, a number, or plain.
-_WORDS = re.compile(r'"([^"]*)"|\[(\d+)\]|([^.\[\]"]+)')
-
-Words: TypeAlias = tuple[str | int, ...]
-
 
 def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, ...], tuple[Doubt, ...]]:
     """Find all that is wrong with a scene, and what is improbable in it.
@@ -396,7 +391,7 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
     while (wrong := _first(looked_at, file)) is not None:
         path = _path_of(wrong)
         # a tolerance of what is blamed already is not given only because something stands in for that
-        about = {path, _words_of(str(path[1]))} if path[0] == "tolerance" and len(path) == 2 else {path}
+        about = {path, words_of(str(path[1]))} if path[0] == "tolerance" and len(path) == 2 else {path}
         if not any(each[: len(one)] == one for each in about for one in (*blamed, *instead)):
             errors.append(wrong)
             blamed.add(path)
@@ -413,12 +408,7 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
 
 
 def _path_of(error: SceneError) -> Words:
-    return _words_of(error.key or "")
-
-
-def _words_of(key: str) -> Words:
-    """Take a key apart."""
-    return tuple(part[0] or part[2] or int(part[1]) for part in _WORDS.findall(key))
+    return words_of(error.key or "")
 
 
 def _hanging_on(error: SceneError) -> set[Words]:
@@ -441,7 +431,7 @@ def _mended(tree: Tree, blamed: Iterable[Words]) -> Tree | None:
             tree[first].pop(path[1], None)
         else:
             path, example = example_at(path)
-            _at(tree, path[:-1])[path[-1]] = example
+            at(tree, path[:-1])[path[-1]] = example
     return tree
 
 
@@ -464,9 +454,9 @@ def _passed(tree: Tree, error: SceneError, file: str | None) -> Tree | None:
         on = tree.get("effects", {}) | dict.fromkeys(TIPPING, True)
         return None if on == tree.get("effects") else tree | {"model": {}, "effects": on}
     usable: list[Tree] = []
-    for stand_in in _shapes(tree, error) if path == ("part", "vertices") else _stand_ins(_at(tree, path)):
+    for stand_in in _shapes(tree, error) if path == ("part", "vertices") else _stand_ins(at(tree, path)):
         other = copy.deepcopy(tree)
-        node = _at(other, path[:-1])
+        node = at(other, path[:-1])
         if stand_in is not None:
             node[path[-1]] = stand_in
         elif isinstance(node, dict):
@@ -483,16 +473,6 @@ def _passed(tree: Tree, error: SceneError, file: str | None) -> Tree | None:
     if not path or path[0] in NEEDED:
         return None
     return {key: value for key, value in tree.items() if key != path[0]}
-
-
-def _at(tree: Any, path: Words) -> Any:
-    """Return what stands there, None where nothing does."""
-    for word in path:
-        try:
-            tree = tree[word]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return tree
 
 
 def _shapes(tree: Tree, error: SceneError) -> Iterator[Any]:
