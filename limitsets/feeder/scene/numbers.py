@@ -33,8 +33,16 @@ from limitsets.feeder.geometry import (
 )
 from limitsets.feeder.geometry.polygon import Scalar, Vector
 from limitsets.feeder.scene.facts import TIPPING
-from limitsets.feeder.scene.quantities import LEAST, STANDARD_GRAVITY, Resolver, find
-from limitsets.feeder.scene.units import density_dimension
+from limitsets.feeder.scene.quantities import (
+    LEAST,
+    STANDARD_GRAVITY,
+    Resolver,
+    base_unit,
+    find,
+    in_units,
+    text_at,
+)
+from limitsets.feeder.scene.units import convert, density_dimension, parse
 
 
 class Shape(NamedTuple):
@@ -99,18 +107,24 @@ class Numbers(ABC):
         """Add up a plate and the point masses on it."""
         return mass_of(vertices, density, points, self.sqrt)
 
+    def lengths(self) -> list[Scalar] | None:
+        """Return the lengths of the sides, where they are given."""
+        sides = self.tree["part"].get("sides")
+        return None if sides is None else [self.number(f"part.sides[{k}]") for k in range(len(sides))]
+
+    def vertices(self, lengths: list[Scalar] | None) -> Sequence[Vector]:
+        """Return the vertices, counterclockwise."""
+        if lengths is not None:
+            return self.triangle(lengths)
+        count = len(self.tree["part"]["vertices"])
+        pairs = [[self.number(f"part.vertices[{k}].{axis}") for axis in "xy"] for k in range(count)]
+        return self.polygon([(x, y) for x, y in pairs])
+
     @cached_property
     def shape(self) -> Shape:
         """The part."""
-        part: Mapping[str, Any] = self.tree["part"]
-        mass, lengths = part["mass"], None
-        if "sides" in part:
-            lengths = [self.number(f"part.sides[{k}]") for k in range(len(part["sides"]))]
-            vertices = self.triangle(lengths)
-        else:
-            count = len(part["vertices"])
-            pairs = [[self.number(f"part.vertices[{k}].{axis}") for axis in "xy"] for k in range(count)]
-            vertices = self.polygon([(x, y) for x, y in pairs])
+        mass, lengths = self.tree["part"]["mass"], self.lengths()
+        vertices = self.vertices(lengths)
         if "center" in mass:
             centre = self.on_side(vertices)
             return Shape(vertices, centre, lengths, self.number("part.mass.radius_of_gyration"))
@@ -145,6 +159,30 @@ class Numbers(ABC):
             return self.number("throw.kappa")
         speed = self.number("throw.speed")
         return self.gravity / (speed * speed)
+
+
+class Unchecked(Numbers):
+    """The numbers of one scene as floats, as far as they can be read.
+
+    Parameters
+    ----------
+    tree : mapping
+        The scene as text.
+    unit : str
+        Its unit of length.
+    """
+
+    def __init__(self, tree: Mapping[str, Any], unit: str) -> None:
+        super().__init__(tree, lambda square: math.sqrt(max(square, 0.0)), math.sin)
+        self.unit = unit
+
+    def number(self, name: str) -> float:
+        """Return a quantity by its name."""
+        return in_units(self.unit, name, text_at(self.tree, name), key=name)
+
+    def constant(self, text: str, dimension: str, key: str) -> float:
+        """Return what no quantity's name stands for, from its text."""
+        return convert(parse(text, dimension, key=key), base_unit(dimension, self.unit))
 
 
 # ----------------------------------------------------------------

@@ -45,11 +45,20 @@ class Key(NamedTuple):
     needed: bool = False
 
 
+class Either(NamedTuple):
+    """Two keys of which a table has one: what they are about, the two, and what is allowed."""
+
+    thing: str
+    words: tuple[str, str]
+    allowed: str
+
+
 class Section(NamedTuple):
     """A table of a scene: no key but these."""
 
     says: str
     keys: dict[str, Key]
+    either: Either | None = None
 
 
 class Several(NamedTuple):
@@ -180,6 +189,7 @@ PART = Section(
         ),
         "mass": Key(MASS, needed=True),
     },
+    Either("the shape", ("sides", "vertices"), "sides = [three lengths] or vertices = [[x, y], ...]"),
 )
 ARM = Section(
     "The arm; the unit of its length is the scene's unit.",
@@ -207,6 +217,7 @@ THROW = Section(
             SPEED, "instead of kappa, with [gravity]: angular speed of the arm when it stops", "158 deg/s"
         ),
     },
+    Either("the throw", ("kappa", "speed"), "kappa or speed"),
 )
 GRAVITY = Section(
     "Gravity in the plane of the motion; with kappa given it only tells which speed that is.",
@@ -214,6 +225,7 @@ GRAVITY = Section(
         "acceleration": Key(quantity("acceleration"), "in the plane of the motion", "193.045 in/s^2"),
         "tilt": Key(ANGLE, "instead: of the table; 90 deg stands upright", "30 deg"),
     },
+    Either("gravity", ("acceleration", "tilt"), "acceleration or tilt"),
 )
 MODEL = Section(
     "Which formulas.",
@@ -237,6 +249,7 @@ SENSOR = Section(
         "error": Key(LENGTH, "within this distance the answer may be wrong", "0.1 in"),
         "side": Key(SIDE, "instead of beyond: does the part lie on this side?", 2),
     },
+    Either("the sensor", ("beyond", "side"), "beyond or side: it answers one question"),
 )
 CHOSEN_THROW = Section(
     "A throw to choose, by kappa or by its angular speed.",
@@ -245,6 +258,7 @@ CHOSEN_THROW = Section(
         "kappa": Key(LENGTH, "as in [throw]", "25.4 in"),
         "speed": Key(SPEED, "as in [throw]", "158 deg/s"),
     },
+    Either("this throw", ("kappa", "speed"), "kappa or speed"),
 )
 FEEDBACK = Section(
     "What a controller has: a sensor of one bit, and throws.",

@@ -240,7 +240,7 @@ def resolve_feedback(count: int, arm_length: float, resolver: Resolver, *, gravi
     throws: list[ChosenThrow] = []
     for k, each in enumerate(resolver.text("feedback.throws")):
         key = f"feedback.throws[{k}]"
-        word = _one_of(each, ("kappa", "speed"), key, "this throw", "give it one of the two", resolver)
+        word = "kappa" if "kappa" in each else "speed"
         unique = each["name"] not in [other.name for other in throws]
         thing, allowed = "the name of this throw", "a name of its own"
         resolver.require(unique, f"{key}.name", thing, allowed, "choose another")
@@ -254,19 +254,8 @@ def resolve_feedback(count: int, arm_length: float, resolver: Resolver, *, gravi
     return Feedback(tuple(throws), sensor)
 
 
-def _one_of(
-    table: Tree, words: tuple[str, str], key: str, thing: str, remedy: str, resolver: Resolver
-) -> str:
-    """Give the word of two that a table has."""
-    named = [word for word in words if word in table]
-    if len(named) != 1:
-        raise resolver.refusal(key, thing, " and ".join(named) or "none", " or ".join(words), remedy)
-    return named[0]
-
-
 def _sensor(table: Tree, key: str, count: int, arm_length: float, resolver: Resolver) -> Sensor:
-    remedy = "it answers one question: name it"
-    if _one_of(table, ("beyond", "side"), key, "the sensor", remedy, resolver) == "side":
+    if "side" in table:
         remedy = "the error of a place: leave it out"
         resolver.require("error" not in table, f"{key}.error", "the error", "none with side", remedy)
         there, remedy = table["side"] < count, "name a side of this part"

@@ -78,7 +78,8 @@ class Wrong(NamedTuple):
     Parameters
     ----------
     rank : int
-        0 for an unknown key, 1 for a value, 2 for a missing key: the order in which they are told.
+        0 for an unknown key, 1 for a value, 2 for a missing key, 3 for both of two that exclude each other, or neither:
+        the order in which they are told.
     error : SceneError
         What is said of it.
     unknown : Unknown or None
@@ -162,6 +163,13 @@ def _wrong_in_table(table: Tree, section: Section, key: str, file: str | None) -
     for word in [word for word in table if word not in section.keys]:
         unknown = Unknown(word, table, section)
         yield Wrong(0, _refusal(unknown, _joined(key, word), file), unknown)
+    if section.either is not None:
+        thing, words, allowed = section.either
+        given = [word for word in words if word in table]
+        said = " and ".join(given) or f"neither {words[0]} nor {words[1]}"
+        remedy = "give one of them, not both" if given else "give one of them"
+        if len(given) != 1:
+            yield Wrong(3, SceneError(thing, said, allowed, remedy, key=key, file=file))
 
 
 def _wrong_in_list(entries: list[Any], several: Several, key: str, file: str | None) -> Iterator[Wrong]:
@@ -192,28 +200,13 @@ def _refusal(unknown: Unknown, key: str, file: str | None) -> SceneError:
     return SceneError("the key", shown(unknown.word), ", ".join(names), remedy, key=key, file=file)
 
 
-# Tables with one of two words each, and what they are about.
-_ONE_OF = {
-    "part": ("the shape", "sides", "vertices", "sides = [three lengths] or vertices = [[x, y], ...]"),
-    "gravity": ("gravity", "acceleration", "tilt", "acceleration or tilt"),
-    "throw": ("the throw", "kappa", "speed", "kappa or speed"),
-}
-
-
 def _contradictions(tree: Tree, file: str | None) -> Iterator[SceneError]:
-    """Refuse words that exclude each other, half a description, or none; for this no value has to be right."""
-    for key, (thing, one, other, allowed) in _ONE_OF.items():
-        if not isinstance(tree.get(key), dict):
-            continue
-        given = [word for word in (one, other) if word in tree[key]]
-        if len(given) != 1:
-            words = " and ".join(given) or f"neither {one} nor {other}"
-            remedy = "give one of them, not both" if given else "give one of them"
-            yield SceneError(thing, shown(words), allowed, remedy, key=key, file=file)
-        elif given == ["speed"] and "gravity" not in tree:
-            allowed = "acceleration or tilt in [gravity]"
-            remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
-            yield SceneError("gravity", "missing", allowed, remedy, key="throw.speed", file=file)
+    """Refuse half a description, or words that exclude each other; for this no value has to be right."""
+    throw = tree.get("throw")
+    if isinstance(throw, dict) and "speed" in throw and "gravity" not in tree:
+        remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
+        allowed = "acceleration or tilt in [gravity]"
+        yield SceneError("gravity", "missing", allowed, remedy, key="throw.speed", file=file)
     mass = tree["part"].get("mass") if isinstance(tree.get("part"), dict) else None
     if isinstance(mass, dict):
         yield from _contradictions_of_mass(mass, file)
