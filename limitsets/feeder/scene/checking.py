@@ -14,7 +14,7 @@ import numpy as np
 
 from limitsets.base.errors import SceneError, TipsError
 from limitsets.feeder.geometry.polygon import mass_of
-from limitsets.feeder.scene.facts import TIPPING
+from limitsets.feeder.scene.facts import TIPPING, Scatter
 from limitsets.feeder.scene.numbers import hull_of
 from limitsets.feeder.scene.quantities import Words, at, find, words_of
 from limitsets.feeder.scene.reading import can_name, load, replace_file, structure_of
@@ -59,8 +59,8 @@ class Doubt(NamedTuple):
         return f"{place}: careful, {self.value!r}: {self.thing}; usual: {self.allowed}; {self.remedy}"
 
 
-# Key, value as written, what is measured of it, least and largest that is believed, what it comes to, what is usual.
-Row: TypeAlias = tuple[str, str, float, float, float, str, str]
+# Key, what is measured of its value, least and largest that is believed, what it comes to, what is usual.
+Row: TypeAlias = tuple[str, float, float, float, str, str]
 
 
 def doubts(scene: Scene) -> tuple[Doubt, ...]:
@@ -75,9 +75,12 @@ def doubts(scene: Scene) -> tuple[Doubt, ...]:
     "1.17 times the part's longest side"
     """
     by_key: dict[str, Doubt] = {}
-    for key, value, measured, least, most, thing, usual in _rows(scene):
+    size = f"{scene.sides.length.max():.4g} {scene.unit}"
+    for key, measured, least, most, thing, usual in _rows(scene):
         if not least <= measured <= most and not (key.startswith("throw.") and "arm.length" in by_key):
             thing = thing.format(f"{measured:.3g}" if measured < 1000 else f"{measured:.0f}")
+            text = at(scene.text, words_of(key))
+            value = size if isinstance(text, list) else str(text)
             by_key.setdefault(key, Doubt(key, thing, value, usual, "has it the right unit?", scene.file))
     return tuple(by_key.values())
 
@@ -85,68 +88,52 @@ def doubts(scene: Scene) -> tuple[Doubt, ...]:
 def _rows(scene: Scene) -> Iterator[Row]:
     """Give what is measured of a scene."""
     text, unit, metre = scene.text, scene.unit, float(exact_factor(scene.unit, "m"))
-    part, throw, mass = text["part"], text["throw"], text["part"]["mass"]
+    part, (word,) = text["part"], text["throw"]
     arm, size, over = scene.arm_length, float(scene.sides.length.max()), "{} times the part's longest side"
-    shape = "part.sides" if "sides" in part else "part.vertices"
-    yield shape, f"{size:.4g} {unit}", size * metre, 1e-4, 1.0, "the longest side is {} m", "1 mm to 0.5 m"
-    yield "arm.length", text["arm"]["length"], arm * metre, 1e-3, 3.0, "the arm is {} m long", "1 cm to 2 m"
-    yield "arm.length", text["arm"]["length"], arm / size, 0.0, 40.0, over, "2 to 10 times"
-    height = abs(scene.surface_height) / size
-    yield "arm.surface_height", text["arm"]["surface_height"], height, 0.0, 0.5, over, "below 0.5 times"
-    if "center" in mass:
+    shape, small = "part.sides" if "sides" in part else "part.vertices", "below 0.05 times"
+    yield shape, size * metre, 1e-4, 1.0, "the longest side is {} m", "1 mm to 0.5 m"
+    yield "arm.length", arm * metre, 1e-3, 3.0, "the arm is {} m long", "1 cm to 2 m"
+    yield "arm.length", arm / size, 0.0, 40.0, over, "2 to 10 times"
+    yield "arm.surface_height", abs(scene.surface_height) / size, 0.0, 0.5, over, "below 0.5 times"
+    if "center" in part["mass"]:
         reach = max(math.dist(scene.centre, vertex) for vertex in scene.vertices.tolist())
         key, radius = "part.mass.radius_of_gyration", scene.radius_of_gyration / reach
         said = "{} times the way from the centre of mass to the farthest vertex"
-        yield key, mass["radius_of_gyration"], radius, 0.02, 1.0, said, "0.2 to 0.7 times"
+        yield key, radius, 0.02, 1.0, said, "0.2 to 0.7 times"
     else:
-        yield from _rows_of_plate(mass, (scene.vertices * metre).tolist(), size * metre)
+        yield from _rows_of_plate(part["mass"], (scene.vertices * metre).tolist(), size * metre)
     if scene.gravity is not None:
-        ((word, given),) = text["gravity"].items()
-        pull = scene.gravity * metre
-        said = "gravity in the plane of the motion is {} m/s^2"
-        yield f"gravity.{word}", given, pull, 0.3, 11.0, said, "0.5 to 9.81 m/s^2"
-    ((word, given),) = throw.items()
+        (key,), said = text["gravity"], "gravity in the plane of the motion is {} m/s^2"
+        yield f"gravity.{key}", scene.gravity * metre, 0.3, 11.0, said, "0.5 to 9.81 m/s^2"
     speeds = [f"{_in_words(scene, word, share):.3g}" for share in USUAL_TURNS]
-    here = f"{USUAL_TURNS[0]} to {USUAL_TURNS[1]} times, here {' to '.join(speeds)}"
-    unit_of_throw = "deg/s" if word == "speed" else unit
-    said = "a part thrown from the arm's end turns {} times before it lands"
-    turned = turns(arm, scene.kappa)
-    yield f"throw.{word}", given, turned, LEAST_TURNS, MOST_TURNS, said, f"{here} {unit_of_throw}"
+    usual = f"{USUAL_TURNS[0]} to {USUAL_TURNS[1]} times, here {' to '.join(speeds)}"
+    usual = f"{usual} {'deg/s' if word == 'speed' else unit}"
+    said, turned = "a part thrown from the arm's end turns {} times before it lands", turns(arm, scene.kappa)
+    yield f"throw.{word}", turned, LEAST_TURNS, MOST_TURNS, said, usual
     for name, deviation in scene.tolerance.items():
-        key, given = f'tolerance."{name}"', text["tolerance"][name]
+        key = f'tolerance."{name}"'
         if find(name).dimension == "length" and not deviation.relative and name != "throw.kappa":
-            yield key, given, deviation.value / size, 0.0, 0.25, over, "below 0.05 times"
+            yield key, deviation.value / size, 0.0, 0.25, over, small
         elif deviation.relative or name != "gravity.tilt" or "tilt" in text["gravity"]:
             share = deviation.value if deviation.relative else deviation.value / abs(scene.value(name))
-            yield key, given, share, 0.0, 0.5, "{} times the value itself", "below 0.1 times"
-    scatter = scene.world.scatter
-    speed = None if scatter is None else scatter.speed
+            yield key, share, 0.0, 0.5, "{} times the value itself", "below 0.1 times"
+    scatter = scene.world.scatter or Scatter()
+    speed, landing = scatter.speed, scatter.landing
     # a throw given by kappa without gravity has no speed
     if speed is not None and (speed.relative or scene.gravity is not None):
         share = speed.value if speed.relative else speed.value / scene.value("throw.speed")
-        said, given = "{} times the speed itself", text["world"]["scatter"]["speed"]
-        yield "world.scatter.speed", given, share, 0.0, 0.2, said, "below 0.03 times"
-    if scatter is not None and scatter.landing is not None:
-        given = text["world"]["scatter"]["landing"]
-        yield (
-            "world.scatter.landing",
-            given,
-            scatter.landing.value / size,
-            0.0,
-            0.25,
-            over,
-            "below 0.05 times",
-        )
+        yield "world.scatter.speed", share, 0.0, 0.2, "{} times the speed itself", "below 0.03 times"
+    if landing is not None:
+        yield "world.scatter.landing", landing.value / size, 0.0, 0.25, over, small
     # what a fact of the world is measured in, and what is believed of it
     facts = {
         "friction": (1.0, 0.0, 3.0, "a coefficient of {}", "0.1 to 1"),
-        "bounce_threshold": (size, 0.0, 0.25, over, "below 0.05 times"),
+        "bounce_threshold": (size, 0.0, 0.25, over, small),
         "throw_rate": (1.0, 0.01, 20.0, "{} throws a second", "0.1 to 10"),
     }
-    for name, (one, least, most, said, usual) in facts.items():
+    for name, (whole, *believed) in facts.items():
         if name in text.get("world", {}):
-            given, measured = str(text["world"][name]), getattr(scene.world, name) / one
-            yield f"world.{name}", given, measured, least, most, said, usual
+            yield f"world.{name}", getattr(scene.world, name) / whole, *believed
 
 
 def _in_words(scene: Scene, word: str, turned: float) -> float:
@@ -164,17 +151,18 @@ def _rows_of_plate(mass: Mapping[str, Any], vertices: list[Any], size: float) ->
     unit = "kg/m^3" if volume else "kg/m^2"
     density = convert(parse(text, density_dimension(text)), unit)
     least, most, usual = (10.0, 25e3, "500 to 8000 kg/m^3") if volume else (0.02, 1e3, "0.5 to 80 kg/m^2")
-    yield "part.mass.plate_density", text, density, least, most, f"the plate has {{}} {unit}", usual
+    yield "part.mass.plate_density", density, least, most, f"the plate has {{}} {unit}", usual
     if volume:
-        thickness = convert(parse(mass["plate_thickness"], "length"), "m")
-        said = "{} times the part's longest side"
-        key = "part.mass.plate_thickness"
-        yield key, mass["plate_thickness"], thickness / size, 0.0, 0.5, said, "below 0.2 times"
+        thickness, said = (
+            convert(parse(mass["plate_thickness"], "length"), "m"),
+            "{} times the part's longest side",
+        )
+        yield "part.mass.plate_thickness", thickness / size, 0.0, 0.5, said, "below 0.2 times"
     plate = mass_of(vertices, density * thickness).mass
     said = f"{{}} times the plate, which weighs {1000.0 * plate:.3g} g"
     for k, point in enumerate(mass.get("points", ())):
-        given, key = point["mass"], f"part.mass.points[{k}].mass"
-        yield key, given, convert(parse(given, "mass"), "kg") / plate, 0.0, 30.0, said, "up to a few times it"
+        share = convert(parse(point["mass"], "mass"), "kg") / plate
+        yield f"part.mass.points[{k}].mass", share, 0.0, 30.0, said, "up to a few times it"
 
 
 # ----------------------------------------------------------------
