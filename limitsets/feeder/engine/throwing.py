@@ -297,8 +297,9 @@ class Comparison:
     @property
     def agree(self) -> NDArray[np.bool_]:
         """Whether it rests on the same side by both."""
-        inside: NDArray[np.bool_] = (self.code_map != OUTSIDE_MODEL) & (self.status == "rest")
-        return inside & (self.side_map == self.side_engine)
+        inside = (self.code_map != OUTSIDE_MODEL) & (self.status == "rest")
+        same: NDArray[np.bool_] = inside & (self.side_map == self.side_engine)
+        return same
 
     @property
     def error(self) -> NDArray[np.float64]:
