@@ -91,8 +91,7 @@ def _place_of(text: str) -> Place | None:
     pattern = _pattern_of(text)
     if pattern not in NAMES or "[i]" in text:
         return None
-    words = re.split(r"[.\[]", text)
-    path: list[str | int] = [int(word[:-1]) if word.endswith("]") else word for word in words]
+    path = list(words_of(text))
     if path[1] == "vertices":
         path[-1] = "xy".index(str(path[-1]))
     return Place(text, tuple(path), NAMES[pattern])
