@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base.errors import AnswerError
-from limitsets.feeder.engine.stage import LEANING, nearest, pymunk_module, set_up
+from limitsets.feeder.engine.stage import LEANING, faces_about, nearest, pymunk_module, set_up
 from limitsets.feeder.geometry import side_ends
 
 if TYPE_CHECKING:
@@ -282,11 +282,7 @@ class Member:
         self.joint.error_bias = 0.0  # all of the drift is corrected in the next step
         space.add(self.joint)
         self.mode, self.vertex = HINGED, vertex
-        count = len(self.flat)
-        self.faces = -vertex % count, (1 - vertex) % count
-        right, left = (self.flat[face] for face in self.faces)
-        self.low = pose[2] - ((pose[2] - right + LEANING) % math.tau - LEANING)
-        self.high = self.low + (left - right) % math.tau
+        self.faces, self.low, self.high = faces_about(self.flat, vertex, pose[2])
 
     def steps_to_face(self, step: float) -> int:
         """Count the steps in which no face can come down; 0 where one does in the next."""

@@ -231,18 +231,24 @@ ROCKING = 1e-4
 AS_LOW = 1e-7
 
 
+def faces_about(flat: Sequence[float], vertex: int, angle: float) -> tuple[tuple[int, int], float, float]:
+    """Give the sides that come down about a vertex, and the angles between which neither is down.
+
+    A face may already lie there, to rounding.
+    """
+    faces = -vertex % len(flat), (1 - vertex) % len(flat)
+    clockwise, counter = (flat[face] for face in faces)
+    low = angle - ((angle - clockwise + LEANING) % math.tau - LEANING)
+    return faces, low, low + (counter - clockwise) % math.tau
+
+
 def turn_on_hinge(stage: Stage, struck: int, step: float, patience: float) -> tuple[float, int]:
     """Hold a vertex that sticks until a face lies on the arm: time and side, -1 where patience ends first.
 
     What it leaves is the velocity at that moment, to second order in the step.
     """
     pymunk, space, body = pymunk_module(), stage.space, stage.body
-    count = len(stage.flat)
-    clockwise, counter = -struck % count, (1 - struck) % count
-    # The angles between which no face is down; a face may already lie there, to rounding.
-    leaning = (body.angle - stage.flat[clockwise] + LEANING) % math.tau - LEANING
-    low = body.angle - leaning
-    high = low + (stage.flat[counter] - stage.flat[clockwise]) % math.tau
+    (clockwise, counter), low, high = faces_about(stage.flat, struck, body.angle)
 
     place = tuple(body.local_to_world(stage.corners[struck]))
     catch, joint = (pymunk.PivotJoint(space.static_body, body, place) for _ in range(2))
@@ -337,7 +343,7 @@ def turn_and_roll(
         if face < 0:
             break
         down = body.angular_velocity
-        left, right = -face % len(stage.flat), (1 - face) % len(stage.flat)
+        left, right = side_ends(len(stage.flat), face)
         vertex = right if vertex == left else left
     return time, -1
 

@@ -146,7 +146,9 @@ class Numbers(ABC):
 
     @cached_property
     def gravity(self) -> Scalar:
-        """Gravity in the plane of the motion [unit/s^2]."""
+        """Gravity in the plane of the motion [unit/s^2]; None where it is not given."""
+        if "gravity" not in self.tree:
+            return None
         if "acceleration" in self.tree["gravity"]:
             return self.number("gravity.acceleration")
         tilt = self.number("gravity.tilt")
@@ -289,14 +291,6 @@ class Floats(Numbers):
         vertices.flags.writeable = False
         x, y = centre.in_frame(pairs) if isinstance(centre, OnSide) else centre
         return Body(vertices, (x, y), radius, sides)
-
-    @cached_property
-    def gravity(self) -> float | None:
-        """Gravity in the plane of the motion [unit/s^2]; None where it is not given."""
-        if "gravity" not in self.tree:
-            return None
-        in_plane: float = super().gravity
-        return in_plane
 
     @cached_property
     def kappa(self) -> float:
