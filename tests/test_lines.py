@@ -127,7 +127,7 @@ def test_a_docstring_is_no_statement():
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "limitsets"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
-LATE = ["numba", "scipy", "networkx", "matplotlib", "pydantic", "typer", "rich", "jinja2", "tomlkit"]
+LATE = ["numba", "scipy", "networkx", "matplotlib", "typer", "rich", "jinja2", "tomlkit"]
 LATE += ["pymunk", "xarray", "zarr", "pandas", "pyarrow", "dask", "distributed"]
 
 

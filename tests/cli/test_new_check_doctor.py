@@ -12,7 +12,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import SceneError
 from limitsets.feeder.scene.checking import examined, starting_text
-from limitsets.feeder.scene.schema import Table, scene_table
+from limitsets.feeder.scene.schema import Section, Several, schema
 from limitsets.feeder.scene.validation import refusals
 from tests.cli.command import documented, run
 
@@ -41,18 +41,15 @@ SWITCH = re.compile(r'^# (?=\[|[a-z_]+ = |"[a-z.]+" = )', re.M)
 
 def keys_of(table, path=()):
     """Every key of a table of the schema, with those of the tables in it."""
-    for name, field in table.model_fields.items():
+    for name, key in table.keys.items():
         yield (*path, name)
-        inner = list(models(field.annotation))
-        for each in inner:
+        for each in tables(key.of):
             yield from keys_of(each, (*path, name))
 
 
-def models(annotation):
-    if isinstance(annotation, type) and issubclass(annotation, Table):
-        yield annotation
-    for part in getattr(annotation, "__args__", ()):
-        yield from models(part)
+def tables(of):
+    inner = of.of if isinstance(of, Several) else of
+    return [inner] if isinstance(inner, Section) else []
 
 
 def test_the_new_scene_loads_and_is_the_designed_feeder(capfd, tmp_path):
@@ -78,8 +75,8 @@ def test_every_key_of_the_schema_stands_in_it_with_its_words_and_an_example_that
     text = starting_text("all", "all.toml")
     tree = tomllib.loads(SWITCH.sub("", text))
     # it has both of each two words that exclude each other
-    assert {error.key for error in refusals(tree, None)[1]} == {"part", "part.mass", "gravity", "throw"}
-    table = scene_table(with_effects=True)
+    assert {error.key for error in refusals(tree, None)} == {"part", "part.mass", "gravity", "throw"}
+    table = schema(with_effects=True)
     for path in keys_of(table):
         assert re.search(rf"\b{path[-1]}\b", text), path
     for path in keys_of(table):
@@ -88,13 +85,13 @@ def test_every_key_of_the_schema_stands_in_it_with_its_words_and_an_example_that
 
 
 def test_every_key_of_the_schema_says_what_it_means():
-    table = scene_table(with_effects=True)
+    table = schema(with_effects=True)
     bare = []
 
     def look(table, path):
-        for name, field in table.model_fields.items():
-            inner = list(models(field.annotation))
-            if not field.description and not (inner and len(path) < 2 and inner[0].__doc__):
+        for name, key in table.keys.items():
+            inner = tables(key.of)
+            if not key.says and not (inner and len(path) < 2 and inner[0].says):
                 bare.append((*path, name))
             for each in inner:
                 look(each, (*path, name))

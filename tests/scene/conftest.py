@@ -68,6 +68,6 @@ def plate() -> dict[str, Any]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _loaded() -> Callable[..., Any]:
-    """Import pydantic before hypothesis measures its first example."""
+    """Import what a scene needs before hypothesis measures its first example."""
     load("paper-designed")
     return load

@@ -32,7 +32,7 @@ from limitsets.feeder.scene import (
     scenes,
 )
 from limitsets.feeder.scene.quantities import NAMES
-from limitsets.feeder.scene.schema import scene_table
+from limitsets.feeder.scene.schema import schema
 from limitsets.feeder.scene.surroundings import BeyondSensor, ChosenThrow, Feedback
 from limitsets.feeder.thrower import trace
 from limitsets.feeder.thrower.effects import EFFECTS
@@ -267,16 +267,16 @@ def test_domain_begins_just_beyond_the_feet() -> None:
 
 
 def test_reading_a_scene_loads_little() -> None:
-    """Numba takes a second, and is not needed for a scene; pydantic only to read."""
+    """Numba takes a second, scipy a third of one; neither is needed for a scene."""
     code = (
         "import sys, limitsets.scene as scene\n"
-        "heavy = ('numba', 'pydantic', 'scipy')\n"
+        "heavy = ('numba', 'scipy')\n"
         "print([name for name in heavy if name in sys.modules])\n"
         "scene.load('paper-designed')\n"
         "print([name for name in heavy if name in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == ["[]", "['pydantic']"]
+    assert done.stdout.splitlines() == ["[]", "[]"]
 
 
 # ----------------------------------------------------------------
@@ -302,13 +302,11 @@ TABLES = (
 )
 
 
-def keys(model, path=""):
+def keys(table, path=""):
     """Every key of the schema by its whole name; what is written in one line counts as one key."""
-    for name, field in model.model_fields.items():
-        kinds = (field.annotation, *getattr(field.annotation, "__args__", ()))
+    for name, key in table.keys.items():
         if f"{path}{name}" in TABLES:
-            (inner,) = (kind for kind in kinds if hasattr(kind, "model_fields"))
-            yield from keys(inner, f"{path}{name}.")
+            yield from keys(key.of, f"{path}{name}.")
         else:
             yield f"{path}{name}"
 
@@ -330,7 +328,7 @@ def documented():
 
 
 def test_the_table_has_the_keys_that_there_are():
-    assert sorted(documented()) == sorted(keys(scene_table(with_effects=True)))
+    assert sorted(documented()) == sorted(keys(schema(with_effects=True)))
 
 
 def test_the_model_s_table_has_every_effect_and_the_facts_that_it_needs():

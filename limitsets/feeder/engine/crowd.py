@@ -26,7 +26,7 @@ from limitsets.feeder.engine.member import (
     on_arm,
     rest_of,
 )
-from limitsets.feeder.engine.stage import IDLE, ITERATIONS, OVERLAP, TAKEN_BACK, pymunk_module
+from limitsets.feeder.engine.stage import IDLE, ITERATIONS, OVERLAP, TAKEN_BACK, check_contact, pymunk_module
 
 if TYPE_CHECKING:
     from limitsets.feeder.engine.member import Ground
@@ -51,16 +51,11 @@ def check_asked(
         if len(values) > 1:
             remedy = "parts on one arm share it, its throw and its cavity"
             raise AnswerError(f"{name} of the scenes", ", ".join(sorted(values)), "one value", remedy)
-    if contact not in ("hinge", "unilateral"):
-        raise AnswerError("the contact", contact, "'hinge' or 'unilateral'", "choose one")
+    check_contact(contact, e, step, 0.05)
     remedies = "give world.friction in the scene, or pass friction=0.5", "pass sliding=0.2"
     for name, value, remedy in zip(("on the arm", "elsewhere"), (mu, sliding), remedies, strict=True):
         if value is None or not 0.0 <= value < math.inf:
             raise AnswerError(f"the friction {name}", value, "a number from 0", remedy)
-    if not 0.0 <= e <= 1.0:
-        raise AnswerError("the restitution", e, "0 to 1", "pass restitution=0 for a plastic contact")
-    if not 0.0 < step <= 0.05:
-        raise AnswerError("the engine's step", step, "above 0 and at most 0.05 rad", "pass step=4e-3")
 
 
 # ---------------------------------------------------------------- By how much two convex polygons overlap
@@ -396,15 +391,7 @@ class Crowd:
 
     def rests(self) -> list[Rest]:
         """Where all parts are now."""
-        resting = []
-        for each in self.members:
-            if each.mode == OUT:
-                x, y = each.body.position
-                where = "lost" if each.lost else "out"
-                resting.append(Rest(each.number, where, x, -1, (x, y, each.body.angle), tuple(each.met)))
-            else:
-                resting.append(rest_of(each, self.ground, self.cavity, each.body.is_sleeping))
-        return resting
+        return [rest_of(each, self.ground, self.cavity) for each in self.members]
 
     def recording(self) -> Recording:
         """Give what was kept since the crowd was made."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.engine.member import ground_of
-from limitsets.feeder.engine.stage import IDLE, LEANING, Stage, pymunk_module, set_up
+from limitsets.feeder.engine.stage import IDLE, LEANING, Stage, nearest, pymunk_module, set_up
 from limitsets.feeder.geometry import side_ends
 
 if TYPE_CHECKING:
@@ -254,7 +254,9 @@ class Plate:
         """
         stage = self._stage()
         space, body = stage.space, stage.body
-        space.add(*self._shapes(stage))
+        shapes = [pymunk_module().Poly(space.static_body, corners.tolist()) for corners in self.ground()]
+        stage.meet(shapes, self.friction, self.restitution, self.step)
+        space.add(*shapes)
         body.position, body.angle = (pose.x, pose.y), pose.angle
         body.velocity, body.angular_velocity = (motion.along, motion.up), motion.turning
         space.sleep_time_threshold = IDLE
@@ -269,12 +271,6 @@ class Plate:
     def _stage(self) -> Stage:
         return set_up(replace(self.part, kappa=self.size, surface_height=0.0), 0.0, 0)
 
-    def _shapes(self, stage: Stage) -> list[Any]:
-        fixed = stage.space.static_body
-        shapes = [pymunk_module().Poly(fixed, corners.tolist()) for corners in self.ground()]
-        stage.meet(shapes, self.friction, self.restitution, self.step)
-        return shapes
-
     def _rest(self, stage: Stage, time: float) -> Rest:
         body = stage.body
         pose = _seen(body)[0]
@@ -288,13 +284,12 @@ def state_of(
     heights: Sequence[float], angle: float, flat: Sequence[float], depth: float, size: float
 ) -> tuple[int, int]:
     """Say how a part at rest lies: state and side, as in `Rest`, from the heights of its corners over the plate."""
-    off = [abs(math.remainder(angle - each, math.tau)) for each in flat]
-    nearest = off.index(min(off))
-    flush, low = off[nearest] < LEANING, heights.index(min(heights))
+    side, off = nearest(angle, flat)
+    flush, low = off < LEANING, heights.index(min(heights))
     if -heights[low] < IN_IT * size:
-        return EMPTY, nearest if flush else -1
+        return EMPTY, side if flush else -1
     if flush and -heights[low] > depth - IN_IT * size:
-        return 1 + nearest, -1
+        return 1 + side, -1
     return 1 + len(flat) + low, -1
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base.errors import AnswerError
-from limitsets.feeder.engine.stage import LEANING, pymunk_module, set_up
+from limitsets.feeder.engine.stage import LEANING, faces_about, nearest, pymunk_module, set_up
 from limitsets.feeder.geometry import side_ends
 
 if TYPE_CHECKING:
@@ -79,8 +79,6 @@ class Ground:
 
     def shapes(self, on: Any) -> dict[str, list[Any]]:
         """Make the engine's shapes on a body of a space, by name; friction and the like are the caller's."""
-        from limitsets.feeder.engine.stage import pymunk_module
-
         pymunk = pymunk_module()
         made: dict[str, list[Any]] = {}
         for piece in self.pieces:
@@ -284,11 +282,7 @@ class Member:
         self.joint.error_bias = 0.0  # all of the drift is corrected in the next step
         space.add(self.joint)
         self.mode, self.vertex = HINGED, vertex
-        count = len(self.flat)
-        self.faces = -vertex % count, (1 - vertex) % count
-        right, left = (self.flat[face] for face in self.faces)
-        self.low = pose[2] - ((pose[2] - right + LEANING) % math.tau - LEANING)
-        self.high = self.low + (left - right) % math.tau
+        self.faces, self.low, self.high = faces_about(self.flat, vertex, pose[2])
 
     def steps_to_face(self, step: float) -> int:
         """Count the steps in which no face can come down; 0 where one does in the next."""
@@ -367,12 +361,14 @@ class Rest:
     met: tuple[str, ...]
 
 
-def rest_of(member: Member, ground: Ground, cavity: Cavity | None, asleep: bool) -> Rest:
-    """Say where a part in play is."""
-    (x, y), angle = member.body.position, member.body.angle
-    side = lying(member)
-    if not asleep:
-        where, side = "unfinished", -1
+def rest_of(member: Member, ground: Ground, cavity: Cavity | None) -> Rest:
+    """Say where a part is."""
+    x, y, angle = member.pose()
+    side = lying(member) if member.mode != OUT and member.body.is_sleeping else -1
+    if member.mode == OUT:
+        where = "lost" if member.lost else "out"
+    elif not member.body.is_sleeping:
+        where = "unfinished"
     elif side >= 0:
         where = "arm" if x <= ground.end else "beyond"
     elif x <= ground.end or cavity is None:
@@ -384,20 +380,14 @@ def rest_of(member: Member, ground: Ground, cavity: Cavity | None, asleep: bool)
 
 def lying(member: Member) -> int:
     """Which side lies on the arm; -1 for none."""
-    side, off = _nearest(member.body.angle, member.flat)
+    side, off = nearest(member.body.angle, member.flat)
     height = member.scene.surface_height + float(member.scene.sides.d[side])
     flat = off < LEANING and abs(member.body.position.y - height) < TOUCHING * member.size
     return side if flat else -1
 
 
-def _nearest(angle: float, flat: Sequence[float]) -> tuple[int, float]:
-    """Find the side that is nearest to lie on, and by which angle it is off."""
-    off = [abs(math.remainder(angle - each, math.tau)) for each in flat]
-    return off.index(min(off)), min(off)
-
-
 def _on_ramp(member: Member, ground: Ground, cavity: Cavity) -> int:
-    side, off = _nearest(member.body.angle + cavity.angle, member.flat)
+    side, off = nearest(member.body.angle + cavity.angle, member.flat)
     corners, ends = member.world(), side_ends(len(member.corners), side)
     slope = math.tan(cavity.angle)
     over = [corners[end][1] - ground.height + slope * (corners[end][0] - ground.end) for end in ends]

@@ -52,6 +52,18 @@ def pymunk_module() -> ModuleType:
     return pymunk
 
 
+def check_contact(contact: str, restitution: float, step: float, most: float) -> None:
+    """Refuse what no contact in the engine can be; `most`: of the step."""
+    if contact not in ("hinge", "unilateral"):
+        raise AnswerError("the contact", contact, "'hinge' or 'unilateral'", "choose one")
+    if not 0.0 <= restitution <= 1.0:
+        remedy = "pass restitution=0 for a plastic contact"
+        raise AnswerError("the restitution", restitution, "0 to 1", remedy)
+    if not 0.0 < step <= most:
+        remedy = "pass step=1e-3"
+        raise AnswerError("the engine's step", step, f"above 0 and at most {most:g} rad", remedy)
+
+
 @dataclass(frozen=True)
 class Stage:
     """One part in a space of its own.
@@ -219,18 +231,24 @@ ROCKING = 1e-4
 AS_LOW = 1e-7
 
 
+def faces_about(flat: Sequence[float], vertex: int, angle: float) -> tuple[tuple[int, int], float, float]:
+    """Give the sides that come down about a vertex, and the angles between which neither is down.
+
+    A face may already lie there, to rounding.
+    """
+    faces = -vertex % len(flat), (1 - vertex) % len(flat)
+    clockwise, counter = (flat[face] for face in faces)
+    low = angle - ((angle - clockwise + LEANING) % math.tau - LEANING)
+    return faces, low, low + (counter - clockwise) % math.tau
+
+
 def turn_on_hinge(stage: Stage, struck: int, step: float, patience: float) -> tuple[float, int]:
     """Hold a vertex that sticks until a face lies on the arm: time and side, -1 where patience ends first.
 
     What it leaves is the velocity at that moment, to second order in the step.
     """
     pymunk, space, body = pymunk_module(), stage.space, stage.body
-    count = len(stage.flat)
-    clockwise, counter = -struck % count, (1 - struck) % count
-    # The angles between which no face is down; a face may already lie there, to rounding.
-    leaning = (body.angle - stage.flat[clockwise] + LEANING) % math.tau - LEANING
-    low = body.angle - leaning
-    high = low + (stage.flat[counter] - stage.flat[clockwise]) % math.tau
+    (clockwise, counter), low, high = faces_about(stage.flat, struck, body.angle)
 
     place = tuple(body.local_to_world(stage.corners[struck]))
     catch, joint = (pymunk.PivotJoint(space.static_body, body, place) for _ in range(2))
@@ -325,7 +343,7 @@ def turn_and_roll(
         if face < 0:
             break
         down = body.angular_velocity
-        left, right = -face % len(stage.flat), (1 - face) % len(stage.flat)
+        left, right = side_ends(len(stage.flat), face)
         vertex = right if vertex == left else left
     return time, -1
 
@@ -391,17 +409,16 @@ def settle(
         if (body.velocity - velocity).length + size * abs(body.angular_velocity - rate) > sudden:
             seen.reverses |= slides_back(stage, velocity, rate, friction)
             rises = body.angular_velocity * rate > 0.0 and size * abs(body.angular_velocity) > sudden
-            seen.rocks |= rises and min(_leaning(stage)) < LEANING
-    off = _leaning(stage)
-    side = off.index(min(off))
-    at_rest = body.is_sleeping and off[side] < LEANING
+            seen.rocks |= rises and nearest(body.angle, stage.flat)[1] < LEANING
+    side, off = nearest(body.angle, stage.flat)
     seen.residual /= stage.kappa * size
-    return time, side if at_rest else -1, seen
+    return time, side if body.is_sleeping and off < LEANING else -1, seen
 
 
-def _leaning(stage: Stage) -> list[float]:
-    """By which angle each side is off the arm."""
-    return [abs(math.remainder(stage.body.angle - flat, math.tau)) for flat in stage.flat]
+def nearest(angle: float, flat: Sequence[float]) -> tuple[int, float]:
+    """Find the side that is nearest to lie on, and by which angle it is off."""
+    off = [abs(math.remainder(angle - each, math.tau)) for each in flat]
+    return off.index(min(off)), min(off)
 
 
 def _watch(arbiter: Any, body: Any, friction: float, seen: Seen) -> None:

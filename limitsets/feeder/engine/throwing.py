@@ -16,6 +16,7 @@ from limitsets.feeder.engine.stage import (
     OVERLAP,
     Seen,
     Stage,
+    check_contact,
     fly,
     pymunk_module,
     set_up,
@@ -242,19 +243,14 @@ def _check(
     if not 0 <= side < len(scene.sides):
         allowed = f"an integer from 0 to {len(scene.sides) - 1}"
         raise MapError("the side", side, allowed, "name a side of the part")
-    if not 0.0 < step <= 0.1:
-        raise AnswerError("the engine's step", step, "above 0 and at most 0.1 rad", "pass step=1e-3")
-    if contact not in ("hinge", "unilateral"):
-        raise AnswerError("the contact", contact, "'hinge' or 'unilateral'", "choose one")
     held = contact == "hinge"
     mu = scene.world.friction if friction is None else friction
     mu = 0.0 if mu is None and held else mu
     e = scene.world.restitution if restitution is None and not held else restitution
+    check_contact(contact, e or 0.0, step, 0.1)
     if mu is None or not 0.0 <= mu < math.inf:
         remedy = "pass friction=0.5, or give world.friction in the scene"
         raise AnswerError("the friction", mu, "a number from 0", remedy)
-    if e is not None and not 0.0 <= e <= 1.0:
-        raise AnswerError("the restitution", e, "0 to 1", "pass restitution=0 for a plastic contact")
     return mu, e or 0.0
 
 
@@ -301,8 +297,8 @@ class Comparison:
     @property
     def agree(self) -> NDArray[np.bool_]:
         """Whether it rests on the same side by both."""
-        same: NDArray[np.bool_] = (self.side_map == self.side_engine) & (self.code_map != OUTSIDE_MODEL)
-        same &= self.status == "rest"
+        inside = (self.code_map != OUTSIDE_MODEL) & (self.status == "rest")
+        same: NDArray[np.bool_] = inside & (self.side_map == self.side_engine)
         return same
 
     @property

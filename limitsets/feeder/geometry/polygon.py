@@ -6,8 +6,10 @@ Coordinates enter only as differences from a vertex of the part, so that where t
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import partial, reduce
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
 
@@ -37,8 +39,7 @@ def side_ends(count: int, side: int) -> tuple[int, int]:
     return left, (left + 1) % count
 
 
-def _by_size(lengths: Sequence[Scalar]) -> Sequence[Scalar]:
-    return sorted(lengths, key=float)
+_by_size = partial(sorted, key=float)
 
 
 def triangle_of(
@@ -173,7 +174,15 @@ def convex_polygon(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
         )
     if not np.isfinite(points).all():
         raise GeometryError("a coordinate of a vertex", "not finite", "finite numbers", "correct it")
-    _refuse_repeated(points)
+    same = np.argwhere(_repeated(points))
+    if len(same):
+        first, second = same[0].tolist()
+        raise GeometryError(
+            f"vertex {second}",
+            points[second].tolist(),
+            "vertices that all differ",
+            f"it repeats vertex {first}; leave one of them out (the last vertex is joined to the first by itself)",
+        )
     sine, rounds = _turning(points)
     _refuse_shape(sine, int(rounds))
     return points
@@ -209,28 +218,10 @@ def _repeated(points: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
     return np.triu(gap <= _FLAT * size[..., None, None], k=1)
 
 
-def _refuse_repeated(points: npt.NDArray[np.float64]) -> None:
-    same = np.argwhere(_repeated(points))
-    if len(same):
-        first, second = (int(index) for index in same[0])
-        raise GeometryError(
-            f"vertex {second}",
-            points[second].tolist(),
-            "vertices that all differ",
-            f"it repeats vertex {first}; leave one of them out (the last vertex is joined to the first by itself)",
-        )
-
-
 def _refuse_shape(sine: npt.NDArray[np.float64], rounds: int) -> None:
     """Refuse what is not convex and counterclockwise; the boundary of such a part turns left, once around."""
     flat = np.flatnonzero(np.abs(sine) <= _FLAT)
     left = int((sine > 0).sum())
-    crossing = GeometryError(
-        "the boundary",
-        f"{rounds} turns",
-        "one turn to the left around the part",
-        "it crosses itself; give the vertices in order, counterclockwise",
-    )
     if len(flat):
         raise GeometryError(
             f"vertex {int(flat[0])}",
@@ -243,7 +234,12 @@ def _refuse_shape(sine: npt.NDArray[np.float64], rounds: int) -> None:
     if left == 0 and rounds == -1:
         raise GeometryError("the order of the vertices", "clockwise", "counterclockwise", "reverse the list")
     if abs(rounds) != 1:
-        raise crossing
+        raise GeometryError(
+            "the boundary",
+            f"{rounds} turns",
+            "one turn to the left around the part",
+            "it crosses itself; give the vertices in order, counterclockwise",
+        )
     inward = int(np.flatnonzero(sine * rounds < 0)[0])
     order = "clockwise and " if rounds < 0 else ""
     raise GeometryError(
@@ -279,9 +275,7 @@ def heights_inside(
     """
     ends = [side_ends(len(corners), side) for side in range(len(corners))]
     measured = [above_side(corners[left], corners[right], point, sqrt) for left, right in ends]
-    longest = measured[0][2]
-    for _, _, length in measured[1:]:
-        longest = np.maximum(longest, length)
+    longest = reduce(np.maximum, [length for _, _, length in measured])
     return [height for _, height, _ in measured], 1e-12 * longest
 
 
@@ -378,11 +372,7 @@ def mass_of(
     return Mass(total, (x + origin_x, y + origin_y), sqrt(moment / total))
 
 
-def _sum(terms: Sequence[Scalar]) -> Scalar:
-    total = terms[0]
-    for term in terms[1:]:
-        total = total + term
-    return total
+_sum = partial(reduce, operator.add)
 
 
 def plate_with_points(
@@ -582,13 +572,11 @@ def resting_sides(
     ([1.0, 2.0, 3.0], [1.0, 1.0, 1.0])
     """
     corners: list[Vector] = [(x, y) for x, y in np.asarray(vertices, dtype=np.float64).tolist()]
-    if isinstance(centre, OnSide):
-        if not 0 <= centre.side < len(corners):
-            raise GeometryError(
-                "the side", centre.side, f"0 to {len(corners) - 1}", "name a side of this part"
-            )
-        return RestingSides(*np.array(rest_of(corners, centre, lengths)).T)
-    return RestingSides(*np.array(rest_of(corners, (centre[0], centre[1]), lengths)).T)
+    if isinstance(centre, OnSide) and not 0 <= centre.side < len(corners):
+        allowed = f"0 to {len(corners) - 1}"
+        raise GeometryError("the side", centre.side, allowed, "name a side of this part")
+    point = centre if isinstance(centre, OnSide) else (centre[0], centre[1])
+    return RestingSides(*np.array(rest_of(corners, point, lengths)).T)
 
 
 def require_rest(sides: RestingSides, unit: str = "", *, tips: bool = False) -> None:

@@ -18,11 +18,11 @@ import numpy.typing as npt
 from limitsets.base.errors import SceneError
 from limitsets.feeder.geometry import Mass, OnSide, heights_inside, is_convex, is_triangle, triangle_of
 from limitsets.feeder.geometry.polygon import Scalar, Vector
-from limitsets.feeder.scene.numbers import SIGNED, SIGNED_POINT, Numbers
-from limitsets.feeder.scene.quantities import LEAST, base_unit, in_units, replaced, text_at
+from limitsets.feeder.scene.numbers import SIGNED, SIGNED_POINT, Unchecked
+from limitsets.feeder.scene.quantities import LEAST, replaced
 from limitsets.feeder.scene.scene import Scene, resting_places
 from limitsets.feeder.scene.surroundings import Cavity, Tray, heights_over_sides
-from limitsets.feeder.scene.units import convert, fits, parse
+from limitsets.feeder.scene.units import fits
 
 if TYPE_CHECKING:
     from limitsets.feeder.thrower import Throw
@@ -138,12 +138,13 @@ def _one_by_one(function: Callable[..., float], entries: int) -> Callable[..., A
     return lambda *numbers: np.asarray(apply(*numbers), dtype=np.float64)
 
 
-class _Arrays(Numbers):
+class _Arrays(Unchecked):
     """The numbers of one scene, some of them arrays."""
 
     def __init__(self, tree: Mapping[str, Any], unit: str, values: Mapping[str, Array], count: int) -> None:
-        super().__init__(tree, np.sqrt, _one_by_one(math.sin, 1))
-        self.unit, self.values, self.count = unit, values, count
+        super().__init__(tree, unit)
+        self.sqrt, self.sine = np.sqrt, _one_by_one(math.sin, 1)
+        self.values, self.count = values, count
         self.possible = np.ones(count, dtype=np.bool_)
 
     def require(self, holds: Any) -> None:
@@ -153,7 +154,7 @@ class _Arrays(Numbers):
     def number(self, name: str) -> Scalar:
         """Return a quantity by its name."""
         if name not in self.values:
-            return in_units(self.unit, name, text_at(self.tree, name))
+            return super().number(name)
         value = self.values[name]
         good = fits(value) | (value == 0)
         if not (name.startswith(SIGNED) or name.endswith(SIGNED_POINT)):
@@ -162,10 +163,6 @@ class _Arrays(Numbers):
             good &= (value > 0) & (value <= math.pi / 2)
         self.require(good)
         return np.where(good, value, 1.0)
-
-    def constant(self, text: str, dimension: str, key: str) -> float:
-        """Return what no quantity's name stands for, from its text."""
-        return convert(parse(text, dimension, key=key), base_unit(dimension, self.unit))
 
     def triangle(self, lengths: list[Scalar]) -> Sequence[Vector]:
         """Place the vertices of a triangle."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from limitsets.feeder.geometry import RestingSides
 from limitsets.feeder.goals import GOALS, Goal, words_of
 from limitsets.feeder.scene.facts import (
     FACTS,
     NOT_TIPPING,
+    SCATTERED,
     WITHOUT_EDGE,
     Deviation,
     Effects,
@@ -18,93 +21,72 @@ from limitsets.feeder.scene.facts import (
 )
 from limitsets.feeder.scene.numbers import Floats
 from limitsets.feeder.scene.quantities import Resolver, deviation, require
-from limitsets.feeder.scene.surroundings import Feedback, resolve_cavity, resolve_feedback, resolve_tray
+from limitsets.feeder.scene.surroundings import resolve_cavity, resolve_feedback, resolve_tray
 from limitsets.feeder.scene.units import parse
 from limitsets.feeder.scene.validation import Tree, plain, validate
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene.schema import EffectsTable, GoalTable, SceneTable, WorldTable
-
 
 # ----------------------------------------------------------------
 # The goal, the world and the effects of a scene.
 
 
-def resolve_goal(table: GoalTable, rests: list[bool], arm_length: float, resolver: Resolver) -> Goal:
+def resolve_goal(table: Tree, rests: list[bool], arm_length: float, resolver: Resolver) -> Goal:
     """Resolve ``[goal]`` for a part that rests on these of its sides."""
-    named = [kind for kind in GOALS if getattr(table, kind) is not None]
+    named = [kind for kind in GOALS if kind in table]
     if len(named) != 1:
         kinds = " and ".join(named) or "none"
         raise resolver.refusal("goal", "the goal", kinds, f"one of {', '.join(GOALS)}", "name exactly one")
 
     def side(value: int, key: str) -> int:
-        if value >= len(rests):
-            allowed = f"0 to {len(rests) - 1}"
-            raise resolver.refusal(key, "the side", value, allowed, "name a side of this part")
-        if not rests[value]:
-            allowed = ", ".join(str(each) for each, good in enumerate(rests) if good)
-            raise resolver.refusal(
-                key, "the side", value, allowed, "the part cannot rest on it; name another"
-            )
+        sides = [each for each, good in enumerate(rests) if good]
+        there, last = value < len(rests), len(rests) - 1
+        resolver.require(there, key, "the side", f"0 to {last}", "name a side of this part")
+        remedy = "the part cannot rest on it; name another"
+        resolver.require(value in sides, key, "the side", ", ".join(map(str, sides)), remedy)
         return value
 
-    def position(text: str, key: str) -> float:
-        x = resolver.value(text, "length", key)
-        if not 0 <= x < arm_length:
-            allowed = f"from 0 to below the arm's length, {arm_length:.9g} {resolver.unit}"
-            raise resolver.refusal(
-                key, "the position", text, allowed, "nothing comes to rest there; correct it"
-            )
-        return x
-
     def read(word: str, value: Any, key: str) -> Any:
-        if word == "place":
-            return position(value, key)
         if word == "sides":
             return tuple(side(each, f"{key}[{i}]") for i, each in enumerate(value))
-        return side(value, key) if word == "side" else value
+        if word != "place":
+            return side(value, key) if word == "side" else value
+        x = resolver.value(key, "length")
+        allowed = f"from 0 to below the arm's length, {arm_length:.9g} {resolver.unit}"
+        remedy = "nothing comes to rest there; correct it"
+        resolver.require(0 <= x < arm_length, key, "the position", allowed, remedy)
+        return x
 
-    goal, given, key = GOALS[named[0]], getattr(table, named[0]), f"goal.{named[0]}"
+    goal, given, key = GOALS[named[0]], table[named[0]], f"goal.{named[0]}"
     words = words_of(goal)
     if len(words) == 1:  # it stands by itself
         ((name, word),) = words.items()
         values = {name: read(word, given, key)}
     else:
-        values = {name: read(word, getattr(given, name), f"{key}.{name}") for name, word in words.items()}
-    return goal(**values, from_anywhere=table.from_anywhere)  # type: ignore[call-arg]  # a kind is a dataclass
+        written = {name: word for name, word in words.items() if name in given}
+        values = {name: read(word, given[name], f"{key}.{name}") for name, word in written.items()}
+    return goal(**values, from_anywhere=table.get("from_anywhere", False))  # type: ignore[call-arg]  # a kind is a dataclass
 
 
-def resolve_world(table: WorldTable, resolver: Resolver) -> World:
+def resolve_world(table: Tree, resolver: Resolver) -> World:
     """Resolve ``[world]``."""
-    scatter, facts, own = None, {}, {each.name for each in fields(World)}
-    for name, fact in FACTS.items():
-        given, key = getattr(table, name), f"world.{name}"
-        if given is not None and fact.dimension:
-            text, given = given, resolver.positive(given, fact.dimension, key)
-            if not given < fact.most:
-                raise resolver.refusal(key, fact.thing, text, fact.words, "correct it")
-        if given is not None:
-            facts[name] = given
-    if table.scatter is not None and (table.scatter.speed or table.scatter.landing):
-        scatter = Scatter(
-            _noise(table.scatter.speed, "throw.speed", "world.scatter.speed", resolver),
-            _noise(table.scatter.landing, "landing.x", "world.scatter.landing", resolver),
-        )
+    facts, own = {}, {each.name for each in fields(World)}
+    for name in (name for name in FACTS if name in table):
+        fact, key = FACTS[name], f"world.{name}"
+        facts[name] = resolver.positive(key, fact.dimension) if fact.dimension else float(table[name])
+        resolver.require(not fact.dimension or facts[name] < fact.most, key, fact.thing, fact.words)
+    noise, file = {}, resolver.file
+    for word, text in table.get("scatter", {}).items():
+        key = f"world.scatter.{word}"
+        noise[word] = deviation(text, SCATTERED[word], resolver.unit, zero=True, key=key, file=file)
     more = {name: facts.pop(name) for name in facts.keys() - own}
-    return World(**facts, scatter=scatter, more=more)
+    return World(**facts, scatter=Scatter(**noise) if noise else None, more=more)
 
 
-def _noise(text: str | None, name: str, key: str, resolver: Resolver) -> Deviation | None:
-    if text is None:
-        return None
-    return deviation(text, name, resolver.unit, zero=True, key=key, file=resolver.file)
-
-
-def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Resolver) -> Effects:
+def resolve_effects(table: Tree, world: World, flight: str, resolver: Resolver) -> Effects:
     """Resolve ``[effects]``: refuse what excludes each other, and what lacks its facts."""
-    given = {name: how for name, how in table.model_dump().items() if how and name not in ("auto", "contact")}
+    given = {name: how for name, how in table.items() if how and name not in ("auto", "contact")}
+    switches = {name: table.get(name, False) for name in ("auto", "contact")}
     if not given:
-        return Effects(auto=table.auto, contact=table.contact)
+        return Effects(**switches)
     from limitsets.feeder.thrower.effects import EFFECTS  # lazily: its room loads numba
 
     for effect in given:
@@ -133,7 +115,7 @@ def resolve_effects(table: EffectsTable, world: World, flight: str, resolver: Re
                     f"{fact} in [world]",
                     f"{effect} needs it: add world.{fact}, or leave {key} out",
                 )
-    return Effects({name: given[name] for name in EFFECTS if name in given}, table.auto, table.contact)
+    return Effects({name: given[name] for name in EFFECTS if name in given}, **switches)
 
 
 # ----------------------------------------------------------------
@@ -156,92 +138,79 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
         For the first thing wrong, with file, key, value, what is allowed and what to do.
     """
     tree = plain(structure, file)
-    table = validate(tree, file)
-    unit = parse(table.arm.length, "length", key="arm.length", file=file).unit
-    resolver = Resolver(unit, file)
-    numbers = Floats(tree, resolver)
+    validate(tree, file)
+    unit = parse(tree["arm"]["length"], "length", key="arm.length", file=file).unit
+    resolver = Resolver(tree, unit, file)
+    numbers = Floats(resolver)
     arm_length, body = numbers.number("arm.length"), numbers.body
-    _require_reach(body.sides, arm_length, table, resolver)
-    gravity = numbers.gravity
-    world = resolve_world(table.world, resolver)
-    goal = None
-    if table.goal is not None:
-        goal = resolve_goal(table.goal, body.sides.rests.tolist(), arm_length, resolver)
-    cavity = None
-    if table.cavity is not None:
+    _require_reach(body.sides, arm_length, resolver)
+    gravity, model = numbers.gravity, {"flight": "exact", "flip": "signed"} | tree.get("model", {})
+    world = resolve_world(tree.get("world", {}), resolver)
+    goal = cavity = tray = feedback = None
+    if "goal" in tree:
+        goal = resolve_goal(tree["goal"], body.sides.rests.tolist(), arm_length, resolver)
+    if "cavity" in tree:
         feet, lengths = body.sides.a.tolist(), body.sides.length.tolist()
-        cavity = resolve_cavity(table.cavity, feet, lengths, arm_length, goal, resolver)
-    tray = None
-    if table.tray is not None:
-        tray = resolve_tray(table.tray, body.vertices, body.sides.length, goal, resolver)
-    effects = resolve_effects(table.effects, world, table.model.flight, resolver)
-    _require_tipping(body.sides, effects, table, resolver)
+        cavity = resolve_cavity(feet, lengths, arm_length, goal, resolver)
+    if "tray" in tree:
+        tray = resolve_tray(body.vertices, body.sides.length, goal, resolver)
+    effects = resolve_effects(tree.get("effects", {}), world, model["flight"], resolver)
+    _require_tipping(body.sides, effects, model["flip"], resolver)
+    kappa, tolerance = numbers.kappa, _tolerance(tree.get("tolerance", {}), resolver)
+    if "feedback" in tree:
+        feedback = resolve_feedback(len(body.sides), arm_length, resolver, gravity=gravity is not None)
     return {
-        "name": table.name,
+        "name": tree["name"],
         "unit": unit,
         **body._asdict(),
         "surface_height": numbers.number("arm.surface_height"),
         "arm_length": arm_length,
-        "kappa": numbers.kappa,
+        "kappa": kappa,
         "gravity": gravity,
-        "flight": table.model.flight,
-        "flip": table.model.flip,
+        **model,
         "goal": goal,
         "cavity": cavity,
         "tray": tray,
         "world": world,
         "effects": effects,
-        "tolerance": _tolerance(tree, table, resolver),
-        "feedback": _feedback(table, len(body.sides), arm_length, resolver, gravity=gravity is not None),
+        "tolerance": tolerance,
+        "feedback": feedback,
         "file": file,
         "text": tree,
     }
 
 
-def _require_reach(sides: RestingSides, arm_length: float, table: SceneTable, resolver: Resolver) -> None:
-    for side, (a, rests) in enumerate(zip(sides.a.tolist(), sides.rests.tolist(), strict=True)):
-        if rests and not arm_length > a:
-            raise resolver.refusal(
-                "arm.length",
-                "the length of the arm",
-                table.arm.length,
-                f"more than {a:.6g} {resolver.unit}",
-                f"the part resting on side {side} needs that much before any throw can lift it; lengthen the arm",
-            )
+def _require_reach(sides: RestingSides, arm_length: float, resolver: Resolver) -> None:
+    for side in np.flatnonzero(sides.rests).tolist():
+        needed, remedy = float(sides.a[side]), f"the part resting on side {side} needs that much"
+        remedy = f"{remedy} before any throw can lift it; lengthen the arm"
+        allowed = f"more than {needed:.6g} {resolver.unit}"
+        resolver.require(arm_length > needed, "arm.length", "the length of the arm", allowed, remedy)
 
 
-def _require_tipping(sides: RestingSides, effects: Effects, table: SceneTable, resolver: Resolver) -> None:
+def _require_tipping(sides: RestingSides, effects: Effects, flip: str, resolver: Resolver) -> None:
     """Refuse what says nothing of a part that tips over on one of its sides."""
     tips = [str(side) for side, rests in enumerate(sides.rests.tolist()) if not rests]
     if not tips:
         return
     where = f"the part cannot rest on side {' and '.join(tips)}"
-    if table.model.flip != "signed":
-        allowed = 'flip = "signed" in [model]'
-        remedy = f"{where}, and tips from there the way it turns; correct it"
-        raise resolver.refusal("model.flip", "the criterion of a flip", table.model.flip, allowed, remedy)
+    remedy = f"{where}, and tips from there the way it turns; correct it"
+    allowed = 'flip = "signed" in [model]'
+    resolver.require(flip == "signed", "model.flip", "the criterion of a flip", allowed, remedy)
     for effect in NOT_TIPPING:
         if effect in effects.on():
             remedy = f"{where}, but may on an arm that leans; leave it out"
             raise resolver.refusal(f"effects.{effect}", "this effect", effect, "another effect", remedy)
-    for key, given in (("cavity", table.cavity), ("tray", table.tray), ("feedback", table.feedback)):
-        if given is not None:
+    for key in ("cavity", "tray", "feedback"):
+        if key in resolver.tree:
             allowed = "a part that rests on each of its sides"
             raise resolver.refusal(key, "the part", where, allowed, f"leave [{key}] out, or, {WITHOUT_EDGE}")
 
 
-def _tolerance(tree: Tree, table: SceneTable, resolver: Resolver) -> dict[str, Deviation]:
+def _tolerance(table: Tree, resolver: Resolver) -> dict[str, Deviation]:
     scales = {}
-    for name, text in table.tolerance.items():
+    for name, text in table.items():
         key = f'tolerance."{name}"'
         scales[name] = deviation(text, name, resolver.unit, key=key, file=resolver.file)
-        require(tree, name, key, resolver.file)
+        require(resolver.tree, name, key, resolver.file)
     return scales
-
-
-def _feedback(
-    table: SceneTable, count: int, arm_length: float, resolver: Resolver, *, gravity: bool
-) -> Feedback | None:
-    if table.feedback is None:
-        return None
-    return resolve_feedback(table.feedback, count, arm_length, resolver, gravity=gravity)

@@ -8,25 +8,20 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args, get_origin
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from limitsets.base.errors import SceneError, TipsError
 from limitsets.feeder.geometry.polygon import mass_of
-from limitsets.feeder.scene.facts import TIPPING
+from limitsets.feeder.scene.facts import TIPPING, Scatter
 from limitsets.feeder.scene.numbers import hull_of
-from limitsets.feeder.scene.quantities import find
+from limitsets.feeder.scene.quantities import Words, at, find, words_of
 from limitsets.feeder.scene.reading import can_name, load, replace_file, structure_of
 from limitsets.feeder.scene.scene import Scene, turns
+from limitsets.feeder.scene.schema import ByName, Key, Section, Several, schema
 from limitsets.feeder.scene.units import UNITS, convert, density_dimension, exact_factor, parse
 from limitsets.feeder.scene.validation import Tree, plain, refusals, respelled
-
-if TYPE_CHECKING:
-    from pydantic.fields import FieldInfo
-
-    from limitsets.feeder.scene.schema import Table
-
 
 # ----------------------------------------------------------------
 # What is improbable in a scene: values that most often have a wrong unit.  They are told, and not refused.
@@ -64,8 +59,8 @@ class Doubt(NamedTuple):
         return f"{place}: careful, {self.value!r}: {self.thing}; usual: {self.allowed}; {self.remedy}"
 
 
-# Key, value as written, what is measured of it, least and largest that is believed, what it comes to, what is usual.
-Row: TypeAlias = tuple[str, str, float, float, float, str, str]
+# Key, what is measured of its value, least and largest that is believed, what it comes to, what is usual.
+Row: TypeAlias = tuple[str, float, float, float, str, str]
 
 
 def doubts(scene: Scene) -> tuple[Doubt, ...]:
@@ -80,9 +75,12 @@ def doubts(scene: Scene) -> tuple[Doubt, ...]:
     "1.17 times the part's longest side"
     """
     by_key: dict[str, Doubt] = {}
-    for key, value, measured, least, most, thing, usual in _rows(scene):
+    size = f"{scene.sides.length.max():.4g} {scene.unit}"
+    for key, measured, least, most, thing, usual in _rows(scene):
         if not least <= measured <= most and not (key.startswith("throw.") and "arm.length" in by_key):
             thing = thing.format(f"{measured:.3g}" if measured < 1000 else f"{measured:.0f}")
+            text = at(scene.text, words_of(key))
+            value = size if isinstance(text, list) else str(text)
             by_key.setdefault(key, Doubt(key, thing, value, usual, "has it the right unit?", scene.file))
     return tuple(by_key.values())
 
@@ -90,68 +88,52 @@ def doubts(scene: Scene) -> tuple[Doubt, ...]:
 def _rows(scene: Scene) -> Iterator[Row]:
     """Give what is measured of a scene."""
     text, unit, metre = scene.text, scene.unit, float(exact_factor(scene.unit, "m"))
-    part, throw, mass = text["part"], text["throw"], text["part"]["mass"]
+    part, (word,) = text["part"], text["throw"]
     arm, size, over = scene.arm_length, float(scene.sides.length.max()), "{} times the part's longest side"
-    shape = "part.sides" if "sides" in part else "part.vertices"
-    yield shape, f"{size:.4g} {unit}", size * metre, 1e-4, 1.0, "the longest side is {} m", "1 mm to 0.5 m"
-    yield "arm.length", text["arm"]["length"], arm * metre, 1e-3, 3.0, "the arm is {} m long", "1 cm to 2 m"
-    yield "arm.length", text["arm"]["length"], arm / size, 0.0, 40.0, over, "2 to 10 times"
-    height = abs(scene.surface_height) / size
-    yield "arm.surface_height", text["arm"]["surface_height"], height, 0.0, 0.5, over, "below 0.5 times"
-    if "center" in mass:
+    shape, small = "part.sides" if "sides" in part else "part.vertices", "below 0.05 times"
+    yield shape, size * metre, 1e-4, 1.0, "the longest side is {} m", "1 mm to 0.5 m"
+    yield "arm.length", arm * metre, 1e-3, 3.0, "the arm is {} m long", "1 cm to 2 m"
+    yield "arm.length", arm / size, 0.0, 40.0, over, "2 to 10 times"
+    yield "arm.surface_height", abs(scene.surface_height) / size, 0.0, 0.5, over, "below 0.5 times"
+    if "center" in part["mass"]:
         reach = max(math.dist(scene.centre, vertex) for vertex in scene.vertices.tolist())
         key, radius = "part.mass.radius_of_gyration", scene.radius_of_gyration / reach
         said = "{} times the way from the centre of mass to the farthest vertex"
-        yield key, mass["radius_of_gyration"], radius, 0.02, 1.0, said, "0.2 to 0.7 times"
+        yield key, radius, 0.02, 1.0, said, "0.2 to 0.7 times"
     else:
-        yield from _rows_of_plate(mass, (scene.vertices * metre).tolist(), size * metre)
+        yield from _rows_of_plate(part["mass"], (scene.vertices * metre).tolist(), size * metre)
     if scene.gravity is not None:
-        ((word, given),) = text["gravity"].items()
-        pull = scene.gravity * metre
-        said = "gravity in the plane of the motion is {} m/s^2"
-        yield f"gravity.{word}", given, pull, 0.3, 11.0, said, "0.5 to 9.81 m/s^2"
-    ((word, given),) = throw.items()
+        (key,), said = text["gravity"], "gravity in the plane of the motion is {} m/s^2"
+        yield f"gravity.{key}", scene.gravity * metre, 0.3, 11.0, said, "0.5 to 9.81 m/s^2"
     speeds = [f"{_in_words(scene, word, share):.3g}" for share in USUAL_TURNS]
-    here = f"{USUAL_TURNS[0]} to {USUAL_TURNS[1]} times, here {' to '.join(speeds)}"
-    unit_of_throw = "deg/s" if word == "speed" else unit
-    said = "a part thrown from the arm's end turns {} times before it lands"
-    turned = turns(arm, scene.kappa)
-    yield f"throw.{word}", given, turned, LEAST_TURNS, MOST_TURNS, said, f"{here} {unit_of_throw}"
+    usual = f"{USUAL_TURNS[0]} to {USUAL_TURNS[1]} times, here {' to '.join(speeds)}"
+    usual = f"{usual} {'deg/s' if word == 'speed' else unit}"
+    said, turned = "a part thrown from the arm's end turns {} times before it lands", turns(arm, scene.kappa)
+    yield f"throw.{word}", turned, LEAST_TURNS, MOST_TURNS, said, usual
     for name, deviation in scene.tolerance.items():
-        key, given = f'tolerance."{name}"', text["tolerance"][name]
+        key = f'tolerance."{name}"'
         if find(name).dimension == "length" and not deviation.relative and name != "throw.kappa":
-            yield key, given, deviation.value / size, 0.0, 0.25, over, "below 0.05 times"
+            yield key, deviation.value / size, 0.0, 0.25, over, small
         elif deviation.relative or name != "gravity.tilt" or "tilt" in text["gravity"]:
             share = deviation.value if deviation.relative else deviation.value / abs(scene.value(name))
-            yield key, given, share, 0.0, 0.5, "{} times the value itself", "below 0.1 times"
-    scatter = scene.world.scatter
-    speed = None if scatter is None else scatter.speed
+            yield key, share, 0.0, 0.5, "{} times the value itself", "below 0.1 times"
+    scatter = scene.world.scatter or Scatter()
+    speed, landing = scatter.speed, scatter.landing
     # a throw given by kappa without gravity has no speed
     if speed is not None and (speed.relative or scene.gravity is not None):
         share = speed.value if speed.relative else speed.value / scene.value("throw.speed")
-        said, given = "{} times the speed itself", text["world"]["scatter"]["speed"]
-        yield "world.scatter.speed", given, share, 0.0, 0.2, said, "below 0.03 times"
-    if scatter is not None and scatter.landing is not None:
-        given = text["world"]["scatter"]["landing"]
-        yield (
-            "world.scatter.landing",
-            given,
-            scatter.landing.value / size,
-            0.0,
-            0.25,
-            over,
-            "below 0.05 times",
-        )
+        yield "world.scatter.speed", share, 0.0, 0.2, "{} times the speed itself", "below 0.03 times"
+    if landing is not None:
+        yield "world.scatter.landing", landing.value / size, 0.0, 0.25, over, small
     # what a fact of the world is measured in, and what is believed of it
     facts = {
         "friction": (1.0, 0.0, 3.0, "a coefficient of {}", "0.1 to 1"),
-        "bounce_threshold": (size, 0.0, 0.25, over, "below 0.05 times"),
+        "bounce_threshold": (size, 0.0, 0.25, over, small),
         "throw_rate": (1.0, 0.01, 20.0, "{} throws a second", "0.1 to 10"),
     }
-    for name, (one, least, most, said, usual) in facts.items():
+    for name, (whole, *believed) in facts.items():
         if name in text.get("world", {}):
-            given, measured = str(text["world"][name]), getattr(scene.world, name) / one
-            yield f"world.{name}", given, measured, least, most, said, usual
+            yield f"world.{name}", getattr(scene.world, name) / whole, *believed
 
 
 def _in_words(scene: Scene, word: str, turned: float) -> float:
@@ -169,17 +151,18 @@ def _rows_of_plate(mass: Mapping[str, Any], vertices: list[Any], size: float) ->
     unit = "kg/m^3" if volume else "kg/m^2"
     density = convert(parse(text, density_dimension(text)), unit)
     least, most, usual = (10.0, 25e3, "500 to 8000 kg/m^3") if volume else (0.02, 1e3, "0.5 to 80 kg/m^2")
-    yield "part.mass.plate_density", text, density, least, most, f"the plate has {{}} {unit}", usual
+    yield "part.mass.plate_density", density, least, most, f"the plate has {{}} {unit}", usual
     if volume:
-        thickness = convert(parse(mass["plate_thickness"], "length"), "m")
-        said = "{} times the part's longest side"
-        key = "part.mass.plate_thickness"
-        yield key, mass["plate_thickness"], thickness / size, 0.0, 0.5, said, "below 0.2 times"
+        thickness, said = (
+            convert(parse(mass["plate_thickness"], "length"), "m"),
+            "{} times the part's longest side",
+        )
+        yield "part.mass.plate_thickness", thickness / size, 0.0, 0.5, said, "below 0.2 times"
     plate = mass_of(vertices, density * thickness).mass
     said = f"{{}} times the plate, which weighs {1000.0 * plate:.3g} g"
     for k, point in enumerate(mass.get("points", ())):
-        given, key = point["mass"], f"part.mass.points[{k}].mass"
-        yield key, given, convert(parse(given, "mass"), "kg") / plate, 0.0, 30.0, said, "up to a few times it"
+        share = convert(parse(point["mass"], "mass"), "kg") / plate
+        yield f"part.mass.points[{k}].mass", share, 0.0, 30.0, said, "up to a few times it"
 
 
 # ----------------------------------------------------------------
@@ -215,18 +198,16 @@ def starting_text(name: str, file: str, unit: str = "in") -> str:
     >>> load(starting_text("mine", "mine.toml")).name
     'mine'
     """
-    from limitsets.feeder.scene.schema import scene_table
-
     given = load(LIKE).as_dict() | {"name": name}
     lines: list[str] = []
-    for key, field in scene_table(with_effects=True).model_fields.items():
-        inner = _model(field.annotation)
-        if inner is not None:
-            lines += _table(key, inner, given.get(key))
-        elif key in given:
-            lines += [*_line(key, given[key], field), ""]
+    for word, key in schema(with_effects=True).keys.items():
+        if isinstance(key.of, Section):
+            lines += _table(word, key.of, given.get(word))
+        elif isinstance(key.of, ByName):
+            lines += [f"# {key.says}", f"# [{word}]"]
+            lines += [*(f"# {_word(name)} = {_toml(value)}" for name, value in key.example.items()), ""]
         else:
-            lines += [*_quantities(key, field), ""]
+            lines += [*_line(word, given[word], key), ""]
     body = (
         _LENGTHS.sub(lambda length: _in_unit(length, unit), "\n".join(lines))
         if unit != "in"
@@ -276,85 +257,58 @@ def example_at(path: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], Any]
     >>> example_at(("goal", "flip_order", 1))
     (('goal', 'flip_order'), [0, 1, 2])
     """
-    from limitsets.feeder.scene.schema import scene_table
-
-    table: Any = scene_table(with_effects=path[0] == "effects")
-    for k, word in enumerate(path):
+    section = schema(with_effects=path[0] == "effects")
+    for depth, word in enumerate(path, 1):
         if isinstance(word, str):
-            field, end = table.model_fields[word], k + 1
-            table = _model(field.annotation)
-            if table is None:
+            key, end = section.keys[word], depth
+            inner = _inner(key)
+            if inner is None:
                 break
-    return path[:end], _example(field)
+            section = inner
+    return path[:end], _example(key)
 
 
-def _table(path: str, table: type[Table], given: Mapping[str, Any] | None) -> Iterator[str]:
+def _table(path: str, table: Section, given: Mapping[str, Any] | None) -> Iterator[str]:
     """Write a table under its heading, all of it commented out where it is not given."""
     off = "" if given is not None else "# "
-    yield f"# {(table.__doc__ or '').strip()}"
+    yield f"# {table.says}"
     yield f"{off}[{path}]"
-    below = []
-    for key, field in table.model_fields.items():
-        inner = _model(field.annotation)
-        if f"{path}.{key}" in HEADED and inner is not None:
-            below.append((f"{path}.{key}", inner, None if given is None else given.get(key)))
+    below, texts = [], given or {}
+    for word, key in table.keys.items():
+        inner, on = _inner(key), word in texts
+        if inner is not None and f"{path}.{word}" in HEADED:
+            below.append((f"{path}.{word}", inner, texts.get(word)))
             continue
-        on = given is not None and key in given
-        yield from _line(key, given[key] if given is not None and on else _example(field), field, on=on)
+        yield from _line(word, texts[word] if on else _example(key), key, on=on)
         if inner is not None:
-            yield from (f"#     {word}: {each.description}" for word, each in inner.model_fields.items())
+            yield from (f"#     {name}: {each.says}" for name, each in inner.keys.items())
     yield ""
     for each in below:
         yield from _table(*each)
 
 
-def _quantities(key: str, field: FieldInfo) -> Iterator[str]:
-    """Write a table whose keys are names of quantities."""
-    yield f"# {field.description}"
-    yield f"# [{key}]"
-    yield from (f"# {_word(name)} = {_toml(value)}" for name, value in _example(field).items())
-
-
-def _line(key: str, value: Any, field: FieldInfo, *, on: bool = True) -> list[str]:
+def _line(word: str, value: Any, key: Key, *, on: bool = True) -> list[str]:
     """Write a key with what it means behind it; above it where the line would be long."""
-    line = ("" if on else "# ") + f"{key} = {_toml(value)}"
-    whole = f"{line}  # {field.description}"
-    return [whole] if len(whole) <= WIDTH else [f"#     {field.description}:", line]
+    line = ("" if on else "# ") + f"{word} = {_toml(value)}"
+    whole = f"{line}  # {key.says}"
+    return [whole] if len(whole) <= WIDTH else [f"#     {key.says}:", line]
 
 
-def _model(annotation: Any) -> type[Table] | None:
-    """Find the table in an annotation: itself, of several, or None."""
-    from limitsets.feeder.scene.schema import Table
-
-    if isinstance(annotation, type) and issubclass(annotation, Table):
-        return annotation
-    return next((model for part in get_args(annotation) if (model := _model(part)) is not None), None)
+def _inner(key: Key) -> Section | None:
+    """Give the table that a key stands for, or each entry of its list."""
+    of = key.of.of if isinstance(key.of, Several) else key.of
+    return of if isinstance(of, Section) else None
 
 
-def _example(field: FieldInfo) -> Any:
-    """Give the example of a key: its own, that of its type, or one made of those of its table."""
-    for examples in (field.examples, *_examples(field.annotation)):
-        if examples:
-            return examples[0]
-    inner = _model(field.annotation)
-    if inner is None:  # a switch
-        return True
-    made = {key: _example(each) for key, each in inner.model_fields.items()}
+def _example(key: Key) -> Any:
+    """Give the example of a key: its own, or one made of those of its table."""
+    inner = _inner(key)
+    if inner is None:
+        return key.example
+    made = {word: _example(each) for word, each in inner.keys.items()}
     for instead in ("side" if "beyond" in made else "", "speed" if "name" in made else ""):
         made.pop(instead, None)  # one of two ways to say it
-    return [made] if _is_list(field.annotation) else made
-
-
-def _examples(annotation: Any) -> Iterator[Any]:
-    """Give the examples that the types in an annotation carry."""
-    for part in get_args(annotation):
-        if (examples := getattr(part, "examples", None)) is not None:
-            yield examples
-        yield from _examples(part)
-
-
-def _is_list(annotation: Any) -> bool:
-    return get_origin(annotation) is list or any(map(_is_list, get_args(annotation)))
+    return [made] if isinstance(key.of, Several) else made
 
 
 def _word(key: str) -> str:
@@ -382,11 +336,6 @@ SHAPES = (("part",), ("arm", "length"))
 
 # What stands for a table that is refused, since others need one.
 INSTEAD = {"throw": {"kappa": "25 in"}, "gravity": {"tilt": "30 deg"}}
-
-# The words of a key: in quotation marks, a number, or plain.
-_WORDS = re.compile(r'"([^"]*)"|\[(\d+)\]|([^.\[\]"]+)')
-
-Words: TypeAlias = tuple[str | int, ...]
 
 
 def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, ...], tuple[Doubt, ...]]:
@@ -420,7 +369,7 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
             tree, errors = respelled(tree, file)[0], errors + inner
     except SceneError as error:  # no file, no TOML: there is nothing more to look at
         return (error,), ()
-    refused = refusals(tree, file)[1]
+    refused = refusals(tree, file)
     errors += refused
     blamed = {_path_of(error) for error in refused}
     looked_at = _mended(tree, blamed)
@@ -430,7 +379,7 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
     while (wrong := _first(looked_at, file)) is not None:
         path = _path_of(wrong)
         # a tolerance of what is blamed already is not given only because something stands in for that
-        about = {path, _words_of(str(path[1]))} if path[0] == "tolerance" and len(path) == 2 else {path}
+        about = {path, words_of(str(path[1]))} if path[0] == "tolerance" and len(path) == 2 else {path}
         if not any(each[: len(one)] == one for each in about for one in (*blamed, *instead)):
             errors.append(wrong)
             blamed.add(path)
@@ -447,12 +396,7 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
 
 
 def _path_of(error: SceneError) -> Words:
-    return _words_of(error.key or "")
-
-
-def _words_of(key: str) -> Words:
-    """Take a key apart."""
-    return tuple(part[0] or part[2] or int(part[1]) for part in _WORDS.findall(key))
+    return words_of(error.key or "")
 
 
 def _hanging_on(error: SceneError) -> set[Words]:
@@ -475,7 +419,7 @@ def _mended(tree: Tree, blamed: Iterable[Words]) -> Tree | None:
             tree[first].pop(path[1], None)
         else:
             path, example = example_at(path)
-            _at(tree, path[:-1])[path[-1]] = example
+            at(tree, path[:-1])[path[-1]] = example
     return tree
 
 
@@ -498,9 +442,9 @@ def _passed(tree: Tree, error: SceneError, file: str | None) -> Tree | None:
         on = tree.get("effects", {}) | dict.fromkeys(TIPPING, True)
         return None if on == tree.get("effects") else tree | {"model": {}, "effects": on}
     usable: list[Tree] = []
-    for stand_in in _shapes(tree, error) if path == ("part", "vertices") else _stand_ins(_at(tree, path)):
+    for stand_in in _shapes(tree, error) if path == ("part", "vertices") else _stand_ins(at(tree, path)):
         other = copy.deepcopy(tree)
-        node = _at(other, path[:-1])
+        node = at(other, path[:-1])
         if stand_in is not None:
             node[path[-1]] = stand_in
         elif isinstance(node, dict):
@@ -517,16 +461,6 @@ def _passed(tree: Tree, error: SceneError, file: str | None) -> Tree | None:
     if not path or path[0] in NEEDED:
         return None
     return {key: value for key, value in tree.items() if key != path[0]}
-
-
-def _at(tree: Any, path: Words) -> Any:
-    """Return what stands there, None where nothing does."""
-    for word in path:
-        try:
-            tree = tree[word]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return tree
 
 
 def _shapes(tree: Tree, error: SceneError) -> Iterator[Any]:

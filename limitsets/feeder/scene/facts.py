@@ -43,6 +43,10 @@ class Deviation:
         return abs(nominal) * self.value if self.relative else self.value
 
 
+SCATTERED = {"speed": "throw.speed", "landing": "landing.x"}
+"""The quantities whose scatter `[world]` states, by the word that it has for them."""
+
+
 @dataclass(frozen=True)
 class Scatter:
     """Noise at every throw.

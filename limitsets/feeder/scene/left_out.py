@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.base.files import as_table, picked
 from limitsets.base.proposals import proposed
-from limitsets.feeder.scene.facts import FACTS
+from limitsets.feeder.scene.facts import FACTS, SCATTERED
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene.scene import Scene
@@ -22,8 +22,6 @@ CLOCK = "throw_rate"
 
 # What an effect takes into account where the scene has it, besides what the effect needs.
 READ_IF_GIVEN = {"drive": ("friction",)}
-
-SCATTERED = {"speed": "throw.speed", "landing": "landing.x"}
 
 
 @dataclass(frozen=True)

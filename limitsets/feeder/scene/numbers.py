@@ -33,8 +33,16 @@ from limitsets.feeder.geometry import (
 )
 from limitsets.feeder.geometry.polygon import Scalar, Vector
 from limitsets.feeder.scene.facts import TIPPING
-from limitsets.feeder.scene.quantities import LEAST, STANDARD_GRAVITY, Resolver, find, text_at
-from limitsets.feeder.scene.units import density_dimension
+from limitsets.feeder.scene.quantities import (
+    LEAST,
+    STANDARD_GRAVITY,
+    Resolver,
+    base_unit,
+    find,
+    in_units,
+    text_at,
+)
+from limitsets.feeder.scene.units import convert, density_dimension, parse
 
 
 class Shape(NamedTuple):
@@ -99,18 +107,24 @@ class Numbers(ABC):
         """Add up a plate and the point masses on it."""
         return mass_of(vertices, density, points, self.sqrt)
 
+    def lengths(self) -> list[Scalar] | None:
+        """Return the lengths of the sides, where they are given."""
+        sides = self.tree["part"].get("sides")
+        return None if sides is None else [self.number(f"part.sides[{k}]") for k in range(len(sides))]
+
+    def vertices(self, lengths: list[Scalar] | None) -> Sequence[Vector]:
+        """Return the vertices, counterclockwise."""
+        if lengths is not None:
+            return self.triangle(lengths)
+        count = len(self.tree["part"]["vertices"])
+        pairs = [[self.number(f"part.vertices[{k}].{axis}") for axis in "xy"] for k in range(count)]
+        return self.polygon([(x, y) for x, y in pairs])
+
     @cached_property
     def shape(self) -> Shape:
         """The part."""
-        part: Mapping[str, Any] = self.tree["part"]
-        mass, lengths = part["mass"], None
-        if "sides" in part:
-            lengths = [self.number(f"part.sides[{k}]") for k in range(len(part["sides"]))]
-            vertices = self.triangle(lengths)
-        else:
-            count = len(part["vertices"])
-            pairs = [[self.number(f"part.vertices[{k}].{axis}") for axis in "xy"] for k in range(count)]
-            vertices = self.polygon([(x, y) for x, y in pairs])
+        mass, lengths = self.tree["part"]["mass"], self.lengths()
+        vertices = self.vertices(lengths)
         if "center" in mass:
             centre = self.on_side(vertices)
             return Shape(vertices, centre, lengths, self.number("part.mass.radius_of_gyration"))
@@ -132,7 +146,9 @@ class Numbers(ABC):
 
     @cached_property
     def gravity(self) -> Scalar:
-        """Gravity in the plane of the motion [unit/s^2]."""
+        """Gravity in the plane of the motion [unit/s^2]; None where it is not given."""
+        if "gravity" not in self.tree:
+            return None
         if "acceleration" in self.tree["gravity"]:
             return self.number("gravity.acceleration")
         tilt = self.number("gravity.tilt")
@@ -145,6 +161,30 @@ class Numbers(ABC):
             return self.number("throw.kappa")
         speed = self.number("throw.speed")
         return self.gravity / (speed * speed)
+
+
+class Unchecked(Numbers):
+    """The numbers of one scene as floats, as far as they can be read.
+
+    Parameters
+    ----------
+    tree : mapping
+        The scene as text.
+    unit : str
+        Its unit of length.
+    """
+
+    def __init__(self, tree: Mapping[str, Any], unit: str) -> None:
+        super().__init__(tree, lambda square: math.sqrt(max(square, 0.0)), math.sin)
+        self.unit = unit
+
+    def number(self, name: str) -> float:
+        """Return a quantity by its name."""
+        return in_units(self.unit, name, text_at(self.tree, name), key=name)
+
+    def constant(self, text: str, dimension: str, key: str) -> float:
+        """Return what no quantity's name stands for, from its text."""
+        return convert(parse(text, dimension, key=key), base_unit(dimension, self.unit))
 
 
 # ----------------------------------------------------------------
@@ -172,34 +212,32 @@ class Floats(Numbers):
 
     Parameters
     ----------
-    tree : mapping
-        The scene as text, its words checked.
     resolver : Resolver
-        Its unit and file.
+        The scene's text, its unit and file.
     """
 
-    def __init__(self, tree: Mapping[str, Any], resolver: Resolver) -> None:
-        super().__init__(tree, math.sqrt, math.sin)
+    def __init__(self, resolver: Resolver) -> None:
+        super().__init__(resolver.tree, math.sqrt, math.sin)
         self.resolver, self.refusal, self.at = resolver, resolver.refusal, resolver.at
 
     def number(self, name: str) -> float:
         """Return a quantity by its name."""
-        text, dimension = text_at(self.tree, name), find(name).dimension
-        signed = name.startswith(SIGNED) or name.endswith(SIGNED_POINT)
-        value = (self.resolver.value if signed else self.resolver.positive)(text, dimension, name)
-        if name == "gravity.tilt" and not 0 < value <= math.pi / 2:
-            allowed = "above 0 and up to 90 deg"
-            raise self.refusal(name, "the tilt", text, allowed, "90 deg is an upright table")
+        signed, dimension = name.startswith(SIGNED) or name.endswith(SIGNED_POINT), find(name).dimension
+        if not signed:
+            return self.resolver.positive(name, dimension)
+        value = self.resolver.value(name, dimension)
+        upright = name != "gravity.tilt" or 0 < value <= math.pi / 2
+        allowed = "above 0 and up to 90 deg"
+        self.resolver.require(upright, name, "the tilt", allowed, "90 deg is an upright table")
         return value
 
     def constant(self, text: str, dimension: str, key: str) -> float:
         """Return what no quantity's name stands for, from its text and the place of the text."""
         if dimension == "length":
-            return self.resolver.positive(text, dimension, key)
+            return self.resolver.positive(key, dimension)
         # of a scene in um a density in its unit is a small number, and none is ever squared
-        value = self.resolver.value(text, dimension, key)
-        if not value > 0.0:
-            raise self.refusal(key, f"this {dimension}", text, "above 0", "correct it")
+        value = self.resolver.value(key, dimension, text)
+        self.resolver.require(value > 0.0, key, f"this {dimension}", "above 0")
         return value
 
     def triangle(self, lengths: list[float]) -> Sequence[Vector]:
@@ -229,9 +267,8 @@ class Floats(Numbers):
     def on_side(self, vertices: Sequence[Vector]) -> OnSide:
         """Return the centre of mass where it is measured on a side."""
         side, last = self.tree["part"]["mass"]["center"]["side"], len(vertices) - 1
-        if side > last:
-            key = "part.mass.center.side"
-            raise self.refusal(key, "the side", side, f"0 to {last}", "name a side of this part")
+        key, remedy = "part.mass.center.side", "name a side of this part"
+        self.resolver.require(side <= last, key, "the side", f"0 to {last}", remedy)
         centre = super().on_side(vertices)
         with self.at("part.mass.center"):
             require_inside(np.array(vertices), centre.in_frame(vertices), "the centre of mass")
@@ -256,21 +293,12 @@ class Floats(Numbers):
         return Body(vertices, (x, y), radius, sides)
 
     @cached_property
-    def gravity(self) -> float | None:
-        """Gravity in the plane of the motion [unit/s^2]; None where it is not given."""
-        if "gravity" not in self.tree:
-            return None
-        in_plane: float = super().gravity
-        return in_plane
-
-    @cached_property
     def kappa(self) -> float:
         """Gravity over the squared angular speed of the throw [length]."""
-        throw = self.tree["throw"]
         ratio: float = super().kappa
-        if "speed" in throw and not LEAST <= ratio <= 1 / LEAST:
-            allowed = f"gravity/speed^2 from {LEAST:g} to {1 / LEAST:g} {self.resolver.unit}"
-            raise self.refusal("throw.speed", "this angular speed", throw["speed"], allowed, "correct it")
+        good = "kappa" in self.tree["throw"] or LEAST <= ratio <= 1 / LEAST
+        allowed = f"gravity/speed^2 from {LEAST:g} to {1 / LEAST:g} {self.resolver.unit}"
+        self.resolver.require(good, "throw.speed", "this angular speed", allowed)
         return ratio
 
 

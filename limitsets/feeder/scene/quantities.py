@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from limitsets.base.errors import GeometryError, SceneError, shown
 from limitsets.feeder.scene.facts import Deviation
@@ -91,8 +91,7 @@ def _place_of(text: str) -> Place | None:
     pattern = _pattern_of(text)
     if pattern not in NAMES or "[i]" in text:
         return None
-    words = re.split(r"[.\[]", text)
-    path: list[str | int] = [int(word[:-1]) if word.endswith("]") else word for word in words]
+    path = list(words_of(text))
     if path[1] == "vertices":
         path[-1] = "xy".index(str(path[-1]))
     return Place(text, tuple(path), NAMES[pattern])
@@ -126,13 +125,7 @@ def text_at(tree: Mapping[str, Any], name: str) -> Any:
     >>> text_at({"part": {"vertices": [["0 in", "1 in"]]}}, "part.vertices[0].y")
     '1 in'
     """
-    node: Any = tree
-    for word in find(name).path:
-        known = word in node if isinstance(node, Mapping) else isinstance(word, int) and word < len(node)
-        if not known:
-            return None
-        node = node[word]
-    return node
+    return at(tree, find(name).path)
 
 
 def unit_read(tree: Mapping[str, Any], length: str, name: str) -> str:
@@ -307,33 +300,72 @@ LEAST = 1e-12
 """Least size of what has to be above 0, in the scene's units."""
 
 
+# The words of a key: in quotation marks, a number, or plain.
+_WORDS = re.compile(r'"([^"]*)"|\[(\d+)\]|([^.\[\]"]+)')
+
+Words: TypeAlias = tuple[str | int, ...]
+
+
+@functools.lru_cache(maxsize=1024)
+def words_of(key: str) -> Words:
+    """Take a key apart.
+
+    Examples
+    --------
+    >>> words_of('tolerance."part.sides[1]"'), words_of("goal.flip_order[1]")
+    (('tolerance', 'part.sides[1]'), ('goal', 'flip_order', 1))
+    """
+    return tuple(part[0] or part[2] or int(part[1]) for part in _WORDS.findall(key))
+
+
+def at(tree: Any, words: Words) -> Any:
+    """Return what stands there, None where nothing does; the coordinates of a pair are x and y."""
+    try:
+        for word in words:
+            tree = tree["xy".index(str(word)) if isinstance(tree, list) and word in ("x", "y") else word]
+    except (KeyError, IndexError, TypeError):
+        return None
+    return tree
+
+
 @dataclass(frozen=True)
 class Resolver:
-    """Knows the scene's unit of length and its file.
+    """Knows a scene's text, its unit of length and its file.
 
     Parameters
     ----------
+    tree : mapping
+        The scene as text, its words checked.
     unit : str
         The scene's unit of length.
     file : str or None
         Where the scene was read from.
     """
 
+    tree: Tree
     unit: str
     file: str | None
 
-    def value(self, text: str, dimension: str, key: str) -> float:
-        """Give a quantity in the scene's units."""
-        quantity = parse(text, dimension, key=key, file=self.file)
+    def text(self, key: str) -> Any:
+        """Give what stands at a key."""
+        return at(self.tree, words_of(key))
+
+    def value(self, key: str, dimension: str, text: str | None = None) -> float:
+        """Give the quantity at a key, or one that stands for it, in the scene's units."""
+        quantity = parse(text or self.text(key), dimension, key=key, file=self.file)
         return convert(quantity, base_unit(dimension, self.unit))
 
-    def positive(self, text: str, dimension: str, key: str) -> float:
+    def positive(self, key: str, dimension: str) -> float:
         """Give a quantity that has to be above 0, and far enough from it for its square to be a number."""
-        value = self.value(text, dimension, key)
-        if not value >= LEAST:
-            allowed = "above 0" if value <= 0 else f"from {LEAST:g} {base_unit(dimension, self.unit)}"
-            raise self.refusal(key, f"this {dimension}", text, allowed, "correct it")
+        value = self.value(key, dimension)
+        allowed = "above 0" if value <= 0 else f"from {LEAST:g} {base_unit(dimension, self.unit)}"
+        self.require(value >= LEAST, key, f"this {dimension}", allowed)
         return value
+
+    def require(self, holds: bool, key: str, thing: str, allowed: str, remedy: str = "correct it") -> None:
+        """Refuse what stands at a key where something does not hold of it."""
+        if not holds:
+            raise self.refusal(key, thing, self.text(key), allowed, remedy)
 
     def refusal(self, key: str, thing: str, value: object, allowed: str, remedy: str) -> SceneError:
         """Build the error for a key."""
@@ -345,11 +377,7 @@ class Resolver:
         try:
             yield
         except GeometryError as error:
+            remedy = error.remedy.replace("[length]", self.unit)
             raise type(error)(
-                error.thing,
-                error.value,
-                error.allowed,
-                error.remedy.replace("[length]", self.unit),
-                key=key,
-                file=self.file,
+                error.thing, error.value, error.allowed, remedy, key=key, file=self.file
             ) from None

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import errno
-import math
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,12 +18,11 @@ import numpy.typing as npt
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import SceneError, TipsError, shown
 from limitsets.base.files import replaced
-from limitsets.feeder.geometry import OnSide, triangle_of
-from limitsets.feeder.geometry.polygon import Vector
 from limitsets.feeder.scene.facts import TIPPING
-from limitsets.feeder.scene.quantities import base_unit, find, text_at
+from limitsets.feeder.scene.numbers import Unchecked
+from limitsets.feeder.scene.quantities import text_at
 from limitsets.feeder.scene.scene import Scene
-from limitsets.feeder.scene.units import UNITS, convert, parse
+from limitsets.feeder.scene.units import UNITS, parse
 from limitsets.feeder.scene.validation import plain
 
 _MOST_BYTES = 1 << 20
@@ -324,23 +323,20 @@ def sketch(source: str | Path | Mapping[str, Any]) -> Sketch | None:
     >>> sketch({"part": {"vertices": [["0 in", "0 in"], ["4 in", "0 in"], ["4 in", "-1 ft"]]}}).vertices[2].tolist()
     [4.0, -12.0]
     """
+    refused = (SceneError, KeyError, TypeError, ValueError, ZeroDivisionError, IndexError)
     try:
         structure, file = structure_of(source)
         tree = plain(structure, file)
-        part = tree["part"]
-        unit = _unit_of(tree)
-        if "sides" in part:
-            lengths = [_number(tree, f"part.sides[{k}]", unit) for k in range(3)]
-            corners = triangle_of(lengths, lambda square: math.sqrt(max(square, 0.0)))
-        else:
-            count = range(len(part["vertices"]))
-            corners = tuple(
-                (_number(tree, f"part.vertices[{k}].x", unit), _number(tree, f"part.vertices[{k}].y", unit))
-                for k in count
-            )
-        return Sketch(str(tree["name"]), unit, np.array(corners, dtype=float), _centre(tree, unit, corners))
-    except (SceneError, KeyError, TypeError, ValueError, ZeroDivisionError):
+        numbers = Unchecked(tree, _unit_of(tree))
+        vertices = numbers.vertices(numbers.lengths())
+        corners = np.array(vertices, dtype=float)
+    except refused:
         return None
+    centre = None
+    with contextlib.suppress(*refused):
+        x, y = numbers.on_side(vertices).in_frame(vertices)
+        centre = float(x), float(y)
+    return Sketch(str(tree["name"]), numbers.unit, corners, centre)
 
 
 def _unit_of(tree: Mapping[str, Any]) -> str:
@@ -352,18 +348,3 @@ def _unit_of(tree: Mapping[str, Any]) -> str:
         except SceneError:
             continue
     return UNITS["length"][0]
-
-
-def _number(tree: Mapping[str, Any], name: str, unit: str) -> float:
-    dimension = find(name).dimension
-    return convert(parse(text_at(tree, name), dimension, key=name), base_unit(dimension, unit))
-
-
-def _centre(tree: Mapping[str, Any], unit: str, corners: Sequence[Vector]) -> tuple[float, float] | None:
-    try:
-        side = tree["part"]["mass"]["center"]["side"]
-        along, above = (_number(tree, f"part.mass.center.{word}", unit) for word in ("along", "above"))
-        x, y = OnSide(int(side), along, above).in_frame(corners)
-    except (SceneError, KeyError, TypeError, ValueError, IndexError, ZeroDivisionError):
-        return None
-    return float(x), float(y)

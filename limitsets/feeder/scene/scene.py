@@ -18,9 +18,17 @@ from limitsets.base.tables import Column, Table, Tabled, facts
 from limitsets.feeder.geometry import RestingSides
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scene.facts import WITHOUT_EDGE, Deviation, Effects, World
-from limitsets.feeder.scene.quantities import base_unit, find, text_at
+from limitsets.feeder.scene.quantities import (
+    NOISE_ONLY,
+    base_unit,
+    find,
+    in_units,
+    replaced,
+    text_at,
+    unit_read,
+)
 from limitsets.feeder.scene.surroundings import Cavity, Feedback, Tray
-from limitsets.feeder.scene.units import exact_factor, parse, written
+from limitsets.feeder.scene.units import exact_factor, written
 
 if TYPE_CHECKING:
     from limitsets.feeder.thrower import Throw
@@ -267,8 +275,6 @@ class Scene(Tabled):
         >>> load("paper-designed").value("arm.length")
         28.0
         """
-        from limitsets.feeder.scene.quantities import NOISE_ONLY, find, in_units, text_at
-
         find(name, file=self.file)  # an error names the file
         text = text_at(self.text, name)
         if text is not None:
@@ -318,8 +324,6 @@ class Scene(Tabled):
         >>> load("paper-designed").with_values({"arm.length": 30, "throw.kappa": "2 ft"}).kappa
         24.0
         """
-        from limitsets.feeder.scene.quantities import replaced
-
         made = Scene.of(replaced(self.text, self.unit, self.file, values), self.file)
         speed = values.get("throw.speed")
         most_turns = turns(made.arm_length, made.kappa)
@@ -372,10 +376,6 @@ def require_rests(scene: Scene) -> None:
 # The units in which a scene writes its quantities, for what is told of them and for scenes that are made of it.
 
 
-# Of what a scene does not write itself.
-USUAL = {"angular speed": "deg/s", "angle": "deg"}
-
-
 def unit_of(scene: Scene, name: str) -> str:
     """Give the unit in which a scene writes a quantity, or the usual one of its dimension.
 
@@ -385,10 +385,7 @@ def unit_of(scene: Scene, name: str) -> str:
     >>> unit_of(load("paper-designed"), "throw.kappa"), unit_of(load("paper-designed"), "throw.speed")
     ('in', 'deg/s')
     """
-    dimension, text = find(name).dimension, text_at(scene.text, name)
-    if text is not None:
-        return parse(text, dimension).unit
-    return USUAL.get(dimension, base_unit(dimension, scene.unit))
+    return unit_read(scene.text, scene.unit, name)
 
 
 def in_unit_of(scene: Scene, name: str, value: float) -> float:

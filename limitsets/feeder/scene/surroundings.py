@@ -6,7 +6,7 @@ import functools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from decimal import Decimal
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from limitsets.feeder.geometry.polygon import Scalar, Vector, above_side, side_ends
 from limitsets.feeder.scene.quantities import Resolver
+from limitsets.feeder.scene.validation import Tree
 
 if TYPE_CHECKING:
     from limitsets.feeder.goals import Goal
-    from limitsets.feeder.scene.schema import CavityTable, FeedbackTable, SensorTable, TrayTable
     from limitsets.systems.cells import Grid
 
 
@@ -59,58 +59,32 @@ class Cavity:
 
 
 def resolve_cavity(
-    table: CavityTable,
-    feet: Sequence[float],
-    lengths: Sequence[float],
-    arm_length: float,
-    goal: Goal | None,
-    resolver: Resolver,
+    feet: Sequence[float], lengths: Sequence[float], arm_length: float, goal: Goal | None, resolver: Resolver
 ) -> Cavity:
     """Resolve ``[cavity]`` for a part with these a and lengths of its sides."""
-    unit = resolver.unit
-    position = resolver.positive(table.position, "length", "cavity.position")
-    if position > arm_length:
-        allowed = f"up to the arm's length, {arm_length:.9g} {unit}"
-        remedy = "the arm ends where the cavity begins; move the cavity, or lengthen the arm"
-        raise resolver.refusal(
-            "cavity.position", "the position of the cavity", table.position, allowed, remedy
-        )
+    unit, key, thing = resolver.unit, "cavity.position", "the position of the cavity"
+    position = resolver.positive(key, "length")
+    remedy = "the arm ends where the cavity begins; move the cavity, or lengthen the arm"
+    allowed = f"up to the arm's length, {arm_length:.9g} {unit}"
+    resolver.require(position <= arm_length, key, thing, allowed, remedy)
     farthest = max(range(len(feet)), key=feet.__getitem__)
-    if not position > feet[farthest]:
-        allowed = f"more than {feet[farthest]:.6g} {unit}"
-        remedy = f"the part resting on side {farthest} needs that much of the arm; move the cavity outward"
-        raise resolver.refusal(
-            "cavity.position", "the position of the cavity", table.position, allowed, remedy
-        )
+    remedy = f"the part resting on side {farthest} needs that much of the arm; move the cavity outward"
+    resolver.require(position > feet[farthest], key, thing, f"more than {feet[farthest]:.6g} {unit}", remedy)
     wanted = getattr(goal, "side", None)
     side = min(range(len(lengths)), key=lengths.__getitem__) if wanted is None else wanted
-    width = resolver.positive(table.width, "length", "cavity.width")
-    if width < lengths[side]:
-        allowed = f"at least {lengths[side]:.6g} {unit}, the length of side {side}"
-        raise resolver.refusal(
-            "cavity.width",
-            "the width of the cavity",
-            table.width,
-            allowed,
-            "the part cannot lie in it; widen it",
-        )
-    angle = resolver.value(table.angle, "angle", "cavity.angle")
-    if not 0 < angle < math.pi / 2:
-        allowed = "above 0 and below 90 deg"
-        raise resolver.refusal(
-            "cavity.angle", "the angle of the ramp", table.angle, allowed, "measure it downwards from the arm"
-        )
-    depth = resolver.positive(table.depth, "length", "cavity.depth")
-    if depth / math.tan(angle) > width * (1.0 + ROUNDED):
-        allowed = f"at most {width * math.tan(angle):.6g} {unit}, where the ramp meets the far wall"
-        raise resolver.refusal(
-            "cavity.depth",
-            "the depth of the cavity",
-            table.depth,
-            allowed,
-            "the ramp is longer than the cavity: make it less deep, or wider",
-        )
-    return Cavity(position, width, depth, angle, table.tips)
+    width, thing = resolver.positive("cavity.width", "length"), "the width of the cavity"
+    allowed = f"at least {lengths[side]:.6g} {unit}, the length of side {side}"
+    remedy = "the part cannot lie in it; widen it"
+    resolver.require(width >= lengths[side], "cavity.width", thing, allowed, remedy)
+    angle, thing = resolver.value("cavity.angle", "angle"), "the angle of the ramp"
+    allowed, remedy = "above 0 and below 90 deg", "measure it downwards from the arm"
+    resolver.require(0 < angle < math.pi / 2, "cavity.angle", thing, allowed, remedy)
+    depth, most = resolver.positive("cavity.depth", "length"), width * math.tan(angle)
+    allowed = f"at most {most:.6g} {unit}, where the ramp meets the far wall"
+    remedy = "the ramp is longer than the cavity: make it less deep, or wider"
+    fits = depth / math.tan(angle) <= width * (1.0 + ROUNDED)
+    resolver.require(fits, "cavity.depth", "the depth of the cavity", allowed, remedy)
+    return Cavity(position, width, depth, angle, resolver.text("cavity.tips") or "moving")
 
 
 # ----------------------------------------------------------------
@@ -261,53 +235,37 @@ class Feedback:
     sensor: Sensor | None = None
 
 
-def resolve_feedback(
-    table: FeedbackTable, count: int, arm_length: float, resolver: Resolver, *, gravity: bool
-) -> Feedback:
+def resolve_feedback(count: int, arm_length: float, resolver: Resolver, *, gravity: bool) -> Feedback:
     """Resolve ``[feedback]`` for a part with `count` sides on an arm of this length."""
     throws: list[ChosenThrow] = []
-    for k, each in enumerate(table.throws):
+    for k, each in enumerate(resolver.text("feedback.throws")):
         key = f"feedback.throws[{k}]"
-        named = [word for word in ("kappa", "speed") if getattr(each, word) is not None]
-        if len(named) != 1:
-            given = " and ".join(named) or "none"
-            raise resolver.refusal(key, "this throw", given, "kappa or speed", "give it one of the two")
-        if each.name in [other.name for other in throws]:
-            raise resolver.refusal(
-                f"{key}.name", "the name of this throw", each.name, "a name of its own", "choose another"
-            )
-        (word,) = named
-        text = getattr(each, word)
-        resolver.positive(text, "length" if word == "kappa" else "angular speed", f"{key}.{word}")
+        word = "kappa" if "kappa" in each else "speed"
+        unique = each["name"] not in [other.name for other in throws]
+        thing, allowed = "the name of this throw", "a name of its own"
+        resolver.require(unique, f"{key}.name", thing, allowed, "choose another")
+        resolver.positive(f"{key}.{word}", "length" if word == "kappa" else "angular speed")
         if word == "speed" and not gravity:
             remedy = "a speed needs it: add [gravity], or give kappa"
             raise resolver.refusal(f"{key}.speed", "the gravity", "missing", "a table [gravity]", remedy)
-        throws.append(ChosenThrow(each.name, f"throw.{word}", text))
-    sensor = None if table.sensor is None else _sensor(table.sensor, count, arm_length, resolver)
+        throws.append(ChosenThrow(each["name"], f"throw.{word}", each[word]))
+    table = resolver.text("feedback.sensor")
+    sensor = None if table is None else _sensor(table, "feedback.sensor", count, arm_length, resolver)
     return Feedback(tuple(throws), sensor)
 
 
-def _sensor(table: SensorTable, count: int, arm_length: float, resolver: Resolver) -> Sensor:
-    key, named = "feedback.sensor", [word for word in ("beyond", "side") if getattr(table, word) is not None]
-    if len(named) != 1:
-        given = " and ".join(named) or "none"
-        raise resolver.refusal(key, "the sensor", given, "beyond or side", "it answers one question: name it")
-    if table.side is not None:
-        if table.error is not None:
-            remedy = "the error of a place: leave it out"
-            raise resolver.refusal(f"{key}.error", "the error", table.error, "none with side", remedy)
-        if table.side >= count:
-            allowed = f"0 to {count - 1}"
-            raise resolver.refusal(f"{key}.side", "the side", table.side, allowed, "name a side of this part")
-        return SideSensor(table.side)
-    assert table.beyond is not None
-    x = resolver.value(table.beyond, "length", f"{key}.beyond")
-    if not 0 <= x <= arm_length:
-        allowed = f"from 0 to the arm's length, {arm_length:.9g} {resolver.unit}"
-        raise resolver.refusal(f"{key}.beyond", "the sensor's place", table.beyond, allowed, "correct it")
-    error = 0.0 if table.error is None else resolver.value(table.error, "length", f"{key}.error")
-    if error < 0:
-        raise resolver.refusal(f"{key}.error", "the sensor's error", table.error, "0 or more", "correct it")
+def _sensor(table: Tree, key: str, count: int, arm_length: float, resolver: Resolver) -> Sensor:
+    if "side" in table:
+        remedy = "the error of a place: leave it out"
+        resolver.require("error" not in table, f"{key}.error", "the error", "none with side", remedy)
+        there, remedy = table["side"] < count, "name a side of this part"
+        resolver.require(there, f"{key}.side", "the side", f"0 to {count - 1}", remedy)
+        return SideSensor(table["side"])
+    x = resolver.value(f"{key}.beyond", "length")
+    allowed = f"from 0 to the arm's length, {arm_length:.9g} {resolver.unit}"
+    resolver.require(0 <= x <= arm_length, f"{key}.beyond", "the sensor's place", allowed)
+    error = resolver.value(f"{key}.error", "length") if "error" in table else 0.0
+    resolver.require(error >= 0, f"{key}.error", "the sensor's error", "0 or more")
     return BeyondSensor(x, error)
 
 
@@ -353,43 +311,27 @@ def heights_over_sides(
 
 
 def resolve_tray(
-    table: TrayTable,
-    vertices: npt.NDArray[np.float64],
-    lengths: npt.NDArray[np.float64],
-    goal: Goal | None,
-    resolver: Resolver,
+    vertices: npt.NDArray[np.float64], lengths: npt.NDArray[np.float64], goal: Goal | None, resolver: Resolver
 ) -> Tray:
     """Resolve ``[tray]`` for a part with these vertices and lengths of its sides."""
-    names = ("depression_width", "depression_depth", "pitch", "agitation", "wash")
-    sizes = Tray(
-        **{name: resolver.positive(getattr(table, name), "length", f"tray.{name}") for name in names}
-    )
+    sizes = Tray(*(resolver.positive(f"tray.{field.name}", "length") for field in fields(Tray)))
     corners = [(float(x), float(y)) for x, y in vertices]
     heights, wanted = heights_over_sides(corners), getattr(goal, "side", None)
     fit_for = range(len(heights)) if wanted is None else [wanted]
     side = min(fit_for, key=lengths.__getitem__)
-    unit, of_side = resolver.unit, f"of side {side}"
-    if sizes.depression_width < lengths[side]:
-        allowed = f"at least {lengths[side]:.6g} {unit}, the length {of_side}"
-        raise resolver.refusal(
-            "tray.depression_width",
-            "the width of a depression",
-            table.depression_width,
-            allowed,
-            "the part cannot lie in it: widen it",
-        )
+    unit, width, depth = resolver.unit, sizes.depression_width, sizes.depression_depth
+    key, thing, remedy = (
+        "tray.depression_width",
+        "the width of a depression",
+        "the part cannot lie in it: widen it",
+    )
+    allowed = f"at least {lengths[side]:.6g} {unit}, the length of side {side}"
+    resolver.require(width >= lengths[side], key, thing, allowed, remedy)
     highest = max(heights[each] for each in fit_for)
-    if not sizes.depression_depth < highest:
-        allowed = f"below {highest:.6g} {unit}, the height of the part in it"
-        raise resolver.refusal(
-            "tray.depression_depth",
-            "the depth of a depression",
-            table.depression_depth,
-            allowed,
-            "the depression is deeper than the part, and nothing would pop out: make it less deep",
-        )
-    if not sizes.pitch > sizes.depression_width:
-        allowed = f"above the width of a depression, {sizes.depression_width:.6g} {unit}"
-        remedy = "depressions overlap: set them farther apart"
-        raise resolver.refusal("tray.pitch", "the pitch", table.pitch, allowed, remedy)
+    remedy = "the depression is deeper than the part, and nothing would pop out: make it less deep"
+    allowed = f"below {highest:.6g} {unit}, the height of the part in it"
+    resolver.require(depth < highest, "tray.depression_depth", "the depth of a depression", allowed, remedy)
+    allowed = f"above the width of a depression, {width:.6g} {unit}"
+    remedy = "depressions overlap: set them farther apart"
+    resolver.require(sizes.pitch > width, "tray.pitch", "the pitch", allowed, remedy)
     return sizes

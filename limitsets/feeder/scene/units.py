@@ -162,29 +162,32 @@ def parse(
     >>> parse("5.75 in", "length")
     Quantity(number='5.75', unit='in')
     """
+    known = _read(text, dimension) if isinstance(text, str) else _NO_TEXT.format(_EXAMPLES[dimension])
+    if isinstance(known, Quantity):
+        return known
+    percent = '"<decimal number> %" or ' if share and dimension != "share" else ""
     article = "an" if dimension[0] in "aeiou" else "a"
-    example = _EXAMPLES[dimension]
+    other = [sign for sign, unit in _SPELLINGS.items() if unit in UNITS[dimension]]
+    units = ", ".join([*UNITS[dimension], *other[:1]])
+    allowed = f'{percent}{article} {dimension}, "<decimal number> <unit>" with a unit of {units}'
+    raise SceneError(f"this {dimension}", shown(text), allowed, known, key=key, file=file)
 
-    def refuse(value: object, remedy: str) -> SceneError:
-        percent = '"<decimal number> %" or ' if share and dimension != "share" else ""
-        other = [sign for sign, unit in _SPELLINGS.items() if unit in UNITS[dimension]]
-        units = ", ".join([*UNITS[dimension], *other[:1]])
-        allowed = f'{percent}{article} {dimension}, "<decimal number> <unit>" with a unit of {units}'
-        return SceneError(f"this {dimension}", value, allowed, remedy, key=key, file=file)
 
-    if not isinstance(text, str):
-        raise refuse(shown(text), f"write it as text with its unit, like {example}")
+_NO_TEXT = "write it as text with its unit, like {}"
+
+
+@lru_cache(maxsize=4096)  # a scene is read many times in a search, most of it unchanged
+def _read(text: str, dimension: str) -> Quantity | str:
+    """Read a quantity, or say what to do about a text that is none."""
     if len(text) > LONGEST:
-        raise refuse(shown(text), "shorten it")
+        return "shorten it"
     match = _QUANTITY.fullmatch(text.strip(" "))
     if match is None:
-        raise refuse(text, _why_no_quantity(text, dimension))
+        return _why_no_quantity(text, dimension)
     number, unit = match[1], _SPELLINGS.get(match[2], match[2])
     if not (fits(float(number)) or _is_zero(number)):
-        raise refuse(text, f"give 0 or a size from {_SMALLEST:g} to {_LARGEST:g}; choose another unit")
-    if unit not in UNITS[dimension]:
-        raise refuse(text, _why_not_unit(number, unit, dimension))
-    return Quantity(number, unit)
+        return f"give 0 or a size from {_SMALLEST:g} to {_LARGEST:g}; choose another unit"
+    return Quantity(number, unit) if unit in UNITS[dimension] else _why_not_unit(number, unit, dimension)
 
 
 def fits(value: Any) -> Any:

@@ -6,20 +6,16 @@ import copy
 import difflib
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, TypeAlias, get_args
+from typing import Any, NamedTuple, TypeAlias
 
 from limitsets.base.errors import SceneError, shown
+from limitsets.feeder.scene.schema import ByName, Section, Several, schema
 from limitsets.feeder.scene.units import UNITS
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene.schema import SceneTable, Table
-
 
 Tree: TypeAlias = dict[str, Any]
 """A scene as TOML holds it: tables, lists, text, switches and numbers."""
 
 _DEEPEST = 8
-_TABLES = {"model_type": "a table", "dict_type": "a table", "list_type": "a list", "missing": "a value"}
 
 
 def plain(tree: object, file: str | None) -> Tree:
@@ -68,7 +64,34 @@ def _joined(key: str, word: object) -> str:
     return f"{key}.{text}" if key else text
 
 
-def validate(tree: Tree, file: str | None) -> SceneTable:
+class Unknown(NamedTuple):
+    """A key that the schema does not know: the word, the table it stands in, and the schema's table for that place."""
+
+    word: str
+    table: Tree
+    section: Section
+
+
+class Wrong(NamedTuple):
+    """What is wrong at a place of a scene.
+
+    Parameters
+    ----------
+    rank : int
+        0 for an unknown key, 1 for a value, 2 for a missing key, 3 for both of two that exclude each other, or neither:
+        the order in which they are told.
+    error : SceneError
+        What is said of it.
+    unknown : Unknown or None
+        The unknown key.
+    """
+
+    rank: int
+    error: SceneError
+    unknown: Unknown | None = None
+
+
+def validate(tree: Tree, file: str | None) -> None:
     """Check keys, types, numbers and units of a scene.
 
     Raises
@@ -76,92 +99,114 @@ def validate(tree: Tree, file: str | None) -> SceneTable:
     SceneError
         For the first thing wrong, in the order of `refusals`.
     """
-    table, errors = refusals(tree, file)
-    if table is None or errors:
+    errors = refusals(tree, file)
+    if errors:
         raise errors[0]
-    return table
 
 
-def refusals(tree: Tree, file: str | None) -> tuple[SceneTable | None, list[SceneError]]:
-    """Check a scene's words: its tables, and all that is wrong.
+def refusals(tree: Tree, file: str | None) -> list[SceneError]:
+    """Find all that is wrong with a scene's words.
 
     Unknown keys come first, then values, missing keys, and words that exclude or lack each other.
     """
-    model, table, wrong = _read(tree)
-    rank = {"extra_forbidden": 0, "missing": 2}
-    wrong.sort(key=lambda problem: rank.get(problem["type"], 1))
-    errors = [_refusal(problem, model, tree, file) for problem in wrong]
-    return table, [*errors, *_contradictions(tree, file)]
+    wrong = sorted(_wrong(tree, file), key=lambda each: each.rank)
+    return [*(each.error for each in wrong), *_contradictions(tree, file)]
 
 
 def respelled(tree: Tree, file: str | None) -> tuple[Tree, list[SceneError]]:
     """Tell of all unknown keys, each under the name that it is like, where that is free, or else left out."""
-    model, _, wrong = _read(tree)
-    unknown = [problem for problem in wrong if problem["type"] == "extra_forbidden"]
-    errors = [_refusal(problem, model, tree, file) for problem in unknown]
-    tree = copy.deepcopy(tree)
-    for problem in unknown:
-        meant = _meant(problem["loc"], model, tree)
-        node = _table_of(problem["loc"], tree)
-        value = node.pop(problem["loc"][-1])
-        if meant:
-            node[meant] = value
+    tree, errors = copy.deepcopy(tree), []
+    for _, error, unknown in list(_wrong(tree, file)):
+        if unknown is not None:
+            errors.append(error)
+            meant = _meant(unknown)
+            value = unknown.table.pop(unknown.word)
+            if meant:
+                unknown.table[meant] = value
     return tree, errors
 
 
-def _table_of(path: tuple[str | int, ...], tree: Tree) -> Any:
-    node: Any = tree
-    for word in path[:-1]:
-        node = node[word]
-    return node
-
-
-def _meant(path: tuple[str | int, ...], model: type[SceneTable], tree: Tree) -> str | None:
-    """Say which free key an unknown one may stand for: one that is like it, else the only one that is missing."""
-    node, table = _table_of(path, tree), _table_beside(path, model)
-    free = [name for name in sorted(table.model_fields) if name not in node]
-    missing = [name for name in free if table.model_fields[name].is_required()]
-    near = difflib.get_close_matches(str(path[-1])[:64], free, n=1)
-    return near[0] if near else missing[0] if len(missing) == 1 and len(path) > 1 else None
-
-
-def _read(tree: Tree) -> tuple[type[SceneTable], SceneTable | None, list[Any]]:
-    """Read a scene by the schema: the schema, the tables or None, and what is wrong in pydantic's words."""
-    # pydantic takes 0.1 s to import
-    from pydantic import ValidationError
-
-    from limitsets.feeder.scene.schema import scene_table
-
+def _wrong(tree: Tree, file: str | None) -> Iterator[Wrong]:
+    """Check a scene by the schema, in the schema's order."""
     on = tree.get("effects")
-    model = scene_table(with_effects=isinstance(on, dict) and bool(on.keys() - {"auto", "contact"}))
-    try:
-        return model, model.model_validate(tree), []
-    except ValidationError as error:
-        return model, None, list(error.errors(include_url=False))
+    whole = schema(with_effects=isinstance(on, dict) and bool(on.keys() - {"auto", "contact"}))
+    return _wrong_in(tree, whole, "", file)
 
 
-# Tables with one of two words each, and what they are about.
-_ONE_OF = {
-    "part": ("the shape", "sides", "vertices", "sides = [three lengths] or vertices = [[x, y], ...]"),
-    "gravity": ("gravity", "acceleration", "tilt", "acceleration or tilt"),
-    "throw": ("the throw", "kappa", "speed", "kappa or speed"),
-}
+def _wrong_in(value: Any, of: Any, key: str, file: str | None) -> Iterator[Wrong]:
+    if callable(of):
+        try:
+            of(value, key, file)
+        except SceneError as error:
+            yield Wrong(1, error)
+    elif isinstance(of, Section) and isinstance(value, dict):
+        yield from _wrong_in_table(value, of, key, file)
+    elif isinstance(of, Several) and isinstance(value, list):
+        yield from _wrong_in_list(value, of, key, file)
+    elif isinstance(of, ByName) and isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _wrong_in(inner, of.of, _joined(key, name), file)
+    else:
+        wanted = "a list" if isinstance(of, Several) else "a table"
+        yield Wrong(1, SceneError("this entry", shown(value), wanted, "write it so", key=key, file=file))
+
+
+def _wrong_in_table(table: Tree, section: Section, key: str, file: str | None) -> Iterator[Wrong]:
+    for name, entry in section.keys.items():
+        if name in table:
+            yield from _wrong_in(table[name], entry.of, _joined(key, name), file)
+        elif entry.needed:
+            place = _joined(key, name)
+            yield Wrong(
+                2, SceneError("a required key", "missing", "a value for it", "add it", key=place, file=file)
+            )
+    for word in [word for word in table if word not in section.keys]:
+        unknown = Unknown(word, table, section)
+        yield Wrong(0, _refusal(unknown, _joined(key, word), file), unknown)
+    if section.either is not None:
+        thing, words, allowed = section.either
+        given = [word for word in words if word in table]
+        said = " and ".join(given) or f"neither {words[0]} nor {words[1]}"
+        remedy = "give one of them, not both" if given else "give one of them"
+        if len(given) != 1:
+            yield Wrong(3, SceneError(thing, said, allowed, remedy, key=key, file=file))
+
+
+def _wrong_in_list(entries: list[Any], several: Several, key: str, file: str | None) -> Iterator[Wrong]:
+    count, wrong = len(entries), False
+    for index, entry in enumerate(entries if count <= several.most else ()):
+        for each in _wrong_in(entry, several.of, _joined(key, index), file):
+            yield each
+            wrong = True
+    if count > several.most or (count < several.least and not wrong):
+        allowed = f"at least {several.least}" if count < several.least else f"at most {several.most}"
+        remedy = "correct the list"
+        yield Wrong(1, SceneError("the number of entries", count, allowed, remedy, key=key, file=file))
+
+
+def _meant(unknown: Unknown) -> str | None:
+    """Say which free key an unknown one may stand for: one that is like it, else the only one that is missing."""
+    keys = unknown.section.keys
+    free = [name for name in sorted(keys) if name not in unknown.table]
+    missing = [name for name in free if keys[name].needed and "part" not in keys]  # not a whole table
+    near = difflib.get_close_matches(unknown.word[:64], free, n=1)
+    return near[0] if near else missing[0] if len(missing) == 1 else None
+
+
+def _refusal(unknown: Unknown, key: str, file: str | None) -> SceneError:
+    names, meant = sorted(unknown.section.keys), _meant(unknown)
+    near = [meant] if meant else difflib.get_close_matches(unknown.word[:64], names, n=1, cutoff=0.0)
+    remedy = f"it is not known; did you mean {near[0]!r}?" if near else "it is not known; leave it out"
+    return SceneError("the key", shown(unknown.word), ", ".join(names), remedy, key=key, file=file)
 
 
 def _contradictions(tree: Tree, file: str | None) -> Iterator[SceneError]:
-    """Refuse words that exclude each other, half a description, or none; for this no value has to be right."""
-    for key, (thing, one, other, allowed) in _ONE_OF.items():
-        if not isinstance(tree.get(key), dict):
-            continue
-        given = [word for word in (one, other) if word in tree[key]]
-        if len(given) != 1:
-            words = " and ".join(given) or f"neither {one} nor {other}"
-            remedy = "give one of them, not both" if given else "give one of them"
-            yield SceneError(thing, shown(words), allowed, remedy, key=key, file=file)
-        elif given == ["speed"] and "gravity" not in tree:
-            allowed = "acceleration or tilt in [gravity]"
-            remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
-            yield SceneError("gravity", "missing", allowed, remedy, key="throw.speed", file=file)
+    """Refuse half a description, or words that exclude each other; for this no value has to be right."""
+    throw = tree.get("throw")
+    if isinstance(throw, dict) and "speed" in throw and "gravity" not in tree:
+        remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
+        allowed = "acceleration or tilt in [gravity]"
+        yield SceneError("gravity", "missing", allowed, remedy, key="throw.speed", file=file)
     mass = tree["part"].get("mass") if isinstance(tree.get("part"), dict) else None
     if isinstance(mass, dict):
         yield from _contradictions_of_mass(mass, file)
@@ -200,60 +245,3 @@ def _contradictions_of_plate(density: object, thickness: object, file: str | Non
             f"{density} holds the thickness already: leave it out, or give the density in kg/m^3 or g/cm^3"
         )
         yield SceneError("the thickness", shown(thickness), allowed, remedy, key=keys, file=file)
-
-
-def _refusal(problem: Any, table: type[SceneTable], tree: Tree, file: str | None) -> SceneError:
-    kind, path = problem["type"], problem["loc"]
-    key = ""
-    for word in path:
-        key = _joined(key, word)
-    context = problem.get("ctx", {})
-    value = shown(problem["input"])
-    if kind == "refused":
-        return SceneError(context["thing"], value, context["allowed"], context["remedy"], key=key, file=file)
-    if kind == "extra_forbidden":
-        return _unknown(path, key, table, tree, file)
-    if kind == "missing":
-        return SceneError("a required key", "missing", "a value for it", "add it", key=key, file=file)
-    if kind in ("too_short", "too_long"):
-        short = kind == "too_short"
-        allowed = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
-        return SceneError(
-            "the number of entries", context["actual_length"], allowed, "correct the list", key=key, file=file
-        )
-    return SceneError(
-        "this entry", value, _TABLES.get(kind, problem["msg"]), "write it so", key=key, file=file
-    )
-
-
-def _unknown(
-    path: tuple[str | int, ...], key: str, table: type[SceneTable], tree: Tree, file: str | None
-) -> SceneError:
-    names = sorted(_table_beside(path, table).model_fields)
-    word = str(path[-1])
-    meant = _meant(path, table, tree)
-    near = [meant] if meant else difflib.get_close_matches(word[:64], names, n=1, cutoff=0.0)
-    return SceneError(
-        "the key",
-        shown(word),
-        ", ".join(names),
-        f"it is not known; did you mean {near[0]!r}?" if near else "it is not known; leave it out",
-        key=key,
-        file=file,
-    )
-
-
-def _table_beside(path: tuple[str | int, ...], table: type[Table]) -> type[Table]:
-    """Give the table in which an unknown key stands."""
-    for word in path[:-1]:
-        if isinstance(word, str):
-            table = next(model for model in _models_in(table.model_fields[word].annotation))
-    return table
-
-
-def _models_in(annotation: Any) -> list[Any]:
-    from limitsets.feeder.scene.schema import Table
-
-    if isinstance(annotation, type) and issubclass(annotation, Table):
-        return [annotation]
-    return [model for part in get_args(annotation) for model in _models_in(part)]

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from typing import Any, TypeAlias
 
-from limitsets.feeder.thrower.flight import Turned, turn
+from limitsets.feeder.thrower.flight import STILL, Turned, sure_step, turn
 from limitsets.feeder.thrower.motion import (
     DOWN,
     LOST,
@@ -29,24 +29,6 @@ from limitsets.feeder.thrower.motion import (
     side_number,
 )
 from limitsets.numbers.jit import kernel
-
-# ----------------------------------------------------------------
-# A step of a march along a function that cannot pass over its first root.
-#
-# Where f'' >= -bound, f stays positive up to the positive root of the parabola f + f' t - bound t^2/2.  Near a simple
-# root such steps shrink quadratically, near a touching one geometrically.
-
-
-# Steps below this fraction of where the march has got to no longer move it.
-STILL = 2.0**-52
-
-
-@kernel
-def sure_step(f: float, slope: float, bound: float) -> float:
-    """How far a function surely stays positive that is f > 0 now, rises by `slope` and bends by `bound` at most."""
-    root = math.sqrt(slope * slope + 2.0 * bound * f)
-    return (slope + root) / bound if slope > 0.0 else 2.0 * f / (root - slope)
-
 
 # ----------------------------------------------------------------
 # A vertex at rest on the arm, about which the part turns, as far as friction can hold it.

@@ -172,6 +172,17 @@ def _exact(flight: Any, part: Side, x: float) -> tuple[Turned, float, bool]:
 
 
 @kernel
+def sure_step(f: float, slope: float, bound: float) -> float:
+    """How far a function surely stays positive that is f > 0 now, rises by `slope` and bends by `bound` at most.
+
+    Where f'' >= -bound, f stays positive up to the positive root of the parabola f + f' t - bound t^2/2.  Near a simple
+    root such steps of a march shrink quadratically, near a touching one geometrically.
+    """
+    root = math.sqrt(slope * slope + 2.0 * bound * f)
+    return (slope + root) / bound if slope > 0.0 else 2.0 * f / (root - slope)
+
+
+@kernel
 def first_root(part: Side, x: float) -> float:
     """Smallest positive root of f, nan where there is none within a full turn.
 
@@ -192,8 +203,7 @@ def first_root(part: Side, x: float) -> float:
         bend = (part.kappa - part.d) + part.d * at.versin - part.a * at.sin
         here = max(bend + phi * (part.a + 2.0 * part.d * phi) / 3.0, LEAST_BEND * most)
         bound = min(here, most)
-        root = math.sqrt(slope * slope + 2.0 * bound * f)
-        step = (slope + root) / bound if slope > 0.0 else 2.0 * f / (root - slope)
+        step = sure_step(f, slope, bound)
         step = min(step, phi) if here < most else step
         if step <= STILL * phi:
             return phi
@@ -209,33 +219,36 @@ def _exact_surely(flight: Any, part: Side, x: float) -> tuple[Turned, float]:
     return at, -phi / slope
 
 
+def _whole(flight: Any, part: Any) -> Any:
+    return part.kappa
+
+
+def _less_height(flight: Any, part: Any) -> Any:
+    return part.kappa - part.d
+
+
+@generic
+def pull(flight: Any, part: Any) -> Any:
+    """Return what pulls the vertex back in a small-angle flight, phi = 2 (R - a) / pull, for every kind of number."""
+
+
 @kernel
 def _small(flight: Any, part: Side, x: float) -> tuple[Turned, float, bool]:
-    return Turned(2.0 * (x - part.a) / part.kappa, 0.0, 0.0, 0.0), 2.0 / part.kappa, True
+    fall = pull(flight, part)
+    return Turned(2.0 * (x - part.a) / fall, 0.0, 0.0, 0.0), 2.0 / fall, True
 
 
 @kernel
 def _small_surely(flight: Any, part: Side, x: float) -> tuple[Turned, float]:
-    return Turned(2.0 * (x - part.a) / part.kappa, 0.0, 0.0, 0.0), 2.0 / part.kappa
+    at, slope, _ = _small(flight, part, x)
+    return at, slope
 
 
-@kernel
-def _small2(flight: Any, part: Side, x: float) -> tuple[Turned, float, bool]:
-    return (
-        Turned(2.0 * (x - part.a) / (part.kappa - part.d), 0.0, 0.0, 0.0),
-        2.0 / (part.kappa - part.d),
-        True,
-    )
-
-
-@kernel
-def _small2_surely(flight: Any, part: Side, x: float) -> tuple[Turned, float]:
-    return Turned(2.0 * (x - part.a) / (part.kappa - part.d), 0.0, 0.0, 0.0), 2.0 / (part.kappa - part.d)
-
-
+pull.on(SmallAngle, _whole)
+pull.on(SmallAngle2, _less_height)
 impact_angle.on(Exact, _exact)
 impact_angle.on(SmallAngle, _small)
-impact_angle.on(SmallAngle2, _small2)
+impact_angle.on(SmallAngle2, _small)
 sure_impact_angle.on(Exact, _exact_surely)
 sure_impact_angle.on(SmallAngle, _small_surely)
-sure_impact_angle.on(SmallAngle2, _small2_surely)
+sure_impact_angle.on(SmallAngle2, _small_surely)

@@ -27,6 +27,7 @@ from limitsets.feeder.thrower.flight import (
     W6,
     W7,
     Turned,
+    pull,
 )
 from limitsets.feeder.thrower.params import Exact, SideBox, SmallAngle, SmallAngle2
 from limitsets.numbers.interval import Interval
@@ -187,7 +188,7 @@ def _exact_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
 
 
 @proof_kernel
-def _marched(b: SideBox, x: float) -> tuple[Interval, bool]:
+def _marched(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
     """As `_exact_bracket`, however many roots there are: a march that cannot step over the smallest.
 
     With M >= |f''|, f(t + s) >= f(t) + f'(t) s - M s^2/2, so f stays positive up to the positive root of that parabola,
@@ -228,37 +229,22 @@ def _exact_slope(flight: Any, b: SideBox, x: Interval, at: Turned) -> Interval:
 
 @proof_kernel
 def _small_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
-    phi = 2.0 * (x - b.a) / b.kappa
+    phi = 2.0 * (x - b.a) / pull(flight, b)
     return phi, (phi.lo > 0.0) & (phi.hi <= flight.full_turn)
 
 
 @proof_kernel
 def _small_slope(flight: Any, b: SideBox, x: Interval, at: Turned) -> Interval:
-    return 2.0 / b.kappa
+    slope: Interval = 2.0 / pull(flight, b)
+    return slope
 
 
-@proof_kernel
-def _small2_bracket(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
-    phi = 2.0 * (x - b.a) / (b.kappa - b.d)
-    return phi, (phi.lo > 0.0) & (phi.hi <= flight.full_turn)
-
-
-@proof_kernel
-def _small2_slope(flight: Any, b: SideBox, x: Interval, at: Turned) -> Interval:
-    return 2.0 / (b.kappa - b.d)
-
-
-@proof_kernel
-def _exact_surely(flight: Any, b: SideBox, x: float) -> tuple[Interval, bool]:
-    return _marched(b, x)
-
-
-sure_bracket.on(Exact, _exact_surely)
+sure_bracket.on(Exact, _marched)
 sure_bracket.on(SmallAngle, _small_bracket)
-sure_bracket.on(SmallAngle2, _small2_bracket)
+sure_bracket.on(SmallAngle2, _small_bracket)
 bracket.on(Exact, _exact_bracket)
 bracket.on(SmallAngle, _small_bracket)
-bracket.on(SmallAngle2, _small2_bracket)
+bracket.on(SmallAngle2, _small_bracket)
 angle_slope.on(Exact, _exact_slope)
 angle_slope.on(SmallAngle, _small_slope)
-angle_slope.on(SmallAngle2, _small2_slope)
+angle_slope.on(SmallAngle2, _small_slope)

@@ -256,9 +256,9 @@ MOST_STRIKES = 512
 @proof_kernel
 def rested(roll: Any, part: FullSideBox, count: int) -> Ways:
     """Follow all that waits until it rests; without the effect it does so where it came down."""
-    ways = no_way()
+    ways = no_way(0)
     if (count <= 0) | (count > ROOM):
-        return Ways(NOTHING, ways.first, ways.second)
+        return no_way(NOTHING)
     if roll is None:
         for number in range(count):
             row = part.waiting[number]
@@ -270,16 +270,15 @@ def rested(roll: Any, part: FullSideBox, count: int) -> Ways:
         count -= 1
         ways, count = _strike(part, ways, count)
         strikes += 1
-    return ways if count == 0 else Ways(NOTHING, ways.first, ways.second)
+    return ways if count == 0 else no_way(NOTHING)
 
 
 @proof_kernel
 def rested_one_way(roll: Any, part: FullSideBox, count: int) -> Ways:
     """As `rested`, if one side came down and it is decided at every strike what comes next; no way otherwise."""
-    ways = no_way()
-    none = Ways(NOTHING, ways.first, ways.second)
+    ways = no_way(0)
     if count != 1:
-        return none
+        return no_way(NOTHING)
     if roll is None:
         row = part.waiting[0]
         return put(ways, int(row[0]) - part.own.side, False, Interval(row[5], row[6]))
@@ -287,7 +286,7 @@ def rested_one_way(roll: Any, part: FullSideBox, count: int) -> Ways:
     while (count == 1) & (ways.number == 0) & (strikes < MOST_STRIKES):
         ways, count = _strike(part, ways, 0)
         strikes += 1
-    return ways if count == 0 else none
+    return ways if count == 0 else no_way(NOTHING)
 
 
 @proof_kernel
@@ -346,12 +345,6 @@ def _top(tips: bool, beside: bool, top: Interval, side: Interval) -> Interval:
 # ----------------------------------------------------------------
 
 
-@proof_kernel
-def _none() -> Ways:
-    ways = no_way()
-    return Ways(NOTHING, ways.first, ways.second)
-
-
 # Not inlined: images, replays and the argument near the joint would each compile it anew.
 @generic(proof=True, inlined=False)
 def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
@@ -361,7 +354,7 @@ def full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: In
 @proof_kernel
 def _full_ways(part: FullSideBox, x: Interval, state: int, phi: Interval, jog: Interval) -> Ways:
     if (state == NOTHING) | (not all_enclosed(part.effects)):
-        return _none()
+        return no_way(NOTHING)
     count = landed(entry_of(part.effects, Landing), part, x, phi, jog)
     return rested(entry_of(part.effects, Roll), part, count)
 

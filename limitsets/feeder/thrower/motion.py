@@ -431,10 +431,10 @@ def wait(
 
 
 @proof_kernel
-def no_way() -> Ways:
-    """Nothing yet."""
+def no_way(number: int) -> Ways:
+    """Nothing yet, or that nothing is known."""
     none = Way(0, 0, math.inf, -math.inf)
-    return Ways(0, none, none)
+    return Ways(number, none, none)
 
 
 @proof_kernel

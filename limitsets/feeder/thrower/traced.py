@@ -39,19 +39,12 @@ details.on(Throw, _details)
 
 
 @kernel(entry=True)
-def _all_details(
-    params: Any, x: Any, side: Any, phi_out: Any, shift_out: Any, turned: Any, other: Any
-) -> None:
+def _all_details(params: Any, x: Any, side: Any, path: bool, seen: Any) -> None:
+    phi, shift, turned, other = seen
     for k in range(x.size):
-        phi_out[k], shift_out[k], turned[k], other[k] = details(params, x[k], side[k])
-
-
-@kernel(entry=True)
-def _path_details(
-    params: Any, x: Any, side: Any, phi_out: Any, shift_out: Any, turned: Any, other: Any
-) -> None:
-    for k in range(x.size):  # throw number k of start number 0, as `orbit` draws them where throws scatter
-        phi_out[k], shift_out[k], turned[k], other[k] = details(scattered(params, 0, k), x[k], side[k])
+        # along a path throw number k of start number 0, as `orbit` draws them where throws scatter
+        throw = scattered(params, 0, k) if path else params
+        phi[k], shift[k], turned[k], other[k] = details(throw, x[k], side[k])
 
 
 @kernel(entry=True)
@@ -117,12 +110,11 @@ class Flight:
     barrier: float
 
 
-def _seen(kernel_of: Any, params: Any, x: Any, side: Any) -> tuple[Any, Any, Any, Any]:
+def _seen(params: Any, x: Any, side: Any, *, path: bool) -> tuple[Any, Any, Any, Any]:
     """Return the details of many throws: angles, displacements, sides turned, flags."""
-    phi, shift = np.empty(x.size), np.empty(x.size)
-    turned, other = np.empty(x.size, np.int64), np.empty(x.size, np.bool_)
-    kernel_of(params, x, side, phi, shift, turned, other)
-    return phi, shift, turned, other
+    seen = np.empty(x.size), np.empty(x.size), np.empty(x.size, np.int64), np.empty(x.size, np.bool_)
+    _all_details(params, x, side, path, seen)
+    return seen
 
 
 def _check_side(params: Throw | FullThrow, side: int) -> None:
@@ -178,7 +170,7 @@ def trace(params: Throw | FullThrow, x: float, side: int, count: int = 1) -> Tra
         )
     path = orbit(params, x, side, count)
     made = path.code.size
-    phi, shift, turned, other = _seen(_path_details, params, path.x[:made], path.side[:made])
+    phi, shift, turned, other = _seen(params, path.x[:made], path.side[:made], path=True)
     outside = path.code == codes.OUTSIDE_MODEL
     phi[outside] = shift[outside] = math.nan
     other &= ~outside
@@ -241,7 +233,7 @@ def impact_angles(params: Throw | FullThrow, x: ArrayLike, side: int) -> NDArray
     _check_side(params, side)
     starts = np.ascontiguousarray(x, dtype=np.float64)
     count = starts.size
-    phi, _, _, _ = _seen(_all_details, params, starts, np.full(count, side, dtype=np.int64))
+    phi, _, _, _ = _seen(params, starts, np.full(count, side, dtype=np.int64), path=False)
     inside = _rests(params, side) & (starts > params.a[side]) & (phi > 0.0) & (phi <= params.flight.full_turn)
     return np.where(inside, phi, math.nan)
 

@@ -13,7 +13,7 @@ import math
 from typing import Any, NamedTuple
 
 from limitsets.feeder.thrower.effects.drive import Drive, pulled
-from limitsets.feeder.thrower.flight import Turned, turn
+from limitsets.feeder.thrower.flight import STILL, Turned, sure_step, turn
 from limitsets.feeder.thrower.impact import jog_displacement
 from limitsets.feeder.thrower.motion import (
     Arrival,
@@ -26,9 +26,6 @@ from limitsets.feeder.thrower.motion import (
 )
 from limitsets.feeder.thrower.throw import settle
 from limitsets.numbers.jit import entry_of, kernel
-
-# Steps of the march below this fraction of phi no longer move it.
-STILL = 2.0**-52
 
 
 class Landing(NamedTuple):
@@ -64,8 +61,7 @@ def _lowest_root(part: FullSide, x: float, corner: float) -> tuple[float, int]:
             f, slope = _height(part, x, k, turn(phi))
             if f <= 0.0:
                 return phi, vertex
-            root = math.sqrt(slope * slope + 2.0 * bound * f)
-            step = (slope + root) / bound if slope > 0.0 else 2.0 * f / (root - slope)
+            step = sure_step(f, slope, bound)
             if step <= STILL * phi:
                 return phi, vertex
             phi += step

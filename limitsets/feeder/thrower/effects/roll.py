@@ -73,7 +73,7 @@ def _rolls(roll: Any, part: FullSide, face: Face, after: Contact) -> bool:
         return False
     if tips(part, face.side) != 0:
         return True
-    lift = min(_left_lift(part, face.side), _right_lift(part, face.side))  # over the nearer end
+    lift = min(_lift(part, face.side, 1), _lift(part, face.side, -1))  # over the nearer end
     right = right_of(part, after.vertex, after.psi)
     along, up = after.slide - after.omega * part.d[side_number(part, face.side)], after.omega * right
     turning = part.own.rho2 * after.omega * after.omega + up * up
@@ -92,28 +92,17 @@ def next_arrival(roll: Any, bounce: Any, slip: Any, part: FullSide, face: Face) 
 
 
 @kernel
-def _lift(part: FullSide, foot: float, d: float) -> float:
-    """Energy it takes from lying on a side to the top over one of its ends, which is `foot` left of the centre."""
-    gravity, right, high = leant(entry_of(part.effects, Drive), part.own.kappa, foot, d)
+def _lift(part: FullSide, side: int, way: int) -> float:
+    """Energy to get over an end of a side, `way` 1 the left and -1 the right one.
+
+    To the top, or on to a next side that is lower than that.
+    """
+    k, beside = side_number(part, side), side_number(part, side + way)
+    if way * tips(part, side + way) < 0:
+        return part.own.kappa * (part.d[beside] - part.d[k])  # type: ignore[no-any-return]  # kernels take arrays as Any
+    foot = part.a[k] if way > 0 else part.a[k] - part.length[k]
+    gravity, right, high = leant(entry_of(part.effects, Drive), part.own.kappa, foot, part.d[k])
     return gravity * right * right / (math.hypot(right, high) + high)  # ell - H
-
-
-@kernel
-def _left_lift(part: FullSide, side: int) -> float:
-    """Energy to get over the left end of a side: to the top, or on to a next side that is lower than that."""
-    k, after = side_number(part, side), side_number(part, side + 1)
-    if tips(part, side + 1) < 0:
-        return part.own.kappa * (part.d[after] - part.d[k])  # type: ignore[no-any-return]  # kernels take arrays as Any
-    return _lift(part, part.a[k], part.d[k])
-
-
-@kernel
-def _right_lift(part: FullSide, side: int) -> float:
-    """Energy to get over the right end of a side, see `_left_lift`."""
-    k, before = side_number(part, side), side_number(part, side - 1)
-    if tips(part, side - 1) > 0:
-        return part.own.kappa * (part.d[before] - part.d[k])  # type: ignore[no-any-return]  # kernels take arrays as Any
-    return _lift(part, part.a[k] - part.length[k], part.d[k])
 
 
 @kernel
