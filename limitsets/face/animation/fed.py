@@ -34,7 +34,7 @@ from limitsets.face.animation.legs import (
     swing_of,
 )
 from limitsets.face.animation.picture import cavity_pieces
-from limitsets.face.plot.throwing import Throw, angle_on_side, motion, outline, throws_of
+from limitsets.face.plot.throwing import Throw, angle_on_side, motion, outline, pendulum_until, throws_of
 from limitsets.feeder.engine.member import ground_of
 from limitsets.systems.maps import codes
 
@@ -173,10 +173,15 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
     most = _first_contact(cavity, about_end)
     inertia = scene.radius_of_gyration**2 + beyond**2 + d**2
     rate = rate_about_end(scene, throw.x, side, beyond) if throw.code == codes.JOG else 0.0
-    time, angle_at = _tipping((rate, beyond, d), inertia, gravity, most)
+    # an inverted pendulum at e from the top needs ln(d/e) of its time constants, and a few more
+    patience = 40.0 + max(0.0, math.log(d / max(beyond, 1e-300)))
+    longest, arm = patience * math.sqrt(inertia / (gravity * d)), np.array([beyond, d])
+    tipping = pendulum_until(arm, -rate, (-most, math.inf), inertia, (0.0, -gravity), longest=longest)
+    assert tipping is not None  # it has time enough
+    time, _, turned_at, _ = tipping
     tips = leg(
         time * pace.unit,
-        lambda share: pose(angle_at(share * time), 0.0 * share, 0.0 * share),
+        lambda share: pose(np.minimum(-turned_at(share * time), most), 0.0 * share, 0.0 * share),
         f"It tips over the end: {words}",
         begins=True,
     )
@@ -214,33 +219,6 @@ def _first_contact(cavity: Cavity, about_end: Array) -> float:
         if room(after) < 0.0:
             return float(brentq(room, before, after)) if room(before) > 0.0 else before
     return cavity.angle
-
-
-def _tipping(
-    begins: tuple[float, float, float], inertia: float, gravity: float, most: float
-) -> tuple[float, Callable[[Array], Array]]:
-    """Time to tip by an angle from a rate, e and d, and the angle over time."""
-    from scipy.integrate import solve_ivp
-
-    rate, beyond, height = begins
-
-    def rates(_: float, state: Array) -> list[float]:
-        sine, cosine = math.sin(state[0]), math.cos(state[0])
-        return [float(state[1]), gravity * (height * sine + beyond * cosine) / inertia]
-
-    def down(_: float, state: Array) -> float:
-        return float(state[0]) - most
-
-    down.terminal = True  # type: ignore[attr-defined]  # scipy reads it there
-    # an inverted pendulum at e from the top needs ln(d/e) of its time constants, and a few more
-    patience = (40.0 + max(0.0, math.log(height / max(beyond, 1e-300)))) * math.sqrt(
-        inertia / (gravity * height)
-    )
-    fall = solve_ivp(
-        rates, (0.0, patience), [0.0, rate], "DOP853", dense_output=True, events=down, rtol=1e-10, atol=1e-14
-    )
-    end, solution = float(fall.t[-1]), fall.sol
-    return end, lambda at: np.minimum(solution(at)[0], most)
 
 
 def _slide(cavity: Cavity, about_end: Array) -> float:

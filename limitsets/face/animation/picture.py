@@ -299,15 +299,17 @@ class Picture:
             corners = self.at(self.film.arm_polygon(k, THICK * self.film.surface[1] / 28.0))
             yield shape_of("polygon", corners, fill=ARM, what="arm")
             yield shape_of("line", corners[:2], stroke=style.INK, width=2.2)
-            ring = {"fill": "#ffffff", "stroke": style.INK, "width": 1.6}
-            yield shape_of("circle", self.origin, radius=5.5, what="joint", **ring)
+            yield shape_of(
+                "circle", self.origin, radius=5.5, what="joint", fill="#ffffff", stroke=style.INK, width=1.6
+            )
 
     def _trail(self, k: int) -> Iterator[Shape]:
         first, last = (int(frame) for frame in self.film.trail[k])
         if last > first:
             path = self.at(self.film.poses[first : last + 1, 0, :2])
-            dots = {"stroke": "#a9a9a9", "width": 1.0, "dash": (3.0, 3.0)}
-            yield closed(self.at(self.film.polygon(first)), what="left", **dots)
+            yield closed(
+                self.at(self.film.polygon(first)), what="left", stroke="#a9a9a9", width=1.0, dash=(3.0, 3.0)
+            )
             yield shape_of("line", path, stroke=style.FLIP, width=1.6, dash=(5.0, 3.0), what="trail")
 
     def _part(self, k: int, part: int) -> Iterator[Shape]:
@@ -322,8 +324,7 @@ class Picture:
             px, py = self.at((x + cos * label.x - sin * label.y, y + sin * label.x + cos * label.y))
             yield text_of(label.word, px, py + 4.5, anchor="middle", size=13.0, what="label")
         if film.labels[part]:
-            dot = {"fill": "#ffffff", "stroke": style.INK, "width": 1.4}
-            yield shape_of("circle", self.at((x, y)), radius=3.2, **dot)
+            yield shape_of("circle", self.at((x, y)), radius=3.2, fill="#ffffff", stroke=style.INK, width=1.4)
 
     def _marks(self, k: int) -> Iterator[Shape]:
         for mark in self.film.marks:
@@ -344,8 +345,9 @@ class Picture:
         px, y = self.place(x), self.height(side)
         centre = self.at(film.poses[k, 0, :2])
         if abs(float(centre[0]) - px) < LEANS:
-            dots = {"stroke": "#7d7d7d", "width": 0.9, "dash": (1.5, 2.5)}
-            yield shape_of("line", [centre, (px, y)], what="plumb", **dots)
+            yield shape_of(
+                "line", [centre, (px, y)], what="plumb", stroke="#7d7d7d", width=0.9, dash=(1.5, 2.5)
+            )
         yield shape_of("circle", (px, y), what="here", fill=style.FLIP, radius=6.5, **WHITE | {"width": 1.4})
 
 

@@ -96,8 +96,9 @@ __all__ = [*_FILES]
 
 def __getattr__(name: str) -> Any:
     if name not in _FILES:
-        own = sys.modules[__name__]
-        raise AttributeError(f"module 'limitsets.plot' has no attribute {name!r}", name=name, obj=own)
+        raise AttributeError(
+            f"module 'limitsets.plot' has no attribute {name!r}", name=name, obj=sys.modules[__name__]
+        )
     return getattr(import_module(f"limitsets.face.plot.{_FILES[name]}"), name)
 
 

@@ -156,8 +156,9 @@ def _painted(
             line.set_gid("level")
             handles.append(style.key(level[1], color=style.INK, lw=0.9))
     if not there.all():
-        look: dict[str, Any] = {"fc": NOTHING, "ec": style.INK, "hatch": NOTHING_HATCH, "lw": 0.5}
-        handles.append(Patch(label="none, or undecided", **look))
+        handles.append(
+            Patch(label="none, or undecided", fc=NOTHING, ec=style.INK, hatch=NOTHING_HATCH, lw=0.5)
+        )
     return handles
 
 

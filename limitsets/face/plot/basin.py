@@ -72,8 +72,9 @@ def basins(source: Any, shares: Basins, found: Any = None) -> Figure:
     """
     grid = shares.grid
     if grid.dimension > 2:
-        remedy = "draw a section of them yourself"
-        raise AnswerError("the dimension of the basins", grid.dimension, "1 or 2", remedy)
+        raise AnswerError(
+            "the dimension of the basins", grid.dimension, "1 or 2", "draw a section of them yourself"
+        )
     (name, unit), line = _words(source), grid.dimension == 1
     sets: list[Any] = []
     if found is not None:
@@ -100,8 +101,9 @@ def _cells_of(attractors: Any) -> list[CellSet]:
     several = attractors if isinstance(attractors, Iterable) else [attractors]
     cells: list[Any] = [getattr(attractor, "cells", None) for attractor in several]
     if not all(isinstance(cell_set, CellSet) for cell_set in cells):
-        kind = type(attractors).__name__
-        raise AnswerError("what to draw", kind, "attractors", "pass those of ls.attractors")
+        raise AnswerError(
+            "what to draw", type(attractors).__name__, "attractors", "pass those of ls.attractors"
+        )
     return cells
 
 
@@ -307,8 +309,7 @@ def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, fe
 
 def _arrow(axes: Axes, start: Place, end: Place, *, dotted: bool) -> None:
     head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 11, "shrinkA": 13, "shrinkB": 16}
-    line: dict[str, Any] = {"color": "#555555", "lw": 1.0, "ls": ":" if dotted else "-"}
-    axes.add_patch(FancyArrowPatch(start, end, **head, **line))
+    axes.add_patch(FancyArrowPatch(start, end, **head, color="#555555", lw=1.0, ls=":" if dotted else "-"))
 
 
 def _title(whole: nx.DiGraph[int], drawn: nx.DiGraph[Any], name: str) -> str:

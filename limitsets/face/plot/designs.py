@@ -125,11 +125,10 @@ def _frame(axes: Axes, solution: Design, sets: Sequence[Sequence[Extents]], dept
 
 
 def _legend(solution: Design, count: int, several: bool) -> list[Any]:
-    mark = {"color": style.FLIP, "marker": "|", "ms": 10, "mew": 2.2, "ls": ""}
     return [
         *(Patch(label=f"limit set on side {k}", lw=0.8, **style.of_set(k)) for k in range(count)),
         Patch(label="another limit set", **ANOTHER) if several else None,
-        style.key("first critical point", **mark),
+        style.key("first critical point", color=style.FLIP, marker="|", ms=10, mew=2.2, ls=""),
         style.key_of_goal(solution.start),
     ]
 

@@ -63,7 +63,7 @@ def feeding(found: Feeding) -> Figure:
         panels.insert(1, _tipping)
     if found.curve is not None:
         panels.append(_levels)
-    figure, frames = style.pairs(len(panels), 3.6)
+    figure, frames = style.panels(len(panels), 2, (4.8, 3.6), (0.0, 0.3))
     for draw, axes in zip(panels, frames, strict=True):
         draw(axes, found)
     words = f"side {found.end.side} wanted beyond x = {found.end.x:g} {scene.unit}"
@@ -199,7 +199,7 @@ def assembly(found: Assembly) -> Figure:
         both parts at rest, and faintly on their way in the last throw; without, the throws until each part is fed.
     """
     cases = [name for name in OUTCOMES if found.contact != "none" and found.example(name) is not None]
-    figure, (shares, *frames) = style.pairs(1 + (len(cases) or 1), 3.3)
+    figure, (shares, *frames) = style.panels(1 + (len(cases) or 1), 2, (4.8, 3.3), (0.0, 0.3))
     _outcomes(shares, found)
     for axes, name in zip(frames, cases, strict=False):
         _case(axes, found, name)
@@ -224,16 +224,14 @@ def _outcomes(axes: Axes, answer: Assembly) -> None:
         style.note(axes, f"{rate.count}", (high, row), (4, -3))
     names = [WORDS_OF_PAIRS[name] for name in reversed(shown)]
     axes.set_yticks(range(len(shown)), names, fontsize=style.SMALL)
-    below = "share of the trials, 95 % interval"
-    style.panel(axes, "what becomes of a pair", xlim=(0.0, 1.15), xlabel=below)
+    style.panel(axes, "what becomes of a pair", xlim=(0.0, 1.15), xlabel="share of the trials, 95 % interval")
 
 
 def _throws_of_pairs(axes: Axes, answer: Assembly) -> None:
     for k, (scene, (_, edge)) in enumerate(zip(answer.pair.scenes, PARTS, strict=True)):
         right = np.sort([row["throws"][k] for row in answer.rows if row["fates"][k] == "right"])
         share = np.arange(1, right.size + 1) / len(answer.rows)
-        look = {"color": edge["ec"], "ls": edge["ls"], "lw": 1.3}
-        axes.step(right, share, where="post", label=scene.name, **look)
+        axes.step(right, share, where="post", label=scene.name, color=edge["ec"], ls=edge["ls"], lw=1.3)
     style.panel(
         axes,
         "fed rightly, each part by itself",

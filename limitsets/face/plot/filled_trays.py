@@ -149,8 +149,9 @@ def _crowds(axes: Axes, filling: TrayFill, places: NDArray[np.intp]) -> None:
             shown.append((crowd.right + crowd.covered, "white", "the same, also under others"))
         for counts, face, label in shown:
             shares, ends = (each[places] for each in crowd.share(counts))
-            look = {"marker": "^", "ms": 4.5, "color": colour, "mfc": face, "label": label}
-            _with_ends(axes, places * shift, shares, ends, **look)
+            _with_ends(
+                axes, places * shift, shares, ends, marker="^", ms=4.5, color=colour, mfc=face, label=label
+            )
 
 
 def _shares(axes: Axes, filling: TrayFill) -> None:
@@ -211,5 +212,4 @@ def _memory(axes: Axes, filling: TrayFill) -> None:
         height -= 0.5
     axes.set_yticks(list(names), list(names.values()), fontsize=style.SMALL)
     title = "does it forget? dots: new parts, squares: parts return"
-    below = "share in the histories, with 95 % interval"
-    style.panel(axes, title, xlim=(0.0, None), xlabel=below)
+    style.panel(axes, title, xlim=(0.0, None), xlabel="share in the histories, with 95 % interval")

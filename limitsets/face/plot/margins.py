@@ -140,8 +140,7 @@ def margin_curve(found: MarginsBeyond) -> Figure:
         most = 1.12 * max(float(np.nanmax([*refuted, top])), 1e-12)
         measure = f"{name} [{unit or 'times the tolerance'}]"
         style.panel(axes, legend="" if k else "upper right", ylabel=measure, ylim=(0.0, most))
-    below = f"X, beyond which only side {found.side} [{found.scene.unit}]"
-    panels[-1].set_xlabel(below, fontsize=style.TEXT)
+    panels[-1].set_xlabel(f"X, beyond which only side {found.side} [{found.scene.unit}]", fontsize=style.TEXT)
     return style.finished(figure, f"{found.scene.name}: margins against X")
 
 
@@ -274,8 +273,9 @@ def counterexample(
         label = f"on side {sides[-1]}, {x[-1] - violated.x:.2g} {scene.unit} beyond"
         handles.append(style.key(label, **RING))
     if onward:
-        look = {"color": style.FAINT, "ls": ":", "marker": "o", "mfc": "white"}
-        handles.append(style.key("thrown on, in the scene as it is", **look))
+        handles.append(
+            style.key("thrown on, in the scene as it is", color=style.FAINT, ls=":", marker="o", mfc="white")
+        )
     words = f"{scene.name}: an orbit that violates the goal{' at once' * (len(orbit) == 1)}"
     return style.finished(figure, f"{words}\n{name}" if name else words, handles)
 

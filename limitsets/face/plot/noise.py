@@ -41,8 +41,9 @@ WORDS = {
 
 def _main(statistics: NoiseStatistics) -> NoisyClass:
     if not statistics.classes:
-        remedy = "nothing stays: nothing to draw"
-        raise AnswerError("the classes of the noisy scene", "none", "one at least", remedy)
+        raise AnswerError(
+            "the classes of the noisy scene", "none", "one at least", "nothing stays: nothing to draw"
+        )
     return max(statistics.classes, key=lambda part: len(part.cells))
 
 

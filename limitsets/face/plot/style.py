@@ -103,8 +103,9 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
         )
     domain = source.grid.domain
     if source.grid.dimension > 1:
-        remedy = "draw its basins, or a section of it"
-        raise AnswerError("the dimension of the map", source.grid.dimension, "1", remedy)
+        raise AnswerError(
+            "the dimension of the map", source.grid.dimension, "1", "draw its basins, or a section of it"
+        )
     kind = kind_of(source.map)
     return Subject(
         type(source.map).__name__,
@@ -163,28 +164,19 @@ def canvas(
     return figure, list(grid.ravel())
 
 
-def pairs(count: int, tall: float) -> tuple[Figure, list[Axes]]:
-    """Make a figure of so many panels in two columns, each row so tall [inches]."""
-    rows = math.ceil(count / 2)
-    figure, frames = canvas(9.6, tall * rows + 0.3, rows, 2)
-    for axes in frames[count:]:
-        axes.set_axis_off()
-    return figure, frames[:count]
-
-
 def panels(
-    count: int, columns: int, size: tuple[float, float], room: tuple[float, float], below: str
+    count: int, columns: int, size: tuple[float, float], room: tuple[float, float], below: str = ""
 ) -> tuple[Figure, list[Axes]]:
-    """Make a figure of panels that share their limits, and label the lowest in each column.
+    """Make a figure of panels; with a label, `below`, they share their limits, and the lowest in each column has it.
 
     `size` is the size of a panel, `room` the border around all of them [inches].
     """
-    rows = math.ceil(count / columns)
+    rows, shared = math.ceil(count / columns), bool(below)
     wide, tall = size[0] * columns + room[0], size[1] * rows + room[1]
-    figure, frames = canvas(wide, tall, rows, columns, sharex=True, sharey=True)
+    figure, frames = canvas(wide, tall, rows, columns, sharex=shared, sharey=shared)
     for axes in frames[count:]:
         axes.set_axis_off()
-    for k, axes in enumerate(frames[:count]):
+    for k, axes in enumerate(frames[:count] if shared else ()):
         lowest = k + columns >= count
         axes.xaxis.set_tick_params(labelbottom=lowest)
         axes.set_xlabel(below if lowest else "")
@@ -201,8 +193,9 @@ def extents_of(source: Any) -> list[Extents]:
         known = [part for part in parts if isinstance(part, Mapping)]
         if len(known) == len(parts):
             return known
-    allowed = "attractors, limit sets or an analysis"
-    raise AnswerError("what to draw", type(source).__name__, allowed, "pass one of these")
+    raise AnswerError(
+        "what to draw", type(source).__name__, "attractors, limit sets or an analysis", "pass one of these"
+    )
 
 
 def ends_of(sets: Iterable[Extents]) -> list[float]:
