@@ -34,7 +34,15 @@ from limitsets.face.animation.legs import (
     swing_of,
 )
 from limitsets.face.animation.picture import cavity_pieces
-from limitsets.face.plot.throwing import Throw, angle_on_side, motion, outline, pendulum_until, throws_of
+from limitsets.face.plot.throwing import (
+    Throw,
+    angle_on_side,
+    motion,
+    outline,
+    pendulum_until,
+    throws_of,
+    turned,
+)
 from limitsets.feeder.engine.member import ground_of
 from limitsets.systems.maps import codes
 
@@ -200,18 +208,12 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
     return [tips, slides, stays._replace(marks=((0.0, "in the cavity", *hinge.tolist()),))]
 
 
-def _corners(about_end: Array, tipped: float) -> Array:
-    cos, sin = math.cos(tipped), math.sin(tipped)
-    corners: Array = about_end @ np.array([[cos, -sin], [sin, cos]])
-    return corners
-
-
 def _first_contact(cavity: Cavity, about_end: Array) -> float:
     """Angle at which a corner meets the far wall or the floor, or the side the ramp [rad]."""
     from scipy.optimize import brentq
 
     def room(tipped: float) -> float:
-        corners = _corners(about_end, tipped)
+        corners = turned(about_end, -tipped)
         return float(min((cavity.width - corners[:, 0]).min(), (corners[:, 1] + cavity.depth).min()))
 
     angles = np.linspace(0.0, cavity.angle, ANGLES)
@@ -223,7 +225,7 @@ def _first_contact(cavity: Cavity, about_end: Array) -> float:
 
 def _slide(cavity: Cavity, about_end: Array) -> float:
     """Distance that the part slides down the ramp until a corner meets the wall or the floor [length]."""
-    corners = _corners(about_end, cavity.angle)
+    corners = turned(about_end, -cavity.angle)
     wall = (cavity.width - corners[:, 0]) / math.cos(cavity.angle)
     floor = (cavity.depth + corners[:, 1]) / math.sin(cavity.angle)
     return max(0.0, float(min(wall.min(), floor.min())))

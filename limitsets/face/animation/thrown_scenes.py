@@ -18,6 +18,8 @@ from limitsets.face.animation.legs import (
     rest_leg,
 )
 from limitsets.face.plot.throwing import Throw, throws_of
+from limitsets.feeder.thrower import trace
+from limitsets.feeder.thrower.motion import FullThrow
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
@@ -50,8 +52,6 @@ def film_of_throws(
     scene: Scene, start: tuple[float, int], count: int, pace: Pace, lanes: Lanes | None = None
 ) -> Film:
     """Show `count` throws of a scene from a start; without lanes nothing is analysed."""
-    from limitsets.feeder.thrower import trace
-
     x, side = start
     path = trace(scene.map, x, side, count)
     made = throws_of(scene, path)
@@ -116,9 +116,6 @@ def film_of_margin(margin: Margin, asked: Asked) -> Film:
 
 def _thrown(scene: Scene, here: Any) -> Throw:
     """Throw a state as the proof does: with its own kappa, and with the noise of its landing added."""
-    from limitsets.feeder.thrower import trace
-    from limitsets.feeder.thrower.motion import FullThrow
-
     params = scene.map
     if here.kappa is not None:
         bare = scene.bare_map._replace(kappa=here.kappa)
@@ -194,8 +191,6 @@ def _words(synthesis: Synthesis, step: _Step) -> str:
 
 def _run(synthesis: Synthesis, policy: Policy, x: float, side: int) -> list[_Step]:
     """Follow the policy's table: each throw is without noise, each answer of the sensor without error."""
-    from limitsets.feeder.thrower import trace
-
     steps: list[_Step] = []
     table = policy.first
     for _ in range(int(policy.left.max()) + 1):
