@@ -33,8 +33,13 @@ def page():
     made.close()
 
 
+def shown(picture, called):
+    """Give what a layer of a picture shows."""
+    return picture.canvas.layer(called).data
+
+
 def sets_of(page):
-    return list(page.lanes._sets.data["right"])
+    return list(shown(page.lanes, "limit sets")["right"])
 
 
 def test_a_slider_moves_the_picture_and_the_threshold(page):
@@ -84,22 +89,22 @@ def test_the_mark_in_the_part_moves_the_centre_of_mass(page):
     hand({"what": "drag", "x": -9.0, "y": 1.5})  # out of the part: the mark stays
     page.beat()
     assert "wrong" in page._error.object
-    assert page.part.centre.data["x"] == [pytest.approx(2.0)]
+    assert shown(page.part, "centre of mass")["x"] == [pytest.approx(2.0)]
     hand({"what": "release", "x": 2.0, "y": 1.5})
     hand({"what": "drag", "x": 2.5, "y": 1.5})
     page.beat()
-    assert page.part.centre.data["x"] == [pytest.approx(2.0)]
+    assert shown(page.part, "centre of mass")["x"] == [pytest.approx(2.0)]
 
 
 def test_corners_that_are_clicked_become_a_part(page):
     page.opening._draw.value = True
     for x, y in ((0.0, 0.0), (6.0, 0.0), (6.0, 3.0), (0.0, 3.0)):
         page.opening.corner(x, y)
-    assert page.part.corners.data["x"] == [0.0, 6.0, 6.0, 0.0, 0.0]
+    assert shown(page.part, "corners")["x"] == [0.0, 6.0, 6.0, 0.0, 0.0]
     page.opening._draw.value = False
     page.beat()
     assert page.scene.centre == pytest.approx((3.0, 1.5))
-    assert len(page.lanes._basins.data["left"]) >= 4
+    assert len(shown(page.lanes, "basins")["left"]) >= 4
     page.opening._draw.value = True
     for x, y in ((0.0, 0.0), (4.0, 0.0), (1.0, 1.0), (0.0, 4.0)):  # it turns inward
         page.opening.corner(x, y)
@@ -117,7 +122,7 @@ def test_throws_are_shown_from_a_start_and_end_where_the_map_says(page):
     page.beat()
     assert page._film is None
     last = film.rests[-1]
-    assert page.lanes._start.data["x"] == [pytest.approx(last.x)]
+    assert shown(page.lanes, "start")["x"] == [pytest.approx(last.x)]
     page.throw(-5.0, 0)
     assert "wrong" in page._error.object
 
@@ -134,11 +139,11 @@ def test_the_arm_is_near_again_after_a_film(page):
 def test_added_masses_are_drawn_where_they_are(page):
     page.open(ls.load(LEAD))
     page.beat()
-    masses, words = page.part._masses.data, page.part._heavy.data["words"]
+    masses, words = shown(page.part, "added masses"), shown(page.part, "weights")["words"]
     assert (masses["x"], masses["y"], words) == ([20.0], [4.0], ["8 g"])
     page.sliders.put({"part.mass.points[0].x": 10.0})
     page.beat()
-    assert page.part._masses.data["x"] == [10.0]
+    assert shown(page.part, "added masses")["x"] == [10.0]
 
 
 def test_throws_outside_the_model_are_said(page):
@@ -166,7 +171,7 @@ def test_a_point_mass_has_a_slider(page):
     page.open(ls.load(LEAD))
     page.sliders.put({"part.mass.points[0].mass": 16.0})
     page.beat()
-    assert page.part._heavy.data["words"] == ["16 g"]
+    assert shown(page.part, "weights")["words"] == ["16 g"]
     plate, lead = 3.0 * 0.03 * 0.02 / 2, 0.016  # kg; the plate's centroid is at (10, 20/3) mm
     x = (plate * 10.0 + lead * 20.0) / (plate + lead)
     assert page.scene.centre[0] == pytest.approx(x)
@@ -313,11 +318,11 @@ def test_bands_that_cells_join_are_told():
 
 def test_a_map_of_two_dimensions_is_its_points_and_a_bad_parameter_a_line():
     page = ls.explore(ls.maps.Henon()).page()
-    before = len(page.points._points.data["x"])
+    before = len(shown(page.points, "points")["x"])
     assert before > 1000
     page.sliders.put({"a": 5.0})  # all of it leaves
     page.beat()
-    assert len(page.points._points.data["x"]) == 0
+    assert len(shown(page.points, "points")["x"]) == 0
     page.sliders._typed(page.sliders.knobs[0], "much")
     assert "wrong" in page._error.object
 
@@ -367,10 +372,10 @@ def test_the_window_shrinks_to_points_that_would_be_lost_in_it():
 def test_a_cycle_is_drawn_so_that_it_is_seen():
     page = ls.explore(ls.maps.Henon(0.3, 0.3)).page()
     x = ((0.3 - 1) + math.sqrt(0.49 + 4 * 0.3)) / (2 * 0.3)  # Henon's fixed point
-    assert page.points._spots.data["x"] == [pytest.approx(x)]
+    assert shown(page.points, "few points")["x"] == [pytest.approx(x)]
     page.sliders.put({"a": 1.4})
     page.beat()
-    assert page.points._spots.data["x"] == []
+    assert shown(page.points, "few points")["x"] == []
 
 
 def test_where_orbits_go_that_do_not_stay_is_said():
@@ -385,7 +390,7 @@ def test_where_orbits_go_that_do_not_stay_is_said():
 
 def test_a_map_of_one_dimension_has_lanes():
     page = ls.explore(ls.maps.Logistic(3.9)).page()
-    assert page.lanes._sets.data["right"] == [pytest.approx(0.975)]
+    assert shown(page.lanes, "limit sets")["right"] == [pytest.approx(0.975)]
 
 
 def test_what_cannot_be_explored_is_refused():
@@ -409,7 +414,7 @@ def test_a_stored_atlas_is_shown_and_a_point_of_it_opened(tmp_path):
     axes = "throw.speed=150 deg/s:160 deg/s:3", "arm.surface_height=-0.4 in:-0.2 in:3"
     ls.atlas("paper-designed", *axes, store=tmp_path / "a.zarr")
     page = ls.explore("paper-designed", atlas=tmp_path / "a.zarr").page()
-    assert len(page.atlas._boxes.data["left"]) == 9
+    assert len(page.atlas._canvas.layer("classes").data["left"]) == 9
     page.atlas._canvas._handle_msg({"what": "tap", "x": 151.0, "y": -0.29})
     page.beat()
     assert math.degrees(page.scene.value("throw.speed")) == pytest.approx(150.0)

@@ -34,7 +34,15 @@ from limitsets.face.animation.legs import (
     swing_of,
 )
 from limitsets.face.animation.picture import cavity_pieces
-from limitsets.face.plot.throwing import Throw, angle_on_side, motion, outline, throws_of
+from limitsets.face.plot.throwing import (
+    Throw,
+    angle_on_side,
+    motion,
+    outline,
+    pendulum_until,
+    throws_of,
+    turned,
+)
 from limitsets.feeder.engine.member import ground_of
 from limitsets.systems.maps import codes
 
@@ -173,10 +181,15 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
     most = _first_contact(cavity, about_end)
     inertia = scene.radius_of_gyration**2 + beyond**2 + d**2
     rate = rate_about_end(scene, throw.x, side, beyond) if throw.code == codes.JOG else 0.0
-    time, angle_at = _tipping((rate, beyond, d), inertia, gravity, most)
+    # an inverted pendulum at e from the top needs ln(d/e) of its time constants, and a few more
+    patience = 40.0 + max(0.0, math.log(d / max(beyond, 1e-300)))
+    longest, arm = patience * math.sqrt(inertia / (gravity * d)), np.array([beyond, d])
+    tipping = pendulum_until(arm, -rate, (-most, math.inf), inertia, (0.0, -gravity), longest=longest)
+    assert tipping is not None  # it has time enough
+    time, _, turned_at, _ = tipping
     tips = leg(
         time * pace.unit,
-        lambda share: pose(angle_at(share * time), 0.0 * share, 0.0 * share),
+        lambda share: pose(np.minimum(-turned_at(share * time), most), 0.0 * share, 0.0 * share),
         f"It tips over the end: {words}",
         begins=True,
     )
@@ -195,18 +208,12 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
     return [tips, slides, stays._replace(marks=((0.0, "in the cavity", *hinge.tolist()),))]
 
 
-def _corners(about_end: Array, tipped: float) -> Array:
-    cos, sin = math.cos(tipped), math.sin(tipped)
-    corners: Array = about_end @ np.array([[cos, -sin], [sin, cos]])
-    return corners
-
-
 def _first_contact(cavity: Cavity, about_end: Array) -> float:
     """Angle at which a corner meets the far wall or the floor, or the side the ramp [rad]."""
     from scipy.optimize import brentq
 
     def room(tipped: float) -> float:
-        corners = _corners(about_end, tipped)
+        corners = turned(about_end, -tipped)
         return float(min((cavity.width - corners[:, 0]).min(), (corners[:, 1] + cavity.depth).min()))
 
     angles = np.linspace(0.0, cavity.angle, ANGLES)
@@ -216,36 +223,9 @@ def _first_contact(cavity: Cavity, about_end: Array) -> float:
     return cavity.angle
 
 
-def _tipping(
-    begins: tuple[float, float, float], inertia: float, gravity: float, most: float
-) -> tuple[float, Callable[[Array], Array]]:
-    """Time to tip by an angle from a rate, e and d, and the angle over time."""
-    from scipy.integrate import solve_ivp
-
-    rate, beyond, height = begins
-
-    def rates(_: float, state: Array) -> list[float]:
-        sine, cosine = math.sin(state[0]), math.cos(state[0])
-        return [float(state[1]), gravity * (height * sine + beyond * cosine) / inertia]
-
-    def down(_: float, state: Array) -> float:
-        return float(state[0]) - most
-
-    down.terminal = True  # type: ignore[attr-defined]  # scipy reads it there
-    # an inverted pendulum at e from the top needs ln(d/e) of its time constants, and a few more
-    patience = (40.0 + max(0.0, math.log(height / max(beyond, 1e-300)))) * math.sqrt(
-        inertia / (gravity * height)
-    )
-    fall = solve_ivp(
-        rates, (0.0, patience), [0.0, rate], "DOP853", dense_output=True, events=down, rtol=1e-10, atol=1e-14
-    )
-    end, solution = float(fall.t[-1]), fall.sol
-    return end, lambda at: np.minimum(solution(at)[0], most)
-
-
 def _slide(cavity: Cavity, about_end: Array) -> float:
     """Distance that the part slides down the ramp until a corner meets the wall or the floor [length]."""
-    corners = _corners(about_end, cavity.angle)
+    corners = turned(about_end, -cavity.angle)
     wall = (cavity.width - corners[:, 0]) / math.cos(cavity.angle)
     floor = (cavity.depth + corners[:, 1]) / math.sin(cavity.angle)
     return max(0.0, float(min(wall.min(), floor.min())))

@@ -18,6 +18,8 @@ from limitsets.face.animation.legs import (
     rest_leg,
 )
 from limitsets.face.plot.throwing import Throw, throws_of
+from limitsets.feeder.thrower import trace
+from limitsets.feeder.thrower.motion import FullThrow
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
@@ -50,8 +52,6 @@ def film_of_throws(
     scene: Scene, start: tuple[float, int], count: int, pace: Pace, lanes: Lanes | None = None
 ) -> Film:
     """Show `count` throws of a scene from a start; without lanes nothing is analysed."""
-    from limitsets.feeder.thrower import trace
-
     x, side = start
     path = trace(scene.map, x, side, count)
     made = throws_of(scene, path)
@@ -59,8 +59,7 @@ def film_of_throws(
         allowed = "one from which a throw lands on the arm"
         raise AnswerError("the start", f"x = {x:g} on side {side}: {path.reason}", allowed, "choose another")
     count = len(made)
-    words = f"Start: x = {x:.2f} {scene.unit} on side {side}"
-    legs = [rest_leg(scene, x, side, 1.0, words)]
+    legs = [rest_leg(scene, x, side, 1.0, f"Start: x = {x:.2f} {scene.unit} on side {side}")]
     for number, throw in enumerate(made, start=1):
         stays = STAYS if number == count else RESTS
         legs += legs_of(scene, throw, pace, f"Throw {number} of {count}", stays=stays)
@@ -117,9 +116,6 @@ def film_of_margin(margin: Margin, asked: Asked) -> Film:
 
 def _thrown(scene: Scene, here: Any) -> Throw:
     """Throw a state as the proof does: with its own kappa, and with the noise of its landing added."""
-    from limitsets.feeder.thrower import trace
-    from limitsets.feeder.thrower.motion import FullThrow
-
     params = scene.map
     if here.kappa is not None:
         bare = scene.bare_map._replace(kappa=here.kappa)
@@ -162,41 +158,30 @@ def film_of_policy(synthesis: Synthesis, asked: Asked) -> Film:
                 "the start", f"x = {x:g} on side {side}", "one of the policy's starts", "choose another"
             )
     steps = _run(synthesis, policy, x, side)
-    known = tuple(synthesis.beliefs())
-    texts = [_words(synthesis, each) for each in steps]
-    question = synthesis.question
-    legs = [
-        rest_leg(
-            scene,
-            x,
-            side,
-            seconds=1.5,
-            caption=f"Start: x = {x:.2f} {scene.unit} on side {side}",
-            note=texts[0],
-            stage=steps[0].state,
-        )
-    ]
-    made = [(each, each.throw) for each in steps if each.throw is not None][: asked.throws]
-    for number, (each, throw) in enumerate(made):
-        last = number + 1 == len(made)
-        after = ("the part is caught", -1)
-        if number + 1 < len(steps):
-            after = texts[number + 1], steps[number + 1].state
+    texts = [_words(synthesis, step) for step in steps]
+    start = f"Start: x = {x:.2f} {scene.unit} on side {side}"
+    legs = [rest_leg(scene, x, side, 1.5, start, note=texts[0], stage=steps[0].state)]
+    made = [(step, step.throw) for step in steps if step.throw is not None][: asked.throws]
+    states = [step.state for step in steps]
+    afterwards = [*zip(texts[1:], states[1:], strict=True), ("the part is caught", -1)]
+    for number, (step, throw) in enumerate(made):
         legs += legs_of(
             scene,
             throw,
             pace,
-            f"Throw {number + 1}, {each.name}",
+            f"Throw {number + 1}, {step.name}",
             note=texts[number],
-            stage=each.state,
-            stays=STAYS if last else 1.0,
-            after=after,
+            stage=step.state,
+            stays=STAYS if number + 1 == len(made) else 1.0,
+            after=afterwards[number],
         )
     place = getattr(synthesis.sensor, "x", None)
-    lines = () if place is None else ((float(place), f"sensor: {question}"),)
-    lanes = lanes_of(scene, known=known, lines=lines)
-    about = drawn_of(scene)
-    return cut(scene, legs, pace, title=f"{scene.name}, one bit of feedback", about=about, lanes=lanes)
+    lines = () if place is None else ((float(place), f"sensor: {synthesis.question}"),)
+    lanes, title = (
+        lanes_of(scene, known=tuple(synthesis.beliefs()), lines=lines),
+        f"{scene.name}, one bit of feedback",
+    )
+    return cut(scene, legs, pace, title=title, about=drawn_of(scene), lanes=lanes)
 
 
 def _words(synthesis: Synthesis, step: _Step) -> str:
@@ -206,8 +191,6 @@ def _words(synthesis: Synthesis, step: _Step) -> str:
 
 def _run(synthesis: Synthesis, policy: Policy, x: float, side: int) -> list[_Step]:
     """Follow the policy's table: each throw is without noise, each answer of the sensor without error."""
-    from limitsets.feeder.thrower import trace
-
     steps: list[_Step] = []
     table = policy.first
     for _ in range(int(policy.left.max()) + 1):
@@ -240,12 +223,10 @@ def _heard(synthesis: Synthesis, x: float, side: int) -> str:
 
 def _longest(synthesis: Synthesis, policy: Policy) -> tuple[float, int]:
     """Choose the start from which the policy makes the most throws."""
-    best, chosen = -1, (0.0, 0)
-    for side, parts in synthesis.starts.extents().items():
-        for lo, hi in parts:
-            for k in range(1, TRIED + 1):
-                x = lo + (hi - lo) * k / (TRIED + 1)
-                count = len(_run(synthesis, policy, x, side))
-                if count > best:
-                    best, chosen = count, (x, side)
-    return chosen
+    starts = [
+        (lo + (hi - lo) * k / (TRIED + 1), side)
+        for side, parts in synthesis.starts.extents().items()
+        for lo, hi in parts
+        for k in range(1, TRIED + 1)
+    ]
+    return max(starts, key=lambda start: len(_run(synthesis, policy, *start)), default=(0.0, 0))

@@ -8,9 +8,14 @@ from collections.abc import Callable, Iterator
 from html import escape
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Polygon
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from limitsets.base.files import as_plain
@@ -30,10 +35,6 @@ from limitsets.face.animation.picture import (
 )
 from limitsets.face.plot import style
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-
 # ----------------------------------------------------------------
 # Frames as pixels, by matplotlib: fixed shapes are drawn once.
 
@@ -50,16 +51,12 @@ ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 
 def frames(picture: Picture, zoom: float = 1.0, progress: Progress = None) -> Iterator[Pixels]:
     """Draw frame after frame, enlarged so many times; each of shape (height, width, 3), both even."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     width, height = picture.size
     wide, tall = 2 * round(0.5 * zoom * width), 2 * round(0.5 * zoom * height)
     figure = Figure(figsize=(wide / zoom / DPI, tall / zoom / DPI), dpi=DPI * zoom)
     canvas: Any = FigureCanvasAgg(figure)  # matplotlib has no types for its methods
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_xlim(0.0, width)
-    axes.set_ylim(height, 0.0)
+    axes.set(xlim=(0.0, width), ylim=(height, 0.0))
     axes.set_axis_off()
     for shape in picture.still():
         axes.add_artist(_artist(shape))
@@ -69,22 +66,14 @@ def frames(picture: Picture, zoom: float = 1.0, progress: Progress = None) -> It
         if progress is not None:
             progress("frames", k, picture.film.frames)
         canvas.restore_region(background)
-        _draw(axes, picture.moving(k))
+        for shape in picture.moving(k):
+            artist = axes.add_artist(_artist(shape))
+            axes.draw_artist(artist)
+            artist.remove()
         yield np.array(np.asarray(canvas.buffer_rgba())[:, :, :3])
 
 
-def _draw(axes: Axes, shapes: list[Shape]) -> None:
-    for shape in shapes:
-        artist = axes.add_artist(_artist(shape))
-        axes.draw_artist(artist)
-        artist.remove()
-
-
 def _artist(shape: Shape) -> Any:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Circle, Polygon
-    from matplotlib.text import Text
-
     look, (x, y) = shape.look, shape.points[0].tolist()
     if shape.kind == "text":
         how = {"ha": ANCHORS[look.get("anchor", "start")], "va": "baseline", "color": look["fill"]}
@@ -94,9 +83,8 @@ def _artist(shape: Shape) -> Any:
     width = look.get("width", 0.0) * POINTS
     if shape.kind == "line":
         # matplotlib takes dashes in multiples of the width
-        dash = tuple(each / look["width"] for each in look["dash"]) if "dash" in look else None
-        style: Any = (0.0, dash) if dash else "-"
-        return Line2D(*shape.points.T, color=look["stroke"], lw=width, ls=style, solid_capstyle="butt")
+        dash = (0.0, tuple(length / look["width"] for length in look["dash"])) if "dash" in look else "-"
+        return Line2D(*shape.points.T, color=look["stroke"], lw=width, ls=dash, solid_capstyle="butt")
     paint = {"fc": look["fill"], "ec": look.get("stroke", "none"), "lw": width, "alpha": look.get("opacity")}
     if shape.kind == "circle":
         return Circle((x, y), look["radius"], **paint)
@@ -120,7 +108,7 @@ def write_gif(film: Film, file: Path, progress: Progress = None) -> None:
     """Write a film that plays in a loop."""
     from PIL import Image
 
-    picture = Picture.of(film)
+    picture, options = Picture.of(film), {"save_all": True, "loop": 0, "optimize": False, "disposal": 1}
     palette = Image.new("P", (1, 1))
     palette.putpalette(_colours(picture))
     pictures = [
@@ -128,16 +116,7 @@ def write_gif(film: Film, file: Path, progress: Progress = None) -> None:
         for pixels in frames(picture, ZOOM, progress)
     ]
     delay = 10 * round(100.0 / film.fps)
-    pictures[0].save(
-        file,
-        "GIF",
-        save_all=True,
-        append_images=pictures[1:],
-        duration=delay,
-        loop=0,
-        optimize=False,
-        disposal=1,
-    )
+    pictures[0].save(file, "GIF", append_images=pictures[1:], duration=delay, **options)
 
 
 def _colours(picture: Picture) -> bytes:
@@ -169,8 +148,10 @@ def write_page(film: Film, file: Path, progress: Progress = None) -> None:
     if progress is not None:
         progress("page", 0, 1)
     picture = Picture.of(film)
-    still = "\n".join(svg_of(each) for each in picture.still() if each.look.get("what") not in BESIDE)
-    first = "\n".join(svg_of(each) for each in picture.moving(0) if each.look.get("what") not in BESIDE)
+    still, first = (
+        "\n".join(svg_of(shape) for shape in shapes if shape.look.get("what") not in BESIDE)
+        for shapes in (picture.still(), picture.moving(0))
+    )
     template = (files("limitsets.face.animation") / "page.html").read_text(encoding="utf-8")
     page = Environment(undefined=StrictUndefined, autoescape=True).from_string(template)
     top, wide, tall = TOP - 12.0, *picture.size
@@ -202,14 +183,15 @@ def _data(picture: Picture) -> dict[str, Any]:
     def rounded(numbers: Any) -> Any:
         return as_plain(np.round(np.asarray(numbers, dtype=np.float64), digits))
 
-    lanes, rows = film.lanes, picture.rows
+    lanes = film.lanes
+    known = () if lanes is None else lanes.known
     return {
         "fps": film.fps,
         "clock": film.clock,
         "scale": picture.scale,
         "origin": picture.origin,
         "leans": LEANS,
-        "lane": [0.0 if rows is None else rows.height(0.0), LANE],
+        "lane": [0.0 if lanes is None else picture.height(0.0), LANE],
         "times": as_plain(np.round(film.times, 4)),
         "arm": as_plain(np.round(film.arm, 6)),
         "poses": rounded(film.poses),
@@ -231,9 +213,7 @@ def _data(picture: Picture) -> dict[str, Any]:
         "rests": [[each.frame, *rounded([each.x]), each.side] for each in film.rests] if lanes else [],
         "position": rounded(film.position) if lanes else None,
         "stage": film.stage.tolist(),
-        "known": []
-        if rows is None
-        else [[rounded(bar.points) for bar in rows.bars(each, 10.0, **KNOWN)] for each in rows.lanes.known],
+        "known": [[rounded(bar.points) for bar in picture.bars(extents, 10.0)] for extents in known],
         "look": {
             "parts": PARTS,
             "edges": EDGES,
@@ -255,8 +235,8 @@ def svg_of(shape: Shape) -> str:
         how = (
             f'font-size="{look["size"]:g}" text-anchor="{look.get("anchor", "start")}" fill="{look["fill"]}"'
         )
-        how += f' font-weight="{look.get("weight", "normal")}"'
-        return f'<text x="{x:.2f}" y="{y:.2f}" {how}>{escape(look["words"])}</text>'
+        weight = look.get("weight", "normal")
+        return f'<text x="{x:.2f}" y="{y:.2f}" {how} font-weight="{weight}">{escape(look["words"])}</text>'
     paint = f'fill="{look.get("fill", "none")}" stroke="{look.get("stroke", "none")}"'
     paint += f' stroke-width="{look.get("width", 0.0):g}" stroke-linejoin="round"'
     if "dash" in look:

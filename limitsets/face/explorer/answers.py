@@ -9,8 +9,8 @@ from typing import Any
 
 import panel as pn
 
-from limitsets.base.errors import LimitsetsError, SceneError
-from limitsets.face.explorer.canvas import SLIDER, swatch
+from limitsets.base.errors import SceneError
+from limitsets.face.explorer.canvas import SLIDER, said, swatch
 from limitsets.face.explorer.estimates import CELLS, Estimate, Knob, Points
 from limitsets.face.explorer.pictures import look_of
 from limitsets.face.explorer.work import MOST_BYTES, scene_from, with_outline
@@ -219,20 +219,16 @@ class Opening:
             self._corners.value = ""
             self._drawn([], True)
             return
-        try:
-            corners = self._read_corners()
-            self._drawn([], False)
-            if corners and self._scene is not None:
-                self._opened(with_outline(self._scene, corners))
-        except LimitsetsError as error:
-            self._say(error)
-            self._drawn([], False)
+        said(self._finished, self._say)
+        self._drawn([], False)
+
+    def _finished(self) -> None:
+        corners = self._read_corners()
+        if corners and self._scene is not None:
+            self._opened(with_outline(self._scene, corners))
 
     def _sketched(self) -> None:
-        try:
-            self._drawn(self._read_corners(), True)
-        except LimitsetsError as error:
-            self._say(error)
+        said(lambda: self._drawn(self._read_corners(), True), self._say)
 
     def _read_corners(self) -> list[tuple[float, float]]:
         words, corners = self._corners.value.split(), []
@@ -245,10 +241,7 @@ class Opening:
         return corners
 
     def _read(self, text: str) -> None:
-        try:
-            self._opened(scene_from(text))
-        except LimitsetsError as error:
-            self._say(error)
+        said(lambda: self._opened(scene_from(text)), self._say)
 
     def _sent(self, content: bytes | None) -> None:
         if content:

@@ -9,19 +9,18 @@ import subprocess
 import sys
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from html import escape
 from typing import Any
 
 import numpy as np
 import panel as pn
-from scipy.ndimage import distance_transform_edt
 
-from limitsets.face.explorer.canvas import SAID, SLIDER, Canvas, Hand, Layer, Words, swatch
+from limitsets.face.explorer.canvas import SLIDER, Canvas, Hand, Layer, Words, swatch
 from limitsets.face.explorer.estimates import Knob
-from limitsets.face.explorer.pictures import pattern
+from limitsets.face.explorer.pictures import BARS, NUMBERS, WHITE, pattern
 from limitsets.face.plot import style
-from limitsets.face.plot.atlas_maps import edges
+from limitsets.face.plot.atlas_maps import edges, widest
 from limitsets.feeder.scene import Scene, dump
 from limitsets.feeder.scene.units import written
 
@@ -172,16 +171,14 @@ class AtlasPage:
         self._y = pn.widgets.Select(label="up", width=190, **look)
         self._go = pn.widgets.Button(label=f"Compute {POINTS} x {POINTS} points", align="end", **look)
         self._go.on_click(lambda _: self._compute())
-        self._words = Words(stylesheets=[SAID])
-        self._boxes = Layer("bars", "classes", columns=(*BOX, "face", "hatch", "words"))
-        words: dict[str, Any] = {"columns": ("x", "y", "words"), "align": "center", "size": 12, "plate": True}
-        self._numbers = Layer("words", "numbers", colour=style.INK, **words)
-        mark: dict[str, Any] = {"size": 16, "fill": "#ffffff", "line": style.INK, "width": 2}
-        self._here = Layer("marks", "here", shape="cross", **mark)
-        self._chosen = Layer(
-            "marks", "chosen", shape="square", **mark | {"fill": "#ffffff00", "line": style.FLIP}
-        )
-        layers = [self._boxes, self._numbers, self._here, self._chosen]
+        self._words = Words()
+        chosen = WHITE | {"fill": "#ffffff00", "line": style.FLIP}
+        layers = [
+            Layer("bars", "classes", (*BARS, "words")),
+            Layer("words", "numbers", size=12, plate=True, **NUMBERS),
+            Layer("marks", "here", shape="cross", size=16, **WHITE),
+            Layer("marks", "chosen", shape="square", size=16, **chosen),
+        ]
         view = {"margins": MARGINS, "across": " ", "up": "", "keys": True}
         self._canvas = Canvas("atlas", layers, 400, self._touched, stylesheets=[SLIDER], **view)
         self._canvas.visible = False
@@ -229,37 +226,29 @@ class AtlasPage:
     def _show(self, table: dict[str, Any]) -> None:
         self._table = table
         (x, y), numbers = table["axes"], np.array(table["numbers"])
-        across, up = (edges(np.array(axis["values"])) for axis in (x, y))
+        across, up = (edges(np.array(axis["values"])).tolist() for axis in (x, y))
         looks = {each["number"]: each for each in table["classes"]}
-        shown = np.argwhere(np.isin(numbers, list(looks)))
-        i, j = shown.T
-        kinds = [looks[int(each)] for each in numbers[i, j]]
-        self._boxes.data = {
-            "left": across[j].tolist(), "right": across[j + 1].tolist(),
-            "bottom": up[i].tolist(), "top": up[i + 1].tolist(),
-            "face": [_colour(each["facecolor"]) for each in kinds],
-            "hatch": [pattern(each["hatch"]) for each in kinds],
-            "words": [each["words"] for each in kinds],
-        }  # fmt: skip
+        boxes = [
+            (across[j], across[j + 1], up[i], up[i + 1], *_look(looks[number]), looks[number]["words"])
+            for (i, j), number in np.ndenumerate(numbers)
+            if number in looks
+        ]
+        self._canvas.put("classes", boxes)
         marks = [(k + 1, numbers == each["number"]) for k, each in enumerate(table["classes"])]
-        places = [(k, *_middle(where)) for k, where in marks if where.any()]
-        self._numbers.data = {
-            "x": [x["values"][column] for _, _, column in places],
-            "y": [y["values"][row] for _, row, _ in places],
-            "words": [str(k) for k, _, _ in places],
-        }
+        places = [(k, *widest(where)[0]) for k, where in marks if where.any()]
+        self._canvas.put("numbers", [(x["values"][j], y["values"][i], str(k)) for k, i, j in places])
         names = (f"{axis['name']} [{axis['unit']}]" for axis in (x, y))
-        view = {"x": [float(across[0]), float(across[-1])], "y": [float(up[0]), float(up[-1])]}
+        view = {"x": [across[0], across[-1]], "y": [up[0], up[-1]]}
         self._canvas.view |= {**view, **dict(zip(("across", "up"), names, strict=True))}
         self._canvas.heading = "atlas: arrow keys choose a point, Enter opens it"
         self._canvas.visible = True
         rows = "".join(
-            f"<tr><td>{swatch(_colour(each['facecolor']), pattern(each['hatch']))}{k + 1}</td>"
+            f"<tr><td>{swatch(*_look(each))}{k + 1}</td>"
             f"<td>{escape(each['words'])}</td><td>{100 * each['share']:.3g} %</td></tr>"
             for k, each in enumerate(table["classes"][:12])
         )
         self._words.object = f'<table class="said">{rows}</table><p class="how">estimated, not proved</p>'
-        self._chosen.data = {"x": [], "y": []}
+        self._canvas.put("chosen", ())
         self._mark()
         self._canvas.send()
 
@@ -273,8 +262,7 @@ class AtlasPage:
             name in values and values[name].unit == axis["unit"]
             for name, axis in zip(names, self._table["axes"], strict=True)
         ):
-            x, y = (values[name].value for name in names)
-            self._here.data = {"x": [x], "y": [y]}
+            self._canvas.put("here", [[values[name].value for name in names]])
         self._canvas.send()
 
     def _touched(self, hand: Hand) -> None:
@@ -282,7 +270,8 @@ class AtlasPage:
         if self._table is None:
             return
         axes = [np.array(axis["values"]) for axis in self._table["axes"]]
-        at = [layer.data[axis][0] for layer in (self._chosen, self._here) if layer.data["x"] for axis in "xy"]
+        marked = [self._canvas.layer(called).data for called in ("chosen", "here")]
+        at = [places[axis][0] for places in marked if places["x"] for axis in "xy"]
         if hand.what == "tap":
             at = [hand.x, hand.y]
         elif not at:  # the scene on the page is not in this atlas
@@ -295,10 +284,10 @@ class AtlasPage:
             ]
         x, y = (float(values[number]) for values, number in zip(axes, numbers, strict=True))
         if hand.what == "step":
-            self._chosen.data = {"x": [x], "y": [y]}
+            self._canvas.put("chosen", [(x, y)])
             self._canvas.send()
         elif hand.what in ("tap", "enter"):
-            self._chosen.data = {"x": [], "y": []}
+            self._canvas.put("chosen", ())
             places = zip(self._table["axes"], (x, y), strict=True)
             self._opened({axis["name"]: written(value, axis["unit"]) for axis, value in places})
 
@@ -307,17 +296,12 @@ class AtlasPage:
         self._asked.stop()
 
 
-BOX = ("left", "right", "bottom", "top")
 MARGINS = (64, 12, 40, 38)
 
 
-def _middle(where: Any) -> tuple[int, int]:
-    """Give the point of a region that is farthest from its edge."""
-    room = distance_transform_edt(np.pad(where, 1))[1:-1, 1:-1]
-    row, column = np.unravel_index(int(room.argmax()), room.shape)
-    return int(row), int(column)
-
-
-def _colour(face: Any) -> str:
-    """Give a face of the figures as the web writes it."""
-    return face if isinstance(face, str) else "#" + "".join(f"{round(255 * each):02x}" for each in face)
+def _look(kind: Mapping[str, Any]) -> tuple[str, str]:
+    """Give face and hatch of a class, as the web writes them."""
+    face = kind["facecolor"]
+    if not isinstance(face, str):
+        face = "#" + "".join(f"{round(255 * share):02x}" for share in face)
+    return face, pattern(kind["hatch"])

@@ -50,19 +50,22 @@ class Layer:
     ----------
     kind : str
         A kind that `canvas.js` draws: bars, strokes, path, marks, words, dots.
-    called : str, optional
-        What scripts of a reader, and tests, find it by.
+    called : str
+        What it is filled by, and what scripts of a reader, and tests, find it by.
     columns : iterable of str
         The names of its columns.
     **look
         The look of all its shapes.
     """
 
-    def __init__(
-        self, kind: str, called: str = "", *, columns: Iterable[str] = ("x", "y"), **look: Any
-    ) -> None:
+    def __init__(self, kind: str, called: str, columns: Iterable[str] = ("x", "y"), **look: Any) -> None:
         self.kind, self.called, self.look = kind, called, look
         self.data: dict[str, Any] = {name: [] for name in columns}
+
+    def put(self, rows: Iterable[Sequence[Any]]) -> None:
+        """Replace its shapes; a row has an entry for each column."""
+        shapes = list(rows)
+        self.data = {name: [shape[k] for shape in shapes] for k, name in enumerate(self.data)}
 
 
 class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
@@ -104,6 +107,14 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
         self.view: dict[str, Any] = {"x": [0.0, 1.0], "y": [0.0, 1.0], **view}
         options = {"height": height, "sizing_mode": "stretch_width", "stylesheets": list(stylesheets)}
         super().__init__(called=called, drawn=self._written(), **options)
+
+    def layer(self, called: str) -> Layer:
+        """Give the layer of this name."""
+        return next(layer for layer in self.layers if layer.called == called)
+
+    def put(self, called: str, rows: Iterable[Sequence[Any]]) -> None:
+        """Replace the shapes of a layer."""
+        self.layer(called).put(rows)
 
     def send(self) -> None:
         """Send the changes, if there are any, in one message.  Data of layers are replaced, never changed in place."""
@@ -164,8 +175,8 @@ class Words(JSComponent):  # type: ignore[misc]  # panel is not followed
     }
     """
 
-    def __init__(self, html: str = "", **options: Any) -> None:
-        super().__init__(object=html, sizing_mode="stretch_width", **options)
+    def __init__(self, html: str = "") -> None:
+        super().__init__(object=html, sizing_mode="stretch_width", stylesheets=[SAID])
 
 
 # ----------------------------------------------------------------
@@ -227,6 +238,14 @@ input[type=range] { display: block; width: 100%; height: 24px; margin: 0; accent
 # Sliders, each with a field beside it in which a value with a unit can be typed.
 
 
+def said(action: Callable[[], None], say: Callable[[object], None]) -> None:
+    """Do something, and say what is wrong if it is refused."""
+    try:
+        action()
+    except LimitsetsError as error:
+        say(error)
+
+
 class Sliders:
     """The sliders of a scene or a map.
 
@@ -267,11 +286,9 @@ class Sliders:
                 stylesheets=[SLIDER], styles={"flex": "1 1 150px"}, sizing_mode="stretch_width",
             )  # fmt: skip
             field = pn.widgets.TextInput(
-                label=f"{knob.words}, typed",
-                value=_text(knob, knob.value),
-                width=128,
-                stylesheets=[SLIDER, HIDDEN_LABEL],
-            )
+                label=f"{knob.words}, typed", value=_text(knob, knob.value),
+                width=128, stylesheets=[SLIDER, HIDDEN_LABEL],
+            )  # fmt: skip
             bar.param.watch(lambda event, name=knob.name: self._slid(name, event.new), "value")
             field.param.watch(lambda event, knob=knob: self._typed(knob, event.new), "value")
             self._bars[knob.name], self._fields[knob.name] = bar, field
@@ -281,13 +298,10 @@ class Sliders:
     def put(self, values: Mapping[str, float], *, told: bool = True) -> None:
         """Move sliders by program."""
         self._setting = True
-        for name, value in values.items():
-            knob = next(each for each in self.knobs if each.name == name)
-            self.values[name] = value
-            bar = self._bars[name]
-            shown = min(max(value, knob.lo), knob.hi)  # a typed value may lie beyond the slider's ends
-            if bar.value != shown:
-                bar.value = shown
+        self.values |= values
+        for knob in self.knobs:
+            if knob.name in values:  # a typed value may lie beyond the slider's ends
+                self._bars[knob.name].value = min(max(values[knob.name], knob.lo), knob.hi)
         self._setting = False
         if told:
             self._moved()
@@ -296,9 +310,7 @@ class Sliders:
         """Write the values into the fields."""
         self._setting = True
         for knob in self.knobs:
-            text = _text(knob, self.values[knob.name])
-            if self._fields[knob.name].value != text:
-                self._fields[knob.name].value = text
+            self._fields[knob.name].value = _text(knob, self.values[knob.name])
         self._setting = False
 
     def _slid(self, name: str, value: float) -> None:
@@ -306,12 +318,8 @@ class Sliders:
             self.put({name: value})
 
     def _typed(self, knob: Knob, text: str) -> None:
-        if self._setting:
-            return
-        try:
-            self.put({knob.name: knob.read(text)})
-        except LimitsetsError as error:
-            self._say(error)
+        if not self._setting:
+            said(lambda: self.put({knob.name: knob.read(text)}), self._say)
 
 
 HIDDEN_LABEL = """

@@ -10,13 +10,13 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from limitsets.base.errors import LimitsetsError, shown
+from limitsets.face.plot.basin import strips_of
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.geometry.polygon import above_side
 from limitsets.feeder.scene import Scene
@@ -26,7 +26,7 @@ from limitsets.systems.cells import Domain, grid
 from limitsets.systems.graph import transitions
 from limitsets.systems.maps import Orbit, critical_points, has_slope, kind_of, orbit
 from limitsets.systems.maps.pieces import stacked
-from limitsets.systems.sets import Attractor, Basins, attractors, basins
+from limitsets.systems.sets import Attractor, attractors, basins
 from limitsets.systems.topology import Topologies, topologies
 from limitsets.systems.topology.work import DECIDED
 
@@ -109,7 +109,16 @@ def knobs_of(scene: Scene) -> tuple[Knob, ...]:
     >>> [knob.words for knob in knobs_of(ls.load("paper-designed"))]
     ['centre of mass, along', 'centre of mass, above', 'speed', 'height of the surface', 'tilt']
     """
-    return (*_of_mass(scene), _of_throw(scene), _of_height(scene), *_of_gravity(scene))
+    if scene.gravity is None:
+        kappa = scene.kappa
+        throw = Knob("throw.kappa", "kappa", scene.unit, kappa, 0.5 * kappa, 1.5 * kappa)
+    else:
+        speed = math.degrees(scene.value("throw.speed"))
+        throw = Knob("throw.speed", "speed", "deg/s", speed, 0.7 * speed, 1.3 * speed)
+    height, reach = scene.surface_height, 0.05 * scene.arm_length
+    ends = min(-reach, 1.5 * height), max(reach, 1.5 * height)
+    surface = Knob("arm.surface_height", "height of the surface", scene.unit, height, *ends)
+    return (*_of_mass(scene), throw, surface, *_of_gravity(scene))
 
 
 def _of_mass(scene: Scene) -> list[Knob]:
@@ -145,19 +154,6 @@ def _of_mass(scene: Scene) -> list[Knob]:
         mass = convert(parse(text, "mass"), own)
         knobs.append(Knob(name, f"point mass {k}, mass", own, mass, LIGHTEST * mass, HEAVIEST * mass))
     return knobs
-
-
-def _of_throw(scene: Scene) -> Knob:
-    if scene.gravity is None:
-        return Knob("throw.kappa", "kappa", scene.unit, scene.kappa, 0.5 * scene.kappa, 1.5 * scene.kappa)
-    speed = math.degrees(scene.value("throw.speed"))
-    return Knob("throw.speed", "speed", "deg/s", speed, 0.7 * speed, 1.3 * speed)
-
-
-def _of_height(scene: Scene) -> Knob:
-    height, reach = scene.surface_height, 0.05 * scene.arm_length
-    lo, hi = min(-reach, 1.5 * height), max(reach, 1.5 * height)
-    return Knob("arm.surface_height", "height of the surface", scene.unit, height, lo, hi)
 
 
 def _of_gravity(scene: Scene) -> list[Knob]:
@@ -352,7 +348,7 @@ def _estimated(params: Any, domain: Domain, scene: Scene | None) -> Estimate:
         sharp=topology is not None,
         orders=tuple(each.flip_order for each in limit_sets),
         shares=tuple(zip(labels.tolist(), weight.tolist(), strict=True)),
-        basins=tuple(_runs(split)),
+        basins=tuple(strips_of(split)),
         critical=tuple(
             (side, number, point.x)
             for side, points in critical_points(params, domain, samples=SAMPLES).items()
@@ -395,19 +391,6 @@ def _sharpened(attractor: Attractor, params: Any, topology: Topologies | None) -
             ends[side][-1] = ends[side][-1][0], float(reach[side])
         return ends, int(topology.bands[0, k].sum())
     return ends, 0
-
-
-def _runs(split: Basins) -> list[tuple[int, float, float, int]]:
-    """Join cells of one label that lie side by side."""
-    runs = []
-    for side in range(split.grid.sides):
-        edges, labels = split.grid.edges[side][0], split.labels[split.grid.of_side(side)]
-        if not labels.size:
-            continue
-        border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
-        for first, last in pairwise(border.tolist()):
-            runs.append((side, float(edges[first]), float(edges[last]), int(labels[first])))
-    return runs
 
 
 class Points(NamedTuple):

@@ -26,7 +26,7 @@ from limitsets.face.explorer.answers import (
     proof_words,
 )
 from limitsets.face.explorer.atlas_page import AtlasPage, Background
-from limitsets.face.explorer.canvas import SAID, SLIDER, Hand, Sliders, Words
+from limitsets.face.explorer.canvas import SLIDER, Hand, Sliders, Words, said
 from limitsets.face.explorer.estimates import (
     centre_at,
     estimate,
@@ -43,15 +43,48 @@ from limitsets.feeder.scene import Scene, dump
 from limitsets.feeder.scene.left_out import Model
 from limitsets.systems.cells import Domain
 
+WORDS = 0.25
+"""Seconds between two changes of the text."""
+
+WIDE: dict[str, Any] = {"sizing_mode": "stretch_width"}
+
+
+class Page:
+    """What the pages of one visitor have in common: sliders, a line for errors, and texts that change now and then."""
+
+    def __init__(self) -> None:
+        self._error = Words(error_line(""))
+        self.sliders = Sliders(self._moved, self.say)
+        self._dirty = self._refit = self._told = True
+        self._wrote = -1.0
+
+    def say(self, error: object = "") -> None:
+        """Show one line of what is wrong, or take it away."""
+        self._error.object = error_line(error)
+
+    def _moved(self) -> None:
+        """Mark the page as changed; `beat` draws it."""
+        self._dirty = True
+
+    def _writes(self) -> bool:
+        """Whether the texts are to be written now; the fields of the sliders are among them."""
+        due = not self._told and time.monotonic() - self._wrote > WORDS
+        if due:
+            self._told, self._wrote = True, time.monotonic()
+            self.sliders.tell()
+        return due
+
+
+def _part(room: str, *shown: Any) -> pn.Column:
+    """Put things into a column that takes so much room (flex of CSS)."""
+    return pn.Column(*shown, styles={"flex": room, "min-width": "0"}, **WIDE)
+
+
 # ----------------------------------------------------------------
 # The page of a map: its parameters as sliders, and its attractors.
 
 
-WORDS = 0.25
-"""Seconds between two changes of the text."""
-
-
-class MapPage:
+class MapPage(Page):
     """The page of one visitor who looks at a map.
 
     Parameters
@@ -63,63 +96,46 @@ class MapPage:
     """
 
     def __init__(self, params: Any, domain: Domain) -> None:
-        self._params, self._domain, self._dirty = params, domain, True
-        wide: dict[str, Any] = {"sizing_mode": "stretch_width"}
-        self._error, self._said = Words(error_line(""), stylesheets=[SAID]), Words(stylesheets=[SAID])
-        self.sliders = Sliders(self._moved, self.say)
+        super().__init__()
+        self._params, self._domain, self._words, self._said = params, domain, "", Words()
         self.sliders.open(knobs_of_map(params))
         self.lanes = LanesPicture() if domain.dimension == 1 else None
         self.points = None if self.lanes else PointsPicture(domain.lo[0].tolist(), domain.hi[0].tolist())
         shown = self.lanes or self.points
         assert shown is not None  # it is one of the two
-        self._shown = shown
-        self._refit, self._told, self._wrote, self._words = True, False, -1.0, ""
+        self._canvas = shown.canvas
         self.beat()
-        title = Words(f"<h1>limitsets: {type(params).__name__}</h1>", stylesheets=[SAID])
-        controls = pn.Column(self.sliders.column, styles={"flex": "1 1 300px", "min-width": "0"}, **wide)
-        pictures = pn.Column(
-            self._shown.canvas,
-            self._said,
-            styles={"flex": "3 1 330px", "min-width": "0"},
-            **wide,
-        )
-        self.layout = pn.Column(title, self._error, pn.FlexBox(controls, pictures, **wide), **wide)
-
-    def say(self, error: object = "") -> None:
-        """Show one line of what is wrong, or take it away."""
-        self._error.object = error_line(error)
-
-    def _moved(self) -> None:
-        self._dirty = True
+        title = Words(f"<h1>limitsets: {type(params).__name__}</h1>")
+        columns = _part("1 1 300px", self.sliders.column), _part("3 1 330px", self._canvas, self._said)
+        self.layout = pn.Column(title, self._error, pn.FlexBox(*columns, **WIDE), **WIDE)
 
     def beat(self) -> None:
         """Draw the changes."""
-        if not self._told and time.monotonic() - self._wrote > WORDS:
-            self._told, self._wrote = True, time.monotonic()
-            self.sliders.tell()
+        if self._writes():
             self._said.object = self._words
         if not self._dirty:
             return
-        self._dirty, self._told = False, False
+        self._dirty = self._told = False
         try:
-            params = map_with(self._params, self.sliders.values)
-            if self.lanes is None:
-                assert self.points is not None  # it is one of the two
-                points = points_of_map(params, self._domain)
-                self.points.show(points.x)
-                self._words = points_words(points)
-            else:
-                answer = estimate_of_map(params, self._domain)
-                if self._refit:
-                    self.lanes.frame(answer, "")
-                    self._refit = False
-                self.lanes.show(answer)
-                self._words = estimate_words(answer, None, "")
+            self._redraw(map_with(self._params, self.sliders.values))
         except LimitsetsError as error:
             self.say(error)
         else:
             self.say()
-        self._shown.canvas.send()
+        self._canvas.send()
+
+    def _redraw(self, params: Any) -> None:
+        if self.points is not None:
+            points = points_of_map(params, self._domain)
+            self.points.show(points.x)
+            self._words = points_words(points)
+        if self.lanes is not None:
+            answer = estimate_of_map(params, self._domain)
+            if self._refit:
+                self.lanes.frame(answer, "")
+                self._refit = False
+            self.lanes.show(answer)
+            self._words = estimate_words(answer, None, "")
 
     def close(self) -> None:
         """Do nothing: a map has no running computations."""
@@ -136,10 +152,10 @@ RESTS = 0.6
 THROWS, FPS, SLOW = 6, 20.0, 2.0
 BEING = "being computed; the first proof on a machine also compiles, for a minute or more"
 MARGINS = "margins are being computed"
-SAVE: dict[str, Any] = {"stylesheets": [SLIDER], "sizing_mode": "stretch_width"}
+SAVE: dict[str, Any] = {"stylesheets": [SLIDER], **WIDE}
 
 
-class ScenePage:
+class ScenePage(Page):
     """The page of one visitor who looks at a scene.
 
     Parameters
@@ -151,22 +167,17 @@ class ScenePage:
     """
 
     def __init__(self, scene: Scene, atlas: dict[str, Any] | None = None) -> None:
+        super().__init__()
         self._first = within_reach(scene)
         self._proofs = Background()
         self._lines: list[dict[str, Any]] = []
         self._film: Film | None = None
-        self._began = 0.0
-        self._wrote, self._told = -1.0, True
-        self._holding = False
+        self._began, self._holding = 0.0, False
         self.part, self.arm = PartPicture(self._on_part), ArmPicture()
         self.lanes = LanesPicture(self._on_lanes)
-        self.sliders = Sliders(self._moved, self.say)
         self.opening = Opening(self.open, self._draw, self.say)
         self.atlas = AtlasPage(self._at_point, self.say, atlas)
-        self._error = Words(error_line(""), stylesheets=[SAID])
-        self._title, self._careful, self._estimated, self._proved = (
-            Words(stylesheets=[SAID]) for _ in range(4)
-        )
+        self._title, self._careful, self._estimated, self._proved = (Words() for _ in range(4))
         self._x = pn.widgets.FloatInput(label="start x", value=0.0, width=110, stylesheets=[SLIDER])
         self._side = pn.widgets.Select(label="side", options=[0], width=80, stylesheets=[SLIDER])
         self._toml = pn.widgets.FileDownload(
@@ -182,7 +193,6 @@ class ScenePage:
     # ------------------------------------------------------------ what is shown
 
     def _laid_out(self) -> pn.viewable.Viewable:
-        wide: dict[str, Any] = {"sizing_mode": "stretch_width", "gap": "0 18px"}
         throw = pn.widgets.Button(label="Throw", color="primary", width=80, align="end", stylesheets=[SLIDER])
         throw.on_click(lambda _: self.throw(self._x.value, self._side.value))
         reset = pn.widgets.Button(label="Back to the first scene", stylesheets=[SLIDER])
@@ -190,43 +200,29 @@ class ScenePage:
         svg = pn.widgets.FileDownload(
             callback=self._svg, filename="limit-set.svg", label="Save the figure (SVG)", **SAVE
         )
-
-        def part(*shown: Any, room: str) -> pn.Column:
-            return pn.Column(*shown, styles={"flex": room, "min-width": "0"}, sizing_mode="stretch_width")
-
-        key = Words(KEY, stylesheets=[SAID])
         start = pn.Row(self._x, self._side, throw)
-        return pn.Column(
-            self._title,
-            self._error,
-            pn.FlexBox(
-                part(self.sliders.column, start, room="1 1 300px"),
-                part(self.lanes.canvas, key, room="2 1 340px"),
-                **wide,
+        rows = (
+            (
+                _part("1 1 300px", self.sliders.column, start),
+                _part("2 1 340px", self.lanes.canvas, Words(KEY)),
             ),
-            pn.FlexBox(
-                part(self.arm.canvas, room="2 1 330px"),
-                part(self.part.canvas, room="1 1 220px"),
-                part(reset, self._toml, svg, self.opening.column, room="1 1 300px"),
-                **wide,
+            (
+                _part("2 1 330px", self.arm.canvas),
+                _part("1 1 220px", self.part.canvas),
+                _part("1 1 300px", reset, self._toml, svg, self.opening.column),
             ),
-            pn.FlexBox(  # a line that appears or disappears does not shift the controls under the visitor's hand
-                part(self._careful, self._estimated, room="1 1 330px"),
-                part(self._proved, room="1 1 330px"),
-                **wide,
+            (  # a line that appears or disappears does not shift the controls under the visitor's hand
+                _part("1 1 330px", self._careful, self._estimated),
+                _part("1 1 330px", self._proved),
             ),
-            self.atlas.column,
-            sizing_mode="stretch_width",
         )
+        boxes = (pn.FlexBox(*row, gap="0 18px", **WIDE) for row in rows)
+        return pn.Column(self._title, self._error, *boxes, self.atlas.column, **WIDE)
 
     @property
     def _of(self) -> str:
         """The model of the page, and the facts of the scene that the model leaves out."""
         return Model.of(self.scene).line()
-
-    def say(self, error: object = "") -> None:
-        """Show one line of what is wrong, or take it away."""
-        self._error.object = error_line(error)
 
     # ------------------------------------------------------------ what happens
 
@@ -258,9 +254,7 @@ class ScenePage:
             if self._film is not None:
                 number = min(int((time.monotonic() - self._began) * FPS), self._film.frames - 1)
                 self._show(self._film, number)
-        if not self._told and time.monotonic() - self._wrote > WORDS:
-            self._told, self._wrote = True, time.monotonic()
-            self.sliders.tell()
+        if self._writes():
             self._careful.object = careful_line(self._found, self.scene)
             self._estimated.object = estimate_words(self._found, self.scene.goal, self.scene.unit, self._of)
         for picture in (self.lanes, self.part, self.arm):
@@ -274,9 +268,8 @@ class ScenePage:
         self.say()
         if self._refit:
             self.lanes.frame(answer, scene.unit)
-            self._title.object = (
-                f"<h1>limitsets: {scene.name}</h1>"  # a name of letters, digits, dots and dashes
-            )
+            # a name of letters, digits, dots and dashes
+            self._title.object = f"<h1>limitsets: {scene.name}</h1>"
             self._refit = False
         if not self._startable(scene):
             side, parts = (
@@ -336,10 +329,8 @@ class ScenePage:
         if number == film.frames - 1:
             self._film = None
             last = film.rests[-1]
-            if film.position[number].tolist() == [
-                last.x,
-                last.side,
-            ]:  # the part has not left: show the arm close up again
+            # the part has not left: show the arm close up again
+            if film.position[number].tolist() == [last.x, last.side]:
                 self.arm.rest(self.scene, last.x, last.side)
 
     def _on_lanes(self, hand: Hand) -> None:
@@ -365,10 +356,7 @@ class ScenePage:
 
     def _at_point(self, values: dict[str, str]) -> None:
         """Open the feeder at a point of the atlas."""
-        try:
-            self.open(self.base.with_values(values))
-        except LimitsetsError as error:
-            self.say(error)
+        said(lambda: self.open(self.base.with_values(values)), self.say)
 
     def _svg(self) -> io.BytesIO:
         from limitsets.face.plot import limit_set

@@ -62,11 +62,10 @@ def serve(
     """
     here = address in (HERE, "localhost")
     if not here and not origins:
-        allowed = "named for any address but 127.0.0.1"
         raise LimitsetsError(
             "the allowed origins",
             "missing",
-            allowed,
+            "named for any address but 127.0.0.1",
             "pass --allow-origin HOST:PORT, as it stands in the browser",
         )
     chosen = _free_port(address, port)

@@ -52,16 +52,18 @@ def scene_from(text: str) -> Scene:
     """
     size = len(text.encode("utf-8", "surrogatepass"))
     if size > MOST_BYTES:
-        allowed = f"at most {MOST_BYTES} bytes"
-        raise SceneError("the size of the scene", f"{size} bytes", allowed, "send the scene alone")
+        raise SceneError(
+            "the size of the scene", f"{size} bytes", f"at most {MOST_BYTES} bytes", "send the scene alone"
+        )
     return within_reach(load(text + "\n"))  # text with a line break is never taken for a path
 
 
 def within_reach(scene: Scene) -> Scene:
     """Refuse a part with more sides than a picture can follow."""
     if len(scene.sides) > MOST_SIDES:
-        allowed = f"at most {MOST_SIDES}"
-        raise SceneError("the number of sides", len(scene.sides), allowed, "analyse it on the command line")
+        raise SceneError(
+            "the number of sides", len(scene.sides), f"at most {MOST_SIDES}", "analyse it on the command line"
+        )
     return scene
 
 

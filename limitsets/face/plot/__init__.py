@@ -17,89 +17,46 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from limitsets.face.plot.atlas_maps import atlas as atlas
-    from limitsets.face.plot.atlas_surfaces import (
-        atlas_surface as atlas_surface,
-    )
-    from limitsets.face.plot.atlas_surfaces import (
-        bifurcation as bifurcation,
-    )
-    from limitsets.face.plot.basin import basins as basins
-    from limitsets.face.plot.basin import morse as morse
-    from limitsets.face.plot.designs import design as design
-    from limitsets.face.plot.designs import robust_design as robust_design
-    from limitsets.face.plot.fed_parts import assembly as assembly
-    from limitsets.face.plot.fed_parts import feeding as feeding
-    from limitsets.face.plot.filled_trays import tray as tray
-    from limitsets.face.plot.limit_sets import limit_set as limit_set
-    from limitsets.face.plot.limit_sets import map as map  # noqa: A004 - its public name
-    from limitsets.face.plot.margins import (
-        audit as audit,
-    )
-    from limitsets.face.plot.margins import (
-        counterexample as counterexample,
-    )
-    from limitsets.face.plot.margins import (
-        margin_curve as margin_curve,
-    )
-    from limitsets.face.plot.margins import (
-        tolerance_box as tolerance_box,
-    )
-    from limitsets.face.plot.margins import (
-        tornado as tornado,
-    )
-    from limitsets.face.plot.noise import (
-        fit_residuals as fit_residuals,
-    )
-    from limitsets.face.plot.noise import (
-        noise_arrivals as noise_arrivals,
-    )
-    from limitsets.face.plot.noise import (
-        noise_density as noise_density,
-    )
-    from limitsets.face.plot.noise import (
-        noise_levels as noise_levels,
-    )
-    from limitsets.face.plot.parts import flight as flight
-    from limitsets.face.plot.policies import policy as policy
+    from limitsets.face.plot.atlas_maps import atlas
+    from limitsets.face.plot.atlas_surfaces import atlas_surface, bifurcation
+    from limitsets.face.plot.basin import basins, morse
+    from limitsets.face.plot.designs import design, robust_design
+    from limitsets.face.plot.fed_parts import assembly, feeding
+    from limitsets.face.plot.filled_trays import tray
+    from limitsets.face.plot.limit_sets import limit_set, map  # noqa: A004 - its public name
+    from limitsets.face.plot.margins import audit, counterexample, margin_curve, tolerance_box, tornado
+    from limitsets.face.plot.noise import fit_residuals, noise_arrivals, noise_density, noise_levels
+    from limitsets.face.plot.parts import flight, part
+    from limitsets.face.plot.policies import policy
 
+__all__ = [
+    "assembly", "atlas", "atlas_surface", "audit", "basins", "bifurcation", "counterexample", "design", "feeding",
+    "fit_residuals", "flight", "limit_set", "map", "margin_curve", "morse", "noise_arrivals", "noise_density",
+    "noise_levels", "part", "policy", "robust_design", "tolerance_box", "tornado", "tray",
+]  # fmt: skip
 
 _FILES = {
-    "assembly": "fed_parts",
-    "atlas": "atlas_maps",
-    "atlas_surface": "atlas_surfaces",
-    "audit": "margins",
-    "basins": "basin",
-    "bifurcation": "atlas_surfaces",
-    "counterexample": "margins",
-    "design": "designs",
-    "feeding": "fed_parts",
-    "fit_residuals": "noise",
-    "flight": "parts",
-    "limit_set": "limit_sets",
-    "map": "limit_sets",
-    "margin_curve": "margins",
-    "morse": "basin",
-    "noise_arrivals": "noise",
-    "noise_density": "noise",
-    "noise_levels": "noise",
-    "part": "parts",
-    "policy": "policies",
-    "robust_design": "designs",
-    "tolerance_box": "margins",
-    "tornado": "margins",
-    "tray": "filled_trays",
+    "atlas_maps": ("atlas",),
+    "atlas_surfaces": ("atlas_surface", "bifurcation"),
+    "basin": ("basins", "morse"),
+    "designs": ("design", "robust_design"),
+    "fed_parts": ("assembly", "feeding"),
+    "filled_trays": ("tray",),
+    "limit_sets": ("limit_set", "map"),
+    "margins": ("audit", "counterexample", "margin_curve", "tolerance_box", "tornado"),
+    "noise": ("fit_residuals", "noise_arrivals", "noise_density", "noise_levels"),
+    "parts": ("flight", "part"),
+    "policies": ("policy",),
 }
-
-__all__ = [*_FILES]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _FILES:
-        own = sys.modules[__name__]
-        raise AttributeError(f"module 'limitsets.plot' has no attribute {name!r}", name=name, obj=own)
-    return getattr(import_module(f"limitsets.face.plot.{_FILES[name]}"), name)
+    for file, names in _FILES.items():
+        if name in names:
+            return getattr(import_module(f"limitsets.face.plot.{file}"), name)
+    own = sys.modules[__name__]
+    raise AttributeError(f"module 'limitsets.plot' has no attribute {name!r}", name=name, obj=own)
 
 
 def __dir__() -> list[str]:
-    return sorted(_FILES)
+    return __all__

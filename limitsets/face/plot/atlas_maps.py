@@ -23,6 +23,10 @@ from scipy.ndimage import distance_transform_edt, label
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
 from limitsets.face.plot import style
+from limitsets.feeder.goals import OrientedBeyond, Reaches
+from limitsets.feeder.scene import load
+from limitsets.feeder.scene.quantities import base_unit, find
+from limitsets.feeder.scene.units import exact_factor
 from limitsets.parameters.atlas.classes import (
     UNDECIDED,
     AttractorKind,
@@ -51,24 +55,28 @@ def title_of(answers: Atlas) -> str:
 
 # Hatch of points at which no part gets to the X of the goal; it differs from the hatches of classes.
 UNREACHED = "oo"
+DESIGN: dict[str, Any] = {
+    "marker": "*",
+    "ms": 13.0,
+    "mfc": "white",
+    "mec": style.INK,
+    "mew": 1.0,
+    "ls": "none",
+}
+TICKS: dict[str, Any] = {"spacing": 8.0, "length": 0.6}
 
 
 def frame(answers: Atlas, tall: float = 0.0) -> tuple[Figure, Axes]:
     """Make a figure with its axes labelled, flat where one quantity varies, but at least so tall [inches]."""
     names = answers.axes
     figure, (axes,) = style.canvas(10.2, max(5.4 if len(names) == 2 else 2.6, tall))
-    axes.set_xlabel(_with_unit(answers, names[-1]))
-    if len(names) == 2:
-        axes.set_ylabel(_with_unit(answers, names[0]))
+    units = [answers.dataset[name].attrs.get("units", "") for name in names]
+    words = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
     x, y = pixels(answers)
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(y[0], y[-1])
+    axes.set(xlabel=words[-1], xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    if len(names) == 2:
+        axes.set_ylabel(words[0])
     return figure, axes
-
-
-def _with_unit(answers: Atlas, name: str) -> str:
-    unit = answers.dataset[name].attrs.get("units", "")
-    return f"{name} [{unit}]" if unit else name
 
 
 def edges(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -116,45 +124,33 @@ def goal_line(axes: Axes, answers: Atlas) -> list[Any]:
     data = answers.dataset
     if "threshold" not in data:
         return []
-    from limitsets.feeder.goals import OrientedBeyond
-
     goal = _goal_of(answers)
     over = (data["threshold"].values - goal.x) * (1 if isinstance(goal, OrientedBeyond) else -1)
     fails = over[np.isfinite(over)] > 0.0
     if fails.all() or not fails.any():
-        word = "fails" if fails.any() else "holds"
-        return (
-            [Patch(label=f"the goal {word} wherever there is a limit set", alpha=0.0)] if fails.size else []
-        )
-    ticks: dict[str, Any] = {"spacing": 8.0, "length": 0.6}
+        words = f"the goal {'fails' if fails.any() else 'holds'} wherever there is a limit set"
+        return [Patch(label=words, alpha=0.0)] if fails.size else []
     looks = [Stroke(linewidth=3.2, foreground="white"), Normal()]
     names = answers.axes
     if len(names) == 2:
         xs, ys = (data[name].values for name in reversed(names))
-        line = axes.contour(
-            xs, ys, np.ma.masked_invalid(over), [0.0], colors=style.GOAL, linewidths=1.6, zorder=4
-        )
+        levels = np.ma.masked_invalid(over)
+        line = axes.contour(xs, ys, levels, [0.0], colors=style.GOAL, linewidths=1.6, zorder=4)
         # higher values are on the left of a contour
-        line.set(path_effects=[*looks, withTickedStroke(angle=90, **ticks)], gid="goal")
+        line.set(path_effects=[*looks, withTickedStroke(angle=90, **TICKS)], gid="goal")
     else:
         x = data[names[0]].values
         both = np.isfinite(over[1:]) & np.isfinite(over[:-1])
         for k in np.flatnonzero(both & ((over[1:] > 0.0) != (over[:-1] > 0.0))).tolist():
             at = x[k] - over[k] * (x[k + 1] - x[k]) / (over[k + 1] - over[k])
-            angle = -90 if over[k + 1] > over[k] else 90
-            effects = [*looks, withTickedStroke(angle=angle, **ticks)]
-            axes.axvline(at, color=style.GOAL, lw=1.6, zorder=4, gid="goal", path_effects=effects)
-    ticked = [withTickedStroke(angle=-90, **ticks)]
-    return [
-        style.key("the goal fails on the side of the ticks", color=style.GOAL, lw=1.6, path_effects=ticked)
-    ]
+            ticks = withTickedStroke(angle=-90 if over[k + 1] > over[k] else 90, **TICKS)
+            axes.axvline(at, color=style.GOAL, lw=1.6, zorder=4, gid="goal", path_effects=[*looks, ticks])
+    look = {"lw": 1.6, "path_effects": [withTickedStroke(angle=-90, **TICKS)]}
+    return [style.key("the goal fails on the side of the ticks", color=style.GOAL, **look)]
 
 
 def _goal_of(answers: Atlas) -> Any:
     """Read the goal of an atlas with thresholds: only these two kinds of goal have one."""
-    from limitsets.feeder.goals import OrientedBeyond, Reaches
-    from limitsets.feeder.scene import load
-
     goal = load(answers.dataset.attrs["scene"]).goal
     assert isinstance(goal, OrientedBeyond | Reaches)
     return goal
@@ -175,11 +171,8 @@ def unreached(axes: Axes, answers: Atlas) -> list[Any]:
     if not none.any():
         return []
     hatched(axes, *pixels(answers), np.atleast_2d(none), UNREACHED)
-    return [
-        Patch(
-            label=f"no part gets to x = {goal.x:g}", hatch=UNREACHED, fill=False, edgecolor=style.INK, lw=0.5
-        )
-    ]
+    look: dict[str, Any] = {"hatch": UNREACHED, "fill": False, "edgecolor": style.INK, "lw": 0.5}
+    return [Patch(label=f"no part gets to x = {goal.x:g}", **look)]
 
 
 def mark(axes: Axes, answers: Atlas) -> list[Any]:
@@ -190,18 +183,10 @@ def mark(axes: Axes, answers: Atlas) -> list[Any]:
         if value is None or not given[0] <= value <= given[-1]:
             return []
         values.append(value)
-    look: dict[str, Any] = {
-        "marker": "*",
-        "ms": 13.0,
-        "mfc": "white",
-        "mec": style.INK,
-        "mew": 1.0,
-        "ls": "none",
-    }
     x, y = values[-1], values[0] if len(values) == 2 else 0.15
-    axes.plot([x], [y], zorder=6, gid="design", **look)
+    axes.plot([x], [y], zorder=6, gid="design", **DESIGN)
     numbers = ", ".join(f"{value:.6g}" for value in reversed(values))
-    return [style.key(f"{title_of(answers)}: {numbers}", **look)]
+    return [style.key(f"{title_of(answers)}: {numbers}", **DESIGN)]
 
 
 def _value_of(answers: Atlas, name: str) -> float | None:
@@ -210,10 +195,6 @@ def _value_of(answers: Atlas, name: str) -> float | None:
     if "scene" not in plan:
         value = plan.get("parameters", {}).get(name)
         return float(value) if isinstance(value, int | float) else None
-    from limitsets.feeder.scene import load
-    from limitsets.feeder.scene.quantities import base_unit, find
-    from limitsets.feeder.scene.units import exact_factor
-
     scene = load(data.attrs["scene"])
     base = base_unit(find(name).dimension, scene.unit)
     return scene.value(name) / float(exact_factor(data[name].attrs.get("units", ""), base))
@@ -339,12 +320,10 @@ def atlas(found: Atlas) -> Figure:
         handles=handles, loc="outside right upper", fontsize=style.SMALL, frameon=False, handlelength=2.4,
         handleheight=1.6, labelspacing=0.9, borderaxespad=0.8,
     )  # fmt: skip
-    computed = ""
+    title = f"{title_of(found)}: topology of the attractors"
     if "level" in data:
-        computed = f"; {_percent(float((data['level'].values >= 0).mean()))} of the points computed"
-    axes.set_title(
-        f"{title_of(found)}: topology of the attractors{computed}", loc="left", fontsize=style.TEXT + 1
-    )
+        title += f"; {_percent(float((data['level'].values >= 0).mean()))} of the points computed"
+    axes.set_title(title, loc="left", fontsize=style.TEXT + 1)
     return figure
 
 
@@ -372,17 +351,13 @@ def _paint(
     for hatch in {look["hatch"] for look in looks.values()} - {""}:
         numbers = [number for number, look in looks.items() if look["hatch"] == hatch]
         hatched(axes, x, y, np.isin(rows, numbers), hatch)
-    across, along = np.nonzero(rows[:, 1:] != rows[:, :-1]), np.nonzero(rows[1:] != rows[:-1])
-    if across[0].size + along[0].size <= MOST_EDGES:
-        i, j = across
-        lines = [np.stack([x[j + 1], y[i], x[j + 1], y[i + 1]], axis=1)]
-        i, j = along
-        lines.append(np.stack([x[j], y[i + 1], x[j + 1], y[i + 1]], axis=1))
-        pairs = np.concatenate(lines).reshape(-1, 2, 2)
-        axes.add_collection(
-            LineCollection(list(pairs), colors=style.INK, linewidths=0.5, zorder=3, gid="boundaries"),
-            autolim=False,
-        )
+    (i, j), (k, m) = np.nonzero(rows[:, 1:] != rows[:, :-1]), np.nonzero(rows[1:] != rows[:-1])
+    if i.size + k.size <= MOST_EDGES:
+        upright = np.stack([x[j + 1], y[i], x[j + 1], y[i + 1]], axis=1)
+        level = np.stack([x[m], y[k + 1], x[m + 1], y[k + 1]], axis=1)
+        pairs = list(np.concatenate([upright, level]).reshape(-1, 2, 2))
+        lines = LineCollection(pairs, colors=style.INK, linewidths=0.5, zorder=3, gid="boundaries")
+        axes.add_collection(lines, autolim=False)
 
 
 def _label(axes: Axes, answers: Atlas, where: npt.NDArray[np.bool_], words: str) -> None:
@@ -392,12 +367,17 @@ def _label(axes: Axes, answers: Atlas, where: npt.NDArray[np.bool_], words: str)
     regions, count = label(where)
     if count == 0:
         return
-    largest = regions == 1 + np.bincount(regions.ravel())[1:].argmax()
-    room = distance_transform_edt(np.pad(largest, 1))[1:-1, 1:-1]
-    i, j = np.unravel_index(room.argmax(), room.shape)
-    if room[i, j] < max(ROOM * min(where.shape), 1.5):
+    (i, j), room = widest(regions == 1 + np.bincount(regions.ravel())[1:].argmax())
+    if room < max(ROOM * min(where.shape), 1.5):
         return
     x = float(answers.dataset[answers.axes[-1]].values[j])
     y = float(answers.dataset[answers.axes[0]].values[i]) if len(answers.axes) == 2 else 0.5
     box = {"boxstyle": "circle,pad=0.22", "fc": "white", "ec": style.INK, "lw": 0.5, "alpha": 0.92}
     axes.text(x, y, words, ha="center", va="center", fontsize=style.SMALL, bbox=box, zorder=5, gid="number")
+
+
+def widest(where: npt.NDArray[np.bool_]) -> tuple[tuple[int, int], float]:
+    """Give the point that is farthest from the edge of a region, and its distance from there."""
+    room = distance_transform_edt(np.pad(where, 1))[1:-1, 1:-1]
+    row, column = np.unravel_index(int(room.argmax()), room.shape)
+    return (int(row), int(column)), float(room[row, column])

@@ -15,6 +15,7 @@ from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
 from limitsets.face.plot import style
 from limitsets.face.plot.atlas_maps import frame, hatched, mark, pixels, title_of
+from limitsets.feeder.scene import load
 from limitsets.feeder.scene.quantities import NAMES, base_unit
 
 if TYPE_CHECKING:
@@ -84,10 +85,10 @@ def atlas_surface(found: Atlas, variable: str, side: int | None = None) -> Figur
     words += ("" if side is None else f", side {side}") + (f" [{unit}]" if unit else "")
     figure, axes = frame(found, 3.4)
     level = _level(found, variable)
-    handles = _painted(figure, axes, found, values, words, level) if values.ndim == 2 else []
-    if values.ndim == 1:
+    if values.ndim == 2:
+        handles = _painted(figure, axes, found, values, words, level) + mark(axes, found)
+    else:
         handles = _lined(axes, found, values, words, level)
-    handles += mark(axes, found) if values.ndim == 2 else []
     if handles:
         style.legend(figure, handles, 3)
     axes.set_title(f"{title_of(found)}: {words.partition(' [')[0]}", loc="left", fontsize=style.TEXT + 1)
@@ -126,13 +127,9 @@ def _values(answers: Atlas, variable: str, side: int | None) -> Array:
 def _level(answers: Atlas, variable: str) -> tuple[float, str] | None:
     if variable == "lyapunov":
         return 0.0, "0"
-    plan = answers.dataset.attrs["plan"]
-    if variable != "threshold" or "scene" not in plan:
+    if variable != "threshold" or "scene" not in answers.dataset.attrs["plan"]:
         return None
-    from limitsets.feeder.scene import load
-
-    goal = load(answers.dataset.attrs["scene"]).goal
-    x = getattr(goal, "x", None)
+    x = getattr(load(answers.dataset.attrs["scene"]).goal, "x", None)
     return None if x is None else (float(x), f"x of the goal, {x:g}")
 
 
@@ -147,20 +144,15 @@ def _painted(
     handles: list[object] = []
     if there.any():
         low, high = np.percentile(values[there], SPREAD)
-        image = axes.pcolorfast(
-            x, y, np.ma.masked_invalid(values), cmap=COLOURS, vmin=low, vmax=high, zorder=1
-        )
+        shown = np.ma.masked_invalid(values)
+        image = axes.pcolorfast(x, y, shown, cmap=COLOURS, vmin=low, vmax=high, zorder=1)
         cut = (bool((values[there] < low).any()), bool((values[there] > high).any()))
         extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(cut, "neither")
         figure.colorbar(image, ax=axes, label=words, extend=extend, pad=0.02)
         if level is not None and values[there].min() < level[0] < values[there].max():
             xs, ys = (answers.dataset[name].values for name in reversed(answers.axes))
-            axes.contour(
-                xs, ys, np.ma.masked_invalid(values), [level[0]], colors="white", linewidths=2.4, zorder=3
-            )
-            line = axes.contour(
-                xs, ys, np.ma.masked_invalid(values), [level[0]], colors=style.INK, linewidths=1.1, zorder=4
-            )
+            axes.contour(xs, ys, shown, [level[0]], colors="white", linewidths=2.4, zorder=3)
+            line = axes.contour(xs, ys, shown, [level[0]], colors=style.INK, linewidths=1.1, zorder=4)
             line.set_gid("level")
             handles.append(style.key(level[1], color=style.INK, lw=0.9))
     if not there.all():
@@ -246,15 +238,12 @@ def bifurcation(found: Continuation, by: str | None = None) -> Figure:
     for side, axes in zip(sides, panels, strict=True):
         _bands(axes, found, side, along)
         _critical(axes, found, side, along)
-        unit = f" [{found.unit}]" if found.unit else ""
-        axes.set_ylabel(f"x on side {side}{unit}" if count > 1 else f"x{unit}")
-        axes.set_xlim(float(along.min()), float(along.max()))
+        words = (f"x on side {side}" if count > 1 else "x") + (f" [{found.unit}]" if found.unit else "")
+        axes.set(ylabel=words, xlim=(float(along.min()), float(along.max())))
         style.open_frame(axes)
     kinds = _events(panels, found, sides, name, factor)
     panels[-1].set_xlabel(label)
-    style.title(figure, f"Attractors of {found.name}")
-    style.legend(figure, _legend(found, kinds), 5)
-    return figure
+    return style.finished(figure, f"Attractors of {found.name}", _legend(found, kinds), 5)
 
 
 def _scale(continuation: Continuation, name: str) -> tuple[float, str]:
@@ -275,13 +264,11 @@ def _bands(axes: Axes, continuation: Continuation, side: int, along: NDArray[np.
         areas: list[Any] = []
         lines: list[Any] = []
         for k, (here, there) in enumerate(pairwise(continuation.attractors)):
-            if number not in here or number not in there:
-                continue
-            first, last = (states[number].extents.get(side, []) for states in (here, there))
-            if len(first) != len(last):
-                continue
+            first, last = (
+                states[number].extents.get(side, []) if number in states else [] for states in (here, there)
+            )
             x, y = along[k], along[k + 1]
-            for (a, b), (c, d) in zip(first, last, strict=True):
+            for (a, b), (c, d) in zip(first, last, strict=True) if len(first) == len(last) else ():
                 areas.append([(x, a), (y, c), (y, d), (x, b)])
                 lines += [[(x, a), (y, c)], [(x, b), (y, d)]]
         face, _ = style.SETS[number % len(style.SETS)]
@@ -293,23 +280,11 @@ def _bands(axes: Axes, continuation: Continuation, side: int, along: NDArray[np.
 
 
 def _critical(axes: Axes, continuation: Continuation, side: int, along: NDArray[np.float64]) -> None:
-    lines = [
-        [(along[k], c), (along[k + 1], d)]
-        for k, (here, there) in enumerate(pairwise(continuation.critical))
-        if len(here[side]) == len(there[side])
-        for c, d in zip(here[side], there[side], strict=True)
-    ]
-    # Points of one curve are joined, so that the dashes do not begin anew at every step.
-    ways: list[list[tuple[float, float]]] = []
-    for first, last in lines:
-        way = next((each for each in ways if each[-1] == first), None)
-        if way is None:
-            ways.append([first, last])
-        else:
-            way.append(last)
-    for way in ways:
-        x, y = zip(*way, strict=True)
-        axes.plot(x, y, zorder=4, gid="critical point", **CRITICAL)
+    counts = [len(points[side]) for points in continuation.critical]
+    for run in np.split(np.arange(len(counts)), np.flatnonzero(np.diff(counts)) + 1):
+        for number in range(counts[run[0]] if run.size > 1 else 0):
+            curve = [continuation.critical[k][side][number] for k in run]
+            axes.plot(along[run], curve, zorder=4, gid="critical point", **CRITICAL)
 
 
 def _events(
@@ -331,15 +306,17 @@ def _events(
 
 
 def _legend(continuation: Continuation, kinds: set[str]) -> list[Any]:
-    handles: list[Any] = []
-    for number in continuation.numbers[: len(style.SETS)]:
-        face, _ = style.SETS[number % len(style.SETS)]
-        handles.append(Patch(facecolor=face, edgecolor=style.INK, lw=0.5, label=f"attractor {number}"))
-    if any(points for each in continuation.critical for points in each.values()):
-        handles.append(style.key("critical point", **CRITICAL))
-    handles += [
-        style.key(f"event: {kind}", mfc="none", **MARK, **look)
-        for kind, look in EVENTS.items()
-        if kind in kinds
+    faces = [style.SETS[number % len(style.SETS)][0] for number in continuation.numbers[: len(style.SETS)]]
+    critical = any(points for sides in continuation.critical for points in sides.values())
+    return [
+        *(
+            Patch(facecolor=face, edgecolor=style.INK, lw=0.5, label=f"attractor {number}")
+            for number, face in zip(continuation.numbers, faces, strict=False)
+        ),
+        style.key("critical point", **CRITICAL) if critical else None,
+        *(
+            style.key(f"event: {kind}", mfc="none", **MARK, **look)
+            for kind, look in EVENTS.items()
+            if kind in kinds
+        ),
     ]
-    return handles

@@ -72,21 +72,19 @@ def basins(source: Any, shares: Basins, found: Any = None) -> Figure:
     """
     grid = shares.grid
     if grid.dimension > 2:
-        remedy = "draw a section of them yourself"
-        raise AnswerError("the dimension of the basins", grid.dimension, "1 or 2", remedy)
-    (name, unit), cells = _words(source), list[CellSet]()
-    if grid.dimension == 1:
-        figure = _strips(shares, [] if found is None else style.extents_of(found), unit)
-    else:
-        cells = [] if found is None else _cells_of(found)
-        figure = _plane(shares, cells)
-    style.title(figure, f"Basins{name}: where a start ends up")
-    handles = _legend(shares)
-    if (found is not None and grid.dimension == 1) or any(cells):
-        shown = style.INK if grid.dimension == 1 else style.FLIP
-        handles.append(Patch(facecolor=shown, label="the limit set itself"))
-    style.legend(figure, handles, 3 if figure.get_figwidth() > 8.0 else 2)
-    return figure
+        raise AnswerError(
+            "the dimension of the basins", grid.dimension, "1 or 2", "draw a section of them yourself"
+        )
+    (name, unit), line = _words(source), grid.dimension == 1
+    sets: list[Any] = []
+    if found is not None:
+        sets = style.extents_of(found) if line else _cells_of(found)
+    figure = _strips(shares, sets, unit) if line else _plane(shares, sets)
+    inside = Patch(facecolor=style.INK if line else style.FLIP, label="the limit set itself")
+    drawn = found is not None if line else any(sets)
+    handles = [*_legend(shares), inside if drawn else None]
+    columns = 3 if figure.get_figwidth() > 8.0 else 2
+    return style.finished(figure, f"Basins{name}: where a start ends up", handles, columns)
 
 
 def _words(source: Any) -> tuple[str, str]:
@@ -101,13 +99,12 @@ def _words(source: Any) -> tuple[str, str]:
 def _cells_of(attractors: Any) -> list[CellSet]:
     """Read sets of cells off attractors, or one of them."""
     several = attractors if isinstance(attractors, Iterable) else [attractors]
-    cells = [getattr(each, "cells", None) for each in several]
-    known = [each for each in cells if isinstance(each, CellSet)]
-    if len(known) < len(cells):
+    cells: list[Any] = [getattr(attractor, "cells", None) for attractor in several]
+    if not all(isinstance(cell_set, CellSet) for cell_set in cells):
         raise AnswerError(
             "what to draw", type(attractors).__name__, "attractors", "pass those of ls.attractors"
         )
-    return known
+    return cells
 
 
 def _look(label: int) -> dict[str, Any]:
@@ -119,24 +116,28 @@ def _look(label: int) -> dict[str, Any]:
 def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
     grid = shares.grid
     figure, (axes,) = style.canvas(9.0, 0.72 * grid.sides + 1.7)
-    for side in range(grid.sides):
-        edges, labels = grid.edges[side][0], shares.labels[grid.of_side(side)]
-        if not labels.size:
-            continue
-        border = np.concatenate([[0], np.flatnonzero(np.diff(labels)) + 1, [labels.size]])
-        for first, last in pairwise(border.tolist()):
-            label, ends = int(labels[first]), (float(edges[first]), float(edges[last]))
-            style.bar(axes, *ends, -side, 0.32, gid=f"label {label}", **_look(label))
-        for extents in sets:
-            for lo, hi in extents.get(side, ()):
-                style.bar(axes, lo, hi, -side, 0.07, facecolor=style.INK, lw=0, zorder=3, gid="attractor")
-    axes.set_yticks([-side for side in range(grid.sides)], [f"side {side}" for side in range(grid.sides)])
-    axes.set_ylim(-grid.sides + 0.5, 0.5)
+    for side, lo, hi, label in strips_of(shares):
+        style.bars(axes, [(lo, hi)], -side, 0.32, gid=f"label {label}", **_look(label))
+    look = {"facecolor": style.INK, "lw": 0, "zorder": 3, "gid": "attractor"}
+    for extents in sets:
+        for side, parts in extents.items():
+            style.bars(axes, parts, -side, 0.07, **look)
+    style.lanes(axes, {-side: f"side {side}" for side in range(grid.sides)}, style.TEXT)
     lo, hi = float(grid.domain.lo.min()), float(grid.domain.hi.max())
-    axes.set_xlim(lo - 0.01 * (hi - lo), hi + 0.01 * (hi - lo))
+    axes.set(xlim=style.widened(lo, hi, 0.01), ylim=(-grid.sides + 0.5, 0.5))
     axes.set_xlabel(f"x of the start{unit}")
-    style.lanes(axes)
     return figure
+
+
+def strips_of(shares: Basins) -> list[tuple[int, float, float, int]]:
+    """Join cells of one label that lie side by side: side, ends, label."""
+    strips = []
+    for side in range(shares.grid.sides):
+        edges, labels = shares.grid.edges[side][0], shares.labels[shares.grid.of_side(side)]
+        border = [0, *(np.flatnonzero(np.diff(labels)) + 1).tolist(), labels.size]
+        for first, last in pairwise(border if labels.size else ()):
+            strips.append((side, float(edges[first]), float(edges[last]), int(labels[first])))
+    return strips
 
 
 def _plane(shares: Basins, attractors: list[CellSet]) -> Figure:
@@ -148,19 +149,14 @@ def _plane(shares: Basins, attractors: list[CellSet]) -> Figure:
     norm = BoundaryNorm(np.arange(len(kinds) + 1) - 0.5, len(kinds))
     for side, axes in enumerate(panels):
         picture = number[grid.of_side(side)].reshape(tuple(grid.shape[side]))
-        axes.pcolormesh(
-            *grid.edges[side], picture.T, cmap=ListedColormap(colours), norm=norm, rasterized=True
-        )
-        for each in attractors:
-            inside = each.mask[grid.of_side(side)].reshape(tuple(grid.shape[side]))
-            axes.pcolormesh(
-                *grid.edges[side], np.ma.masked_where(~inside, inside).T, cmap=ListedColormap([style.FLIP]),
-                rasterized=True, gid="attractor",
-            )  # fmt: skip
-        axes.set_xlabel("$x_0$")
-        axes.set_ylabel("$x_1$")
-        if grid.sides > 1:
-            axes.set_title(f"side {side}", fontsize=style.TEXT)
+        look: dict[str, Any] = {"rasterized": True, "cmap": ListedColormap(colours)}
+        axes.pcolormesh(*grid.edges[side], picture.T, norm=norm, **look)
+        for cells in attractors:
+            inside = cells.mask[grid.of_side(side)].reshape(tuple(grid.shape[side]))
+            look |= {"cmap": ListedColormap([style.FLIP]), "gid": "attractor"}
+            axes.pcolormesh(*grid.edges[side], np.ma.masked_where(~inside, inside).T, **look)
+        axes.set(xlabel="$x_0$", ylabel="$x_1$")
+        axes.set_title(f"side {side}" if grid.sides > 1 else "", fontsize=style.TEXT)
     return figure
 
 
@@ -236,14 +232,12 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = 
         _arrow(axes, place[one], place[other], dotted=isinstance(other, str))
     for node, (x, y) in place.items():
         _node(axes, node, drawn.nodes[node], x, y, few=few, unit=unit)
-    axes.set_xlim(-0.5 * max(widest, 2) - 0.1, 0.5 * max(widest, 2) + 0.1)
-    axes.set_ylim(-0.72, depth + 0.55)
+    half = 0.5 * max(widest, 2) + 0.1
+    axes.set(xlim=(-half, half), ylim=(-0.72, depth + 0.55))
     axes.set_axis_off()
     axes.set_title(_title(whole, drawn, name), fontsize=style.TEXT + 1, loc="left")
-    figure.supxlabel(
-        "Arrows lead down the order. Areas grow with the number of cells; a double border: attracting.",
-        fontsize=style.SMALL,
-    )
+    words = "Arrows lead down the order. Areas grow with the number of cells; a double border: attracting."
+    figure.supxlabel(words, fontsize=style.SMALL)
     return figure
 
 
@@ -295,26 +289,27 @@ def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, fe
     if data["attracting"]:
         axes.plot([x], [y], ms=size + 6, mfc="none", gid="border", **circle)
     axes.annotate(str(node), (x, y), ha="center", va="center", fontsize=style.SMALL)
-    lines = [f"{data['cells']} cell{'' if data['cells'] == 1 else 's'}"]
+    lines = [f"{data['cells']} cell{'s' * (data['cells'] != 1)}"]
     if few:
         members = data.get("members")  # a graph from elsewhere has only intervals
-        axes_of = range(1 if members is None else members.grid.dimension)
-        along = [data["extents"], *(data["members"].extents(axis) for axis in axes_of[1:])]
-        sides = members is None or members.grid.sides > 1  # a map without sides has no name for side 0
-        every = [(side, axis, parts) for axis in axes_of for side, parts in along[axis].items()]
-        for side, axis, parts in every:
-            shown = ", ".join(f"{lo:z.2f} to {hi:z.2f}" for lo, hi in parts[:2])
-            words = [f"side {side}:"] * sides + [f"$x_{axis}$"] * (len(axes_of) > 1)
-            lines.append(f"{' '.join([*words, shown])}{' ...' if len(parts) > 2 else ''} {unit}".rstrip())
+        dimension, several = (
+            (1, True) if members is None else (members.grid.dimension, members.grid.sides > 1)
+        )
+        along = [data["extents"], *(data["members"].extents(axis) for axis in range(1, dimension))]
+        for axis, extents in enumerate(along):
+            for side, parts in extents.items():
+                shown = ", ".join(f"{lo:z.2f} to {hi:z.2f}" for lo, hi in parts[:2])
+                # a map without sides has no name for side 0
+                words = [f"side {side}:"] * several + [f"$x_{axis}$"] * (dimension > 1)
+                lines.append(f"{' '.join([*words, shown])}{' ...' * (len(parts) > 2)} {unit}".rstrip())
     # An arrow to a way out may run behind the words.
-    box = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
-    style.note(axes, "\n".join(lines), (x, y), (size / 2 + 7, 0), va="center", bbox=box, gid="words")
+    shift = (size / 2 + 7, 0)
+    style.note(axes, "\n".join(lines), (x, y), shift, va="center", bbox=style.PLATE, gid="words")
 
 
 def _arrow(axes: Axes, start: Place, end: Place, *, dotted: bool) -> None:
     head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 11, "shrinkA": 13, "shrinkB": 16}
-    line: dict[str, Any] = {"color": "#555555", "lw": 1.0, "ls": ":" if dotted else "-"}
-    axes.add_patch(FancyArrowPatch(start, end, **head, **line))
+    axes.add_patch(FancyArrowPatch(start, end, **head, color="#555555", lw=1.0, ls=":" if dotted else "-"))
 
 
 def _title(whole: nx.DiGraph[int], drawn: nx.DiGraph[Any], name: str) -> str:

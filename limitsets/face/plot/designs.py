@@ -66,32 +66,24 @@ def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Fi
     drawn = [sets[step] for step in steps]
     deep = count + GAP
     figure, (axes,) = style.canvas(9.4, 0.27 * deep * rows + 1.75)
-    ticks = []
+    names = {}
     for row, (step, attractors) in enumerate(zip(steps, drawn, strict=True)):
         scene, top = found.path[step], -deep * row
-        ticks += [top - side for side in range(count)]
-        _lanes(axes, scene, top)
+        for side, a in enumerate(scene.sides.a.tolist()):
+            names[top - side] = f"side {side}"
+            axes.plot([a, scene.arm_length], [top - side] * 2, color=style.FAINT, lw=0.6, zorder=1)
         for number, extents in enumerate(attractors):
             for side, parts in extents.items():
-                look = ANOTHER if number else style.of_set(side)
-                for lo, hi in parts:
-                    style.bar(axes, lo, hi, top - side, HALF, lw=0.8, zorder=2, gid="limit set", **look)
+                look = {"lw": 0.8, "zorder": 2} | (ANOTHER if number else style.of_set(side))
+                style.bars(axes, parts, top - side, HALF, gid="limit set", **look)
         _marks(axes, scene, top)
         _words(axes, found, scene, step, top - 0.5 * (count - 1))
-    axes.set_yticks(
-        ticks, [f"side {side}" for _ in range(rows) for side in range(count)], fontsize=style.SMALL
-    )
+    style.lanes(axes, names)
     _frame(axes, found, drawn, deep * rows)
     several = max((len(attractors) for attractors in drawn), default=1) > 1
     some = f"\n({rows} of {len(found.path)} scenes are drawn)" if rows < len(found.path) else ""
-    style.title(figure, f"{found.start.name}: limit sets while the critical points move{some}")
-    style.legend(figure, _legend(found, count, several), 5)
-    return figure
-
-
-def _lanes(axes: Axes, scene: Scene, top: float) -> None:
-    for side, a in enumerate(scene.sides.a.tolist()):
-        axes.plot([a, scene.arm_length], [top - side] * 2, color=style.FAINT, lw=0.6, zorder=1)
+    words = f"{found.start.name}: limit sets while the critical points move{some}"
+    return style.finished(figure, words, _legend(found, count, several), 5)
 
 
 def _marks(axes: Axes, scene: Scene, top: float) -> None:
@@ -126,20 +118,19 @@ def _frame(axes: Axes, solution: Design, sets: Sequence[Sequence[Extents]], dept
         for x in (*solution.before.x.tolist(), *solution.jacobian.x.tolist())
         if x <= solution.start.arm_length
     ]
-    lo, hi = min(ends, default=0.0), max(ends, default=solution.start.arm_length)
-    room = 0.05 * (hi - lo)
-    axes.set_xlim(max(lo - room, 0.0), hi + room)
-    axes.set_ylim(-depth + GAP + 0.1, 0.8)
+    lo, hi = style.widened(min(ends, default=0.0), max(ends, default=solution.start.arm_length), 0.05)
+    axes.set(xlim=(max(lo, 0.0), hi), ylim=(-depth + GAP + 0.1, 0.8))
     axes.set_xlabel(f"x of the centre of mass from the joint [{solution.start.unit}]")
-    style.lanes(axes)
     style.goal(axes, solution.start, zorder=3)
 
 
 def _legend(solution: Design, count: int, several: bool) -> list[Any]:
-    sides = [Patch(label=f"limit set on side {k}", lw=0.8, **style.of_set(k)) for k in range(count)]
-    another = [Patch(label="another limit set", **ANOTHER)] if several else []
-    mark = style.key("first critical point", color=style.FLIP, marker="|", ms=10, mew=2.2, ls="")
-    return [*sides, *another, mark, *style.key_of_goal(solution.start)]
+    return [
+        *(Patch(label=f"limit set on side {k}", lw=0.8, **style.of_set(k)) for k in range(count)),
+        Patch(label="another limit set", **ANOTHER) if several else None,
+        style.key("first critical point", color=style.FLIP, marker="|", ms=10, mew=2.2, ls=""),
+        style.key_of_goal(solution.start),
+    ]
 
 
 # ----------------------------------------------------------------
@@ -185,9 +176,7 @@ def robust_design(found: RobustDesign, *, wanted: float | None = None, bound: fl
             how: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "ha": "right", "va": "top"}
             style.note(left, f"{text}\n{value:.2f}", (value, 0.98), (-4, 0), fontsize=9, **how)
     _costs(right, found)
-    style.legend(figure, handles, 3)
-    style.title(figure, f"{found.before.name}: what the margin costs")
-    return figure
+    return style.finished(figure, f"{found.before.name}: what the margin costs", handles)
 
 
 def _front(axes: Axes, optimum: RobustDesign) -> list[Line2D]:
@@ -199,32 +188,29 @@ def _front(axes: Axes, optimum: RobustDesign) -> list[Line2D]:
     axes.plot(margins, means, **look)
     handles = [style.key("designs that none beats, sampled", **look)]
     points = [
-        (
-            optimum.before_margins,
-            optimum.before_sampled,
-            optimum.before_feeding,
-            BEFORE,
-            "s",
-            "the scene before",
-        ),
-        (optimum.margins, optimum.sampled, optimum.feeding, style.FLIP, "D", "the design"),
+        (optimum.before_margins, optimum.before_sampled, optimum.before_feeding),
+        (optimum.margins, optimum.sampled, optimum.feeding),
     ]
-    for margins_of, sampled, feeding, colour, marker, label in points:
+    looks = ((BEFORE, "s", "the scene before"), (style.FLIP, "D", "the design"))
+    for (margins_of, sampled, feeding), (colour, marker, label) in zip(points, looks, strict=True):
         if sampled is None or feeding is None:
             continue
         axes.vlines(sampled.margin, feeding.mean, feeding.quantile_95, color=colour, lw=0.8, alpha=0.6)
         axes.plot(sampled.margin, feeding.mean, color=colour, marker=marker, ms=7.0, ls="none")
-        said = label
-        for one in margins_of:
-            axes.plot([one.proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.0, alpha=0.4)
-            said += f"\n{one.goals[0].kind.replace('_', ' ')}: proved to {bound(one.proved)}"
-        handles.append(style.key(said, color=colour, marker=marker, ms=7.0, lw=2.5))
-    axes.set_xlabel("joint margin, as a factor of the tolerance")
-    axes.set_ylabel("throws to feed from random starts")
-    axes.set_yscale("log")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter(ScalarFormatter())
-    axes.yaxis.set_minor_formatter(NullFormatter())
+        for margin in margins_of:
+            axes.plot([margin.proved, sampled.margin], [feeding.mean] * 2, color=colour, lw=2.0, alpha=0.4)
+            label += f"\n{margin.goals[0].kind.replace('_', ' ')}: proved to {bound(margin.proved)}"
+        handles.append(style.key(label, color=colour, marker=marker, ms=7.0, lw=2.5))
+    axes.set(
+        xlabel="joint margin, as a factor of the tolerance",
+        ylabel="throws to feed from random starts",
+        yscale="log",
+    )
+    axes.yaxis.set(
+        major_locator=LogLocator(subs=(1.0, 2.0, 5.0)),
+        major_formatter=ScalarFormatter(),
+        minor_formatter=NullFormatter(),
+    )
     axes.set_title("throws: mean, and 95 % at the end of each line", loc="left", fontsize=10)
     return handles
 

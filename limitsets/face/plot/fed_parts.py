@@ -63,15 +63,11 @@ def feeding(found: Feeding) -> Figure:
         panels.insert(1, _tipping)
     if found.curve is not None:
         panels.append(_levels)
-    rows = math.ceil(len(panels) / 2)
-    figure, axes = style.canvas(9.6, 3.6 * rows + 0.3, rows, 2)
-    for draw, each in zip(panels, axes, strict=False):
-        draw(each, found)
-    for each in axes[len(panels) :]:
-        each.set_axis_off()
+    figure, frames = style.panels(len(panels), 2, (4.8, 3.6), (0.0, 0.3))
+    for draw, axes in zip(panels, frames, strict=True):
+        draw(axes, found)
     words = f"side {found.end.side} wanted beyond x = {found.end.x:g} {scene.unit}"
-    style.title(figure, f"{scene.name}: {words}")
-    return figure
+    return style.finished(figure, f"{scene.name}: {words}")
 
 
 def _corners(answer: Feeding, beyond: float, tipped: float) -> NDArray[np.float64]:
@@ -108,9 +104,7 @@ def _cavity(axes: Axes, answer: Feeding) -> None:
         axes.add_patch(Polygon(corners, closed=True, fill=False, ec=style.JOG, lw=1.1, alpha=alpha))
     axes.set_aspect("equal")
     axes.autoscale_view()
-    axes.set_title("a part tips over the end", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel(f"beyond the end [{scene.unit}]", fontsize=style.SMALL)
-    style.open_frame(axes)
+    style.panel(axes, "a part tips over the end", xlabel=f"beyond the end [{scene.unit}]")
 
 
 def _tipping(axes: Axes, answer: Feeding) -> None:
@@ -125,13 +119,10 @@ def _tipping(axes: Axes, answer: Feeding) -> None:
         style.note(axes, f"next throw, {rate:g} Hz", (float(e[0]), 1.0 / rate), (2, 3), color=style.FLIP)
     for lo, hi in answer.end.clear:
         axes.axvspan(max(lo, float(e[0])), hi, color="#9BD1B8", alpha=0.4, lw=0)
-    axes.set_xscale("log")
-    axes.set_ylim(bottom=0.0)
+    axes.set(xscale="log", ylim=(0.0, None))
     begins = "from rest" if scene.cavity is not None and scene.cavity.tips == "rest" else "as it comes down"
-    axes.set_title(f"time to tip, {begins} (shaded: clear)", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel(f"comes down beyond the end by [{scene.unit}]", fontsize=style.SMALL)
-    axes.set_ylabel("time [s]", fontsize=style.SMALL)
-    style.open_frame(axes)
+    below = f"comes down beyond the end by [{scene.unit}]"
+    style.panel(axes, f"time to tip, {begins} (shaded: clear)", xlabel=below, ylabel="time [s]")
 
 
 def _throws_until_fed(axes: Axes, answer: Feeding) -> None:
@@ -143,14 +134,15 @@ def _throws_until_fed(axes: Axes, answer: Feeding) -> None:
         if total.size and total[-1] > 0.0:
             label = f"{WORDS_OF_FATES[name]}: {100 * answer.shares.shares[name]:.3g} %"
             axes.step(number, total, where="post", lw=1.3, label=label, **LOOKS[name])
-    axes.set_title(f"fates of {answer.trials.fate.size} parts", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel("throws", fontsize=style.SMALL)
-    axes.set_ylabel("share of random starts", fontsize=style.SMALL)
     axes.set_ylim(0.0, 1.4 * axes.get_ylim()[1])  # room for the legend over the steps
-    axes.set_yticks([tick for tick in axes.get_yticks() if tick <= 1.0])
-    if axes.get_legend_handles_labels()[0]:  # no throw if all parts stay
-        axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
-    style.open_frame(axes)
+    style.panel(
+        axes,
+        f"fates of {answer.trials.fate.size} parts",
+        legend="upper left" if axes.lines else "",  # no throw if all parts stay
+        xlabel="throws",
+        ylabel="share of random starts",
+        yticks=[tick for tick in axes.get_yticks() if tick <= 1.0],
+    )
 
 
 def _levels(axes: Axes, answer: Feeding) -> None:
@@ -160,11 +152,13 @@ def _levels(axes: Axes, answer: Feeding) -> None:
     axes.axhline(curve.wanted, color=style.GOAL, lw=1.0, ls=(0, (4, 2)), label=f"{100 * curve.wanted:g} %")
     if curve.level is not None and curve.level[1] > 0.0:
         axes.axvline(sum(curve.level) / 2, color=style.GOAL, lw=1.0, ls=(0, (1, 1.5)))
-    axes.set_ylim(0.0, 1.03)
-    axes.set_title("right feeds against the noise", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel("noise, in multiples of the one given", fontsize=style.SMALL)
-    axes.legend(fontsize=style.SMALL, frameon=False, loc="lower left")
-    style.open_frame(axes)
+    style.panel(
+        axes,
+        "right feeds against the noise",
+        legend="lower left",
+        xlabel="noise, in multiples of the one given",
+        ylim=(0.0, 1.03),
+    )
 
 
 # ----------------------------------------------------------------
@@ -182,7 +176,10 @@ WORDS_OF_PAIRS = {
     "never": "still on the arm",
     "unfinished": "still in motion",
 }
-PARTS = (("#9CC7E4", style.JOG), ("#F3C9A8", style.FLIP))  # face, edge
+PARTS: tuple[tuple[str, dict[str, Any]], ...] = (  # face, edge
+    ("#9CC7E4", {"ec": style.JOG, "ls": "-"}),
+    ("#F3C9A8", {"ec": style.FLIP, "ls": style.FLIP_LINE}),
+)
 GHOSTS = 3  # poses on the way to rest
 
 
@@ -202,25 +199,19 @@ def assembly(found: Assembly) -> Figure:
         both parts at rest, and faintly on their way in the last throw; without, the throws until each part is fed.
     """
     cases = [name for name in OUTCOMES if found.contact != "none" and found.example(name) is not None]
-    panels = 1 + (len(cases) or 1)
-    rows = math.ceil(panels / 2)
-    figure, axes = style.canvas(9.6, 3.3 * rows + 0.3, rows, 2)
-    _outcomes(axes[0], found)
-    for each, name in zip(axes[1:], cases, strict=False):
-        _case(each, found, name)
+    figure, (shares, *frames) = style.panels(1 + (len(cases) or 1), 2, (4.8, 3.3), (0.0, 0.3))
+    _outcomes(shares, found)
+    for axes, name in zip(frames, cases, strict=False):
+        _case(axes, found, name)
     if not cases:
-        _throws_of_pairs(axes[1], found)
-    for each in axes[panels:]:
-        each.set_axis_off()
+        _throws_of_pairs(frames[0], found)
     one, two = (scene.name for scene in found.pair.scenes)
-    if cases:
-        looks = zip((one, two), PARTS, ("-", style.FLIP_LINE), strict=True)
-        handles = [Patch(label=name, fc=face, ec=edge, ls=line, lw=1.4) for name, (face, edge), line in looks]
-        style.legend(figure, handles, 2)
+    looks = zip((one, two), PARTS, strict=True)
+    handles = [Patch(label=name, fc=face, lw=1.4, **edge) for name, (face, edge) in looks]
     held = f"in contact, {found.contact}, cavity {'carried' if found.series.carried else 'standing'}"
     meet = "pass through each other" if found.contact == "none" else held
-    style.title(figure, f"{one} and {two}, {meet}: {len(found.rows)} trials")
-    return figure
+    words = f"{one} and {two}, {meet}: {len(found.rows)} trials"
+    return style.finished(figure, words, handles if cases else (), 2)
 
 
 def _outcomes(axes: Axes, answer: Assembly) -> None:
@@ -231,28 +222,24 @@ def _outcomes(axes: Axes, answer: Assembly) -> None:
         axes.barh(row, rate.share, 0.6, **style.of_set(0 if name == "assembled" else 4))
         axes.plot([low, high], [row, row], color=style.INK, lw=1.3)
         style.note(axes, f"{rate.count}", (high, row), (4, -3))
-    axes.set_yticks(
-        range(len(shown)), [WORDS_OF_PAIRS[name] for name in reversed(shown)], fontsize=style.SMALL
-    )
-    axes.set_xlim(0.0, 1.15)
-    axes.set_xlabel("share of the trials, 95 % interval", fontsize=style.SMALL)
-    axes.set_title("what becomes of a pair", loc="left", fontsize=style.TEXT)
-    style.open_frame(axes)
+    names = [WORDS_OF_PAIRS[name] for name in reversed(shown)]
+    axes.set_yticks(range(len(shown)), names, fontsize=style.SMALL)
+    style.panel(axes, "what becomes of a pair", xlim=(0.0, 1.15), xlabel="share of the trials, 95 % interval")
 
 
 def _throws_of_pairs(axes: Axes, answer: Assembly) -> None:
-    for k, (scene, (_, colour)) in enumerate(zip(answer.pair.scenes, PARTS, strict=True)):
+    for k, (scene, (_, edge)) in enumerate(zip(answer.pair.scenes, PARTS, strict=True)):
         right = np.sort([row["throws"][k] for row in answer.rows if row["fates"][k] == "right"])
         share = np.arange(1, right.size + 1) / len(answer.rows)
-        axes.step(
-            right, share, where="post", color=colour, ls=("-", style.FLIP_LINE)[k], lw=1.3, label=scene.name
-        )
-    axes.set_ylim(0.0, 1.03)
-    axes.set_title("fed rightly, each part by itself", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel("throws", fontsize=style.SMALL)
-    axes.set_ylabel("share of the trials", fontsize=style.SMALL)
-    axes.legend(fontsize=style.SMALL, frameon=False, loc="lower right")
-    style.open_frame(axes)
+        axes.step(right, share, where="post", label=scene.name, color=edge["ec"], ls=edge["ls"], lw=1.3)
+    style.panel(
+        axes,
+        "fed rightly, each part by itself",
+        legend="lower right",
+        xlabel="throws",
+        ylabel="share of the trials",
+        ylim=(0.0, 1.03),
+    )
 
 
 def _case(axes: Axes, answer: Assembly, name: str) -> None:
@@ -270,14 +257,15 @@ def _case(axes: Axes, answer: Assembly, name: str) -> None:
     scene = answer.pair.scenes[0]
     cavity = scene.cavity
     assert cavity is not None
-    axes.set_xlim(
-        -3.0 if name in ("left", "never") else cavity.position - 12.0, cavity.position + cavity.width + 1.5
+    left = -3.0 if name in ("left", "never") else cavity.position - 12.0
+    style.panel(
+        axes,
+        f"{WORDS_OF_PAIRS[name]} (trial {number})",
+        xlim=(left, cavity.position + cavity.width + 1.5),
+        ylim=(scene.surface_height - cavity.depth - 1.0, scene.surface_height + 9.0),
+        aspect="equal",
+        xlabel=f"x [{scene.unit}]",
     )
-    axes.set_ylim(scene.surface_height - cavity.depth - 1.0, scene.surface_height + 9.0)
-    axes.set_aspect("equal")
-    axes.set_title(f"{WORDS_OF_PAIRS[name]} (trial {number})", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel(f"x [{scene.unit}]", fontsize=style.SMALL)
-    style.open_frame(axes)
 
 
 def _parts(axes: Axes, film: Recording, frame: int, *, whole: bool) -> None:
@@ -285,4 +273,4 @@ def _parts(axes: Axes, film: Recording, frame: int, *, whole: bool) -> None:
         corners = film.corners(frame, k)
         if np.isfinite(corners).all():
             look = {"fc": face, "lw": 1.4} if whole else {"fc": "none", "lw": 0.7, "alpha": 0.5}
-            axes.add_patch(Polygon(corners, closed=True, ec=edge, ls=("-", style.FLIP_LINE)[k], **look))
+            axes.add_patch(Polygon(corners, closed=True, **edge, **look))

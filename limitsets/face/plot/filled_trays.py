@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.patches import Polygon
@@ -43,18 +43,16 @@ def tray(found: TrayFill) -> Figure:
         leaves, and what endless passes; captures after misses and releases after kicks that were stood, or without
         histories what a kick leaves.
     """
-    figure, axes = style.canvas(10.4, 7.6, 2, 2)
-    _poses(axes[0], found)
-    _curve(axes[1], found)
-    _shares(axes[2], found)
-    (_memory if found.histories else _kicks)(axes[3], found)
+    figure, frames = style.canvas(10.4, 7.6, 2, 2)
+    last = _memory if found.histories else _kicks
+    for axes, draw in zip(frames, (_poses, _curve, _shares, last), strict=True):
+        draw(axes, found)
     sizes, unit = found.passes.tray, found.scene.unit
     depth, kick = sizes.depression_depth, sizes.agitation
     words = (
         f"side {found.passes.side} wanted, depressions {depth:.4g} {unit} deep, agitation {kick:.4g} {unit}"
     )
-    style.title(figure, f"{found.scene.name}: {words}")
-    return figure
+    return style.finished(figure, f"{found.scene.name}: {words}")
 
 
 def _short(state: str) -> str:
@@ -110,22 +108,28 @@ def _curve(axes: Axes, filling: TrayFill) -> None:
     for each in filling.histories:
         marker, colour, words = looks[each.returning]
         shares, ends = each.filled[places], np.array([each.interval(int(k)) for k in places])
-        bars = np.abs(ends - shares[:, None]).T
-        shift = 1.06 if each.returning else 1.0
-        label = f"{each.after_pass.shape[0]} histories: {words}"
-        axes.errorbar(
-            places * shift, shares, bars, ls="", marker=marker, ms=4, lw=0.9, color=colour, label=label
-        )
+        look = {"marker": marker, "ms": 4, "color": colour}
+        look["label"] = f"{each.after_pass.shape[0]} histories: {words}"
+        _with_ends(axes, places * (1.06 if each.returning else 1.0), shares, ends, **look)
     _crowds(axes, filling, places)
     axes.set_xscale("symlog", linthresh=1.0)
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_xlim(0.0, 1.3 * passes[-1])
-    axes.set_ylim(0.0, 1.0)
-    axes.set_title("filled rightly", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel("passes", fontsize=style.SMALL)
-    axes.set_ylabel("fraction of the depressions", fontsize=style.SMALL)
-    axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left")
-    style.open_frame(axes)
+    style.panel(
+        axes,
+        "filled rightly",
+        legend="upper left",
+        xlim=(0.0, 1.3 * passes[-1]),
+        ylim=(0.0, 1.0),
+        xlabel="passes",
+        ylabel="fraction of the depressions",
+    )
+
+
+def _with_ends(
+    axes: Axes, x: NDArray[Any], shares: NDArray[np.float64], ends: NDArray[np.float64], **look: Any
+) -> None:
+    """Draw shares with the ends of their intervals, shape (n, 2)."""
+    axes.errorbar(x, shares, np.abs(ends - shares[:, None]).T, ls="", lw=0.9, **look)
 
 
 def _crowds(axes: Axes, filling: TrayFill, places: NDArray[np.intp]) -> None:
@@ -145,17 +149,8 @@ def _crowds(axes: Axes, filling: TrayFill, places: NDArray[np.intp]) -> None:
             shown.append((crowd.right + crowd.covered, "white", "the same, also under others"))
         for counts, face, label in shown:
             shares, ends = (each[places] for each in crowd.share(counts))
-            axes.errorbar(
-                places * shift,
-                shares,
-                np.abs(ends - shares[:, None]).T,
-                ls="",
-                marker="^",
-                ms=4.5,
-                lw=0.9,
-                color=colour,
-                mfc=face,
-                label=label,
+            _with_ends(
+                axes, places * shift, shares, ends, marker="^", ms=4.5, color=colour, mfc=face, label=label
             )
 
 
@@ -173,13 +168,9 @@ def _shares(axes: Axes, filling: TrayFill) -> None:
         bars = np.abs(edges - shares[:, None]).T
         axes.barh(at + shift, shares, 0.38, xerr=bars, label=words, error_kw={"lw": 0.9}, **look)
     axes.set_yticks(at, [_short(name) for name in filled.states], fontsize=style.SMALL)
-    axes.get_yticklabels()[filled.number].set_color(style.GOAL)
-    axes.get_yticklabels()[filled.number].set_fontweight("bold")
-    axes.set_xlim(left=0.0)
-    axes.set_title("what is left in the depression (bold: right)", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel("share", fontsize=style.SMALL)
-    axes.legend(fontsize=style.SMALL, frameon=False)
-    style.open_frame(axes)
+    axes.get_yticklabels()[filled.number].set(color=style.GOAL, fontweight="bold")
+    title = "what is left in the depression (bold: right)"
+    style.panel(axes, title, legend="best", xlim=(0.0, None), xlabel="share")
 
 
 def _kicks(axes: Axes, filling: TrayFill) -> None:
@@ -187,12 +178,17 @@ def _kicks(axes: Axes, filling: TrayFill) -> None:
     numbers = [0, *counts.met]
     shares = counts.kicked[np.ix_(counts.met, numbers)].astype(float)
     shares /= shares.sum(axis=1, keepdims=True)
-    _grid(
-        axes,
-        shares,
-        [_short(counts.states[k]) for k in counts.met],
-        [_short(counts.states[k]) for k in numbers],
-    )
+    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    for (row, column), share in np.ndenumerate(shares):
+        look: dict[str, Any] = {
+            "ha": "center",
+            "va": "center",
+            "color": "white" if share > 0.6 else style.INK,
+        }
+        axes.text(column, row, f"{share:.2f}", fontsize=style.SMALL, **look)
+    for axis, states in ((axes.xaxis, numbers), (axes.yaxis, counts.met)):
+        names = [_short(counts.states[k]) for k in states]
+        axis.set_ticks(range(len(names)), names, fontsize=style.SMALL)
     axes.set_title("what one kick leaves (rows: before)", loc="left", fontsize=style.TEXT)
     axes.tick_params(axis="x", rotation=35)
 
@@ -200,7 +196,7 @@ def _kicks(axes: Axes, filling: TrayFill) -> None:
 def _memory(axes: Axes, filling: TrayFill) -> None:
     rows = [("captured rightly\nafter misses", "captures"), ("released\nafter kicks it stood", "releases")]
     words, height = ("0", "1", "2 or more"), 0.0
-    ticks, names = [], []
+    names = {}
     for title, method in rows:
         for past in range(3):
             for each in filling.histories:
@@ -211,23 +207,9 @@ def _memory(axes: Axes, filling: TrayFill) -> None:
                 at = height - (0.14 if each.returning else -0.14)
                 bars = np.array([[share - low], [high - share]])
                 axes.errorbar([share], [at], xerr=bars, marker=marker, ms=4.5, lw=1.0, color=colour)
-            ticks.append(height)
-            names.append(f"{title}: {words[past]}" if past == 0 else words[past])
+            names[height] = f"{title}: {words[past]}" if past == 0 else words[past]
             height -= 1.0
         height -= 0.5
-    axes.set_yticks(ticks, names, fontsize=style.SMALL)
-    axes.set_xlim(left=0.0)
-    axes.set_title("does it forget? dots: new parts, squares: parts return", loc="left", fontsize=style.TEXT)
-    axes.set_xlabel("share in the histories, with 95 % interval", fontsize=style.SMALL)
-    style.open_frame(axes)
-
-
-def _grid(axes: Axes, shares: NDArray[np.float64], rows: list[str], columns: list[str]) -> None:
-    """Draw shares as shades with their numbers."""
-    axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-    for row, column in np.ndindex(shares.shape):
-        value = shares[row, column]
-        colour = "white" if value > 0.6 else style.INK
-        axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=style.SMALL, color=colour)
-    axes.set_xticks(range(len(columns)), columns, fontsize=style.SMALL)
-    axes.set_yticks(range(len(rows)), rows, fontsize=style.SMALL)
+    axes.set_yticks(list(names), list(names.values()), fontsize=style.SMALL)
+    title = "does it forget? dots: new parts, squares: parts return"
+    style.panel(axes, title, xlim=(0.0, None), xlabel="share in the histories, with 95 % interval")

@@ -71,7 +71,9 @@ def limit_set(scene: Scene | TransitionGraph, found: Any, *, axes: Axes | None =
     alone = axes is None
     if axes is None:
         figure, (axes,) = style.canvas(9.0, 1.02 * _lanes_of(about) + 1.3)
-    _lanes(axes, about)
+    for lane in range(_lanes_of(about)):
+        least = float(about.least[lane % count])
+        axes.plot([least, about.most], [-lane, -lane], color=style.FAINT, lw=0.8, zorder=1)
     for number, extents in enumerate(sets):
         _bars(axes, extents, number, _lanes_of(about) - 1)
         _bands(axes, about, extents)
@@ -94,22 +96,12 @@ def _lanes_of(about: Subject) -> int:
     return about.sides + (about.sides > 1)
 
 
-def _lanes(axes: Axes, about: Subject) -> None:
-    lanes = range(_lanes_of(about))
-    for lane in lanes:
-        least = float(about.least[lane % about.sides])
-        axes.plot([least, about.most], [-lane, -lane], color=style.FAINT, lw=0.8, zorder=1)
-    names = [*(f"side {side}" for side in range(about.sides)), "side 0\nagain"]
-    axes.set_yticks([-lane for lane in lanes], names[: len(lanes)] if about.sides > 1 else [""])
-
-
 def _bars(axes: Axes, extents: Extents, number: int, count: int) -> None:
     again: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
     for side, parts in extents.items():
-        for lo, hi in parts:
-            style.bar(axes, lo, hi, -side, BAR, zorder=3, gid="limit set", **style.of_set(number))
-            if side == 0 and count:
-                style.bar(axes, lo, hi, -count, BAR, zorder=3, gid="limit set again", **again)
+        style.bars(axes, parts, -side, BAR, zorder=3, gid="limit set", **style.of_set(number))
+        if side == 0 and count:
+            style.bars(axes, parts, -count, BAR, zorder=3, gid="limit set again", **again)
 
 
 def _bands(axes: Axes, about: Subject, extents: Extents) -> None:
@@ -153,15 +145,21 @@ def _throws(axes: Axes, path: Orbit, count: int) -> None:
     axes.plot([path.x[0]], [-path.side[0] + BAR], zorder=5, gid="start", **START)
 
 
+def _name(side: int, number: int) -> str:
+    """Write the name of a critical point."""
+    return f"$r_{{{side}}}$" + "'" * number
+
+
 def _critical(axes: Axes, about: Subject) -> list[float]:
     marked = []
     for side, points in critical_points(about.map, about.domain).items():
         for number, point in enumerate(points):
             ends = [-side - 0.2, -side + 0.2]
             axes.plot([point.x] * 2, ends, color=style.INK, lw=1.6, zorder=6, gid="critical point")
-            words = f"$r_{{{side}}}$" + "'" * number + f" = {point.x:.2f}"
-            box = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.85}
-            style.name(axes, words, (point.x, ends[0]), (-3, -1), zorder=7, bbox=box)
+            words = f"{_name(side, number)} = {point.x:.2f}"
+            style.name(
+                axes, words, (point.x, ends[0]), (-3, -1), zorder=7, bbox=style.PLATE | {"alpha": 0.85}
+            )
             marked.append(point.x)
     return marked
 
@@ -175,11 +173,13 @@ def _frame_lanes(axes: Axes, about: Subject, sets: list[Extents], marked: list[f
         ends += [float(np.min(about.least)), about.most]
     lo, hi = min(ends), max(ends)
     margin = 0.06 * (hi - lo)
-    axes.set_xlim(lo - 1.8 * margin, min(hi + margin, about.most) if hi < about.most else hi)
-    axes.set_ylim(0.65 - _lanes_of(about), 0.62)
+    last = min(hi + margin, about.most) if hi < about.most else hi
+    axes.set(xlim=(lo - 1.8 * margin, last), ylim=(0.65 - _lanes_of(about), 0.62))
     place = f"x of the centre of mass from the joint{about.in_brackets}"
     axes.set_xlabel(place if about.thrown else "x")
-    style.lanes(axes)
+    again = {-about.sides: "side 0\nagain"}
+    names = {-side: f"side {side}" for side in range(about.sides)} | again
+    style.lanes(axes, names if about.sides > 1 else {0: ""}, style.TEXT)
     for side in range(about.sides):
         parts = [pair for extents in sets for pair in extents.get(side, ())]
         words = f"{style.interval_text(parts)} {about.unit}".strip() if parts else "never"
@@ -187,17 +187,18 @@ def _frame_lanes(axes: Axes, about: Subject, sets: list[Extents], marked: list[f
 
 
 def _legend_of_lanes(axes: Axes, about: Subject, sets: int) -> list[Any]:
-    drawn = {artist.get_gid() for artist in axes.get_children()}
+    several = about.sides > 1
+    rolls = any(artist.get_gid() == "roll" for artist in axes.get_children())
     shown = range(min(sets, len(style.SETS)))
     return [
         *(Patch(label="limit set" if sets == 1 else f"limit set {k}", **style.of_set(k)) for k in shown),
         style.key("jog (stays on its side)" if about.thrown else "step", color=style.JOG),
-        *([style.key("flip (to the next side)", **FLIPPED)] if about.sides > 1 else []),
-        *([style.key("roll (on, or back)", **ROLLED)] if "roll" in drawn else []),
-        *([Patch(label="where the flipping part lands", **BAND)] if about.sides > 1 else []),
+        style.key("flip (to the next side)", **FLIPPED) if several else None,
+        style.key("roll (on, or back)", **ROLLED) if rolls else None,
+        Patch(label="where the flipping part lands", **BAND) if several else None,
         style.key("start of the orbit shown", **START),
         style.key("critical point", color=style.INK, marker="|", ms=10, mew=1.6, ls=""),
-        *style.key_of_goal(about),
+        style.key_of_goal(about),
     ]
 
 
@@ -273,10 +274,9 @@ def map(scene: Scene | TransitionGraph, found: Any = None) -> Figure:  # noqa: A
         style.keep_apart(axes, 0.13)
         if k % columns == 0:
             axes.set_ylabel(f"x after the {step}{about.in_brackets}")
-    style.title(figure, f"Map of {about.name}: one {step}" + (", from each side" if count > 1 else ""))
+    words = f"Map of {about.name}: one {step}" + (", from each side" if count > 1 else "")
     handles = _legend_of_panels(about, panels, sets, path, _visible(panels[0], flags))
-    style.legend(figure, handles, 4 if columns > 1 else 2)
-    return figure
+    return style.finished(figure, words, handles, 4 if columns > 1 else 2)
 
 
 def _branches(axes: Axes, about: Subject, side: int) -> None:
@@ -316,8 +316,7 @@ def _limits(axes: Axes, about: Subject, sets: list[Extents], critical: list[floa
         first, last = min(ends + critical), max(ends + critical)
         margin = 0.12 * (last - first)
         lo, hi = max(lo, first - margin), min(hi, last + margin)
-    axes.set_xlim(lo, hi)
-    axes.set_ylim(lo, hi)
+    axes.set(xlim=(lo, hi), ylim=(lo, hi))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(7, steps=[1, 2, 5, 10]))
 
@@ -331,7 +330,7 @@ def _frame_panel(axes: Axes, about: Subject, side: int, critical: list[float]) -
         axes.set_title(f"on side {side}{leads}", fontsize=style.TEXT)
     for number, x in enumerate(critical):
         how = {"xycoords": ("data", "axes fraction"), "annotation_clip": True, "fontsize": style.TEXT}
-        style.name(axes, f"$r_{{{side}}}$" + "'" * number, (x, 1.0), (-3, -4), **how)
+        style.name(axes, _name(side, number), (x, 1.0), (-3, -4), **how)
 
 
 def _visible(axes: Axes, flags: Extents) -> bool:
@@ -343,28 +342,20 @@ def _legend_of_panels(
     about: Subject, panels: list[Axes], sets: list[Extents], path: Orbit | None, flagged: bool
 ) -> list[Any]:
     drawn = {line.get_gid() for axes in panels for line in axes.lines}
-    handles: list[Any] = [
-        style.key(name, **LOOKS[code % len(LOOKS)])
-        for code, name in enumerate(about.branches)
-        if name in drawn
+    several, step = about.sides > 1, "throws" if about.thrown else "steps"
+    away = "flips away" if about.thrown else "goes to another side"
+    return [
+        *(
+            style.key(name, **LOOKS[code % len(LOOKS)])
+            for code, name in enumerate(about.branches)
+            if name in drawn
+        ),
+        style.key("critical point", **CRITICAL),
+        Patch(facecolor=style.SETS[0][0], edgecolor=style.INK, label="limit set") if sets else None,
+        style.key(f"orbit of {path.code.size} {step}", color=style.INK, lw=0.8) if path else None,
+        style.key("arrives" if several else "starts", **ARRIVAL) if "arrival" in drawn else None,
+        style.key("rolls or flips away" if "roll" in drawn else away, **DEPARTURE)
+        if "departure" in drawn
+        else None,
+        Patch(label="another vertex lands first", **FLAG | {"edgecolor": "#8c8c8c"}) if flagged else None,
     ]
-    handles.append(style.key("critical point", **CRITICAL))
-    if sets:
-        handles.append(Patch(facecolor=style.SETS[0][0], edgecolor=style.INK, label="limit set"))
-    if path is not None:
-        away = (
-            "rolls or flips away"
-            if "roll" in drawn
-            else "flips away"
-            if about.thrown
-            else "goes to another side"
-        )
-        steps = "throws" if about.thrown else "steps"
-        handles.append(style.key(f"orbit of {path.code.size} {steps}", color=style.INK, lw=0.8))
-        handles += (
-            [style.key("arrives" if about.sides > 1 else "starts", **ARRIVAL)] if "arrival" in drawn else []
-        )
-        handles += [style.key(away, **DEPARTURE)] if "departure" in drawn else []
-    if flagged:
-        handles.append(Patch(label="another vertex lands first", **{**FLAG, "edgecolor": "#8c8c8c"}))
-    return handles

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
     from limitsets.parameters.margins.margin_result import Margin
     from limitsets.parameters.margins.single import MarginsBeyond
-    from limitsets.proofs.auditing import Audit, Finding
+    from limitsets.proofs.auditing import Audit
 
 
 SAFE: dict[str, Any] = {"facecolor": "#9BD1B8", "edgecolor": "#2F6B52", "lw": 0.7}
@@ -80,22 +80,20 @@ def tornado(margins: Sequence[Margin]) -> Figure:
         _bar(axes, each, row, low, high)
     for at, words in zip(COLUMNS, ("safe up to", "fails from"), strict=True):
         _beside(axes, at, -0.75, words)
-    names = [each.quantity + READINGS[each.reading] for each in single]
-    names = [name + _percent(each, 0.0)[1] for name, each in zip(names, single, strict=True)]
-    axes.set_yticks(range(len(single)), names, fontsize=style.SMALL)
-    axes.set_ylim(len(single) - 0.4, -0.6)
-    axes.set_xscale("log")
-    axes.set_xlim(low, high)
+    names = [each.quantity + READINGS[each.reading] + _percent(each, 0.0)[1] for each in single]
+    style.lanes(axes, dict(enumerate(names)))
+    axes.set(ylim=(len(single) - 0.4, -0.6), xscale="log", xlim=(low, high))
     axes.xaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("deviation to either side [% of the value], logarithmic")
-    style.lanes(axes)
+    handles = [
+        Patch(label="proved safe", **SAFE),
+        style.key("shown to fail from here", **FAILS),
+        Patch(label="nothing is shown", **OPEN)
+        if any(each.refuted is None or not each.closed for each in single)
+        else None,
+    ]
     name = single[0].scene.name if single else "margins"
-    style.title(figure, f"{name}: how much each quantity may deviate")
-    handles = [Patch(label="proved safe", **SAFE), style.key("shown to fail from here", **FAILS)]
-    if any(each.refuted is None or not each.closed for each in single):
-        handles.append(Patch(label="nothing is shown", **OPEN))
-    style.legend(figure, handles, 3)
-    return figure
+    return style.finished(figure, f"{name}: how much each quantity may deviate", handles)
 
 
 def _bar(axes: Axes, margin: Margin, row: int, low: float, high: float) -> None:
@@ -139,13 +137,11 @@ def margin_curve(found: MarginsBeyond) -> Figure:
         best, top = found.best(name)
         axes.axvline(best, color=style.FAINT, lw=0.9, ls=":")
         style.note(axes, f"best: X = {best:.4g} {found.scene.unit}", (best, 0.0), (5, 6))
-        axes.set_ylabel(f"{name} [{unit or 'times the tolerance'}]", fontsize=style.SMALL)
-        axes.set_ylim(0.0, 1.12 * max(float(np.nanmax([*refuted, top])), 1e-12))
-        style.open_frame(axes)
-    panels[-1].set_xlabel(f"X, beyond which only side {found.side} [{found.scene.unit}]")
-    panels[0].legend(fontsize=style.SMALL, frameon=False, loc="upper right")
-    style.title(figure, f"{found.scene.name}: margins against X")
-    return figure
+        most = 1.12 * max(float(np.nanmax([*refuted, top])), 1e-12)
+        measure = f"{name} [{unit or 'times the tolerance'}]"
+        style.panel(axes, legend="" if k else "upper right", ylabel=measure, ylim=(0.0, most))
+    panels[-1].set_xlabel(f"X, beyond which only side {found.side} [{found.scene.unit}]", fontsize=style.TEXT)
+    return style.finished(figure, f"{found.scene.name}: margins against X")
 
 
 @arguments_checked
@@ -169,7 +165,7 @@ def tolerance_box(margin: Margin) -> Figure:
     """
     if margin.quantity != "joint":
         raise AnswerError("the margin", margin.quantity, "a joint one", "draw others with plot.tornado")
-    texts = {**margin.tolerance}
+    texts = margin.tolerance
     figure, (axes,) = style.canvas(6.8, 0.4 * len(texts) + 1.6)
     for row, (name, text) in enumerate(texts.items()):
         given = parsed_deviation(text, name)
@@ -177,20 +173,16 @@ def tolerance_box(margin: Margin) -> Figure:
         axes.barh(row, 2 * margin.proved, left=-margin.proved, height=0.6, gid="proved", zorder=2, **SAFE)
         words = f"± {bound(margin.proved * size, unit)}" + (", every throw" if name == "landing.x" else "")
         axes.annotate(words, (0, row), ha="center", va="center", fontsize=style.SMALL, zorder=4)
-    axes.set_yticks(range(len(texts)), list(texts), fontsize=style.SMALL)
-    axes.set_ylim(len(texts) - 0.3, -0.7)
+    style.lanes(axes, dict(enumerate(texts)))
     wide = 1.1 * max(margin.proved, margin.refuted or 0.0, 1e-9)
-    axes.set_xlim(-wide, wide)
+    axes.set(xlim=(-wide, wide), ylim=(len(texts) - 0.3, -0.7))
     axes.set_xlabel("deviation as a factor of the tolerance")
-    style.lanes(axes)
-    style.title(figure, f"{margin.scene.name}: all quantities together")
     handles = [Patch(label="proved safe, all at once", **SAFE)]
     if margin.refuted is not None:
         high, middle = margin.refuted, 0.5 * (len(texts) - 1)
         axes.barh(middle, 2 * high, left=-high, height=len(texts), gid="refuted", zorder=1, **BOX)
         handles.append(Patch(label="somewhere in this larger box it fails", **BOX))
-    style.legend(figure, handles, 2)
-    return figure
+    return style.finished(figure, f"{margin.scene.name}: all quantities together", handles, 2)
 
 
 # ----------------------------------------------------------------
@@ -265,34 +257,27 @@ def counterexample(
         )
         for k, (place, side) in enumerate(onward, start=1):
             axes.plot(throws[-1] + k, place, zorder=3, gid="thrown on", **{**_mark(side), "mfc": "white"})
-    seen = [*x, *(place for place, _ in onward)]
-    low, high = (
-        min(seen),
-        max([*seen, *([violated.x] if isinstance(violated, OrientedBeyond | Reaches) else [])]),
-    )
+    heights = [*x, *(place for place, _ in onward)]
+    goal = [violated.x] if isinstance(violated, OrientedBeyond | Reaches) else []
+    low, high = min(heights), max([*heights, *goal])
     span = max(high - low, 1e-3 * scene.arm_length)
+    axes.set(xlabel="throws", ylabel=f"x at rest [{scene.unit}]")
     axes.set_ylim(low - 0.12 * span, high + 0.22 * span)
-    areas = _areas(axes, violated, scene.unit)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    handles = [
+        *(style.key(f"on side {side}", **_mark(side)) for side in sorted({*sides, *(s for _, s in onward)})),
+        _area(axes, violated, scene.unit),
+    ]
     if isinstance(violated, OrientedBeyond):
         axes.plot(throws[-1], x[-1], zorder=4, **RING)
         label = f"on side {sides[-1]}, {x[-1] - violated.x:.2g} {scene.unit} beyond"
-        areas.append(style.key(label, **RING))
-    axes.set_xlabel("throws")
-    axes.set_ylabel(f"x at rest [{scene.unit}]")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    at_once = " at once" if len(orbit) == 1 else ""
-    style.title(
-        figure, f"{scene.name}: an orbit that violates the goal{at_once}" + (f"\n{name}" if name else "")
-    )
-    marks = [
-        style.key(f"on side {side}", **_mark(side)) for side in sorted({*sides, *(s for _, s in onward)})
-    ]
+        handles.append(style.key(label, **RING))
     if onward:
-        areas.append(
+        handles.append(
             style.key("thrown on, in the scene as it is", color=style.FAINT, ls=":", marker="o", mfc="white")
         )
-    style.legend(figure, [*marks, *areas], 3)
-    return figure
+    words = f"{scene.name}: an orbit that violates the goal{' at once' * (len(orbit) == 1)}"
+    return style.finished(figure, f"{words}\n{name}" if name else words, handles)
 
 
 def _thrown_on(scene: Scene, x: float, side: int) -> list[tuple[float, int]]:
@@ -302,17 +287,17 @@ def _thrown_on(scene: Scene, x: float, side: int) -> list[tuple[float, int]]:
     return [(float(x), int(side)) for x, side in zip(path.x[1:][stays], path.side[1:][stays], strict=True)]
 
 
-def _areas(axes: Axes, violated: Goal | None, unit: str) -> list[Any]:
-    """Shade the places at which only one side is allowed, or to which the part should come."""
+def _area(axes: Axes, violated: Goal | None, unit: str) -> Patch | None:
+    """Shade the places at which only one side is allowed, or to which the part should come; give the entry."""
     if not isinstance(violated, OrientedBeyond | Reaches):
-        return []
+        return None
     at, side, top = violated.x, violated.side, axes.get_ylim()[1]
     forbids = isinstance(violated, OrientedBeyond)
     look = FORBIDDEN if forbids else WANTED
     axes.axhspan(at, top, gid="forbidden" if forbids else "wanted", zorder=0, **look)
     axes.axhline(at, color=style.INK, lw=1.0, zorder=1)
     words = f"only side {side} allowed" if forbids else f"to be reached on side {side}"
-    return [Patch(label=f"beyond {at:.6g} {unit}: {words}", **look)]
+    return Patch(label=f"beyond {at:.6g} {unit}: {words}", **look)
 
 
 def _mark(side: int) -> dict[str, Any]:
@@ -355,33 +340,25 @@ def audit(found: Audit) -> Figure:
     count, size = len(scene.sides), (3.1, 0.29 * len(rows) + 0.75)
     below = f"x before the throw [{scene.unit}]"
     figure, panels = style.panels(count, min(count, 3), size, (1.9, 1.15), below)
+    names = {row: finding.about.name for row, finding in enumerate(rows)}
     for side, axes in enumerate(panels):
+        reach = [(float(scene.sides.a[side]), scene.arm_length)]
         for row, finding in enumerate(rows):
-            _strip(axes, found, finding, side, row)
+            gid, look = ("cannot tell", UNKNOWN) if finding.missing else ("holds", HOLDS)
+            style.bars(axes, reach, row, HALF, gid=gid, zorder=2, **look)
+            style.bars(axes, finding.ranges.get(side, ()), row, HALF, gid="broken", zorder=2, **BROKEN)
         for lo, hi in found.extents.get(side, ()):
             axes.axvspan(lo, hi, facecolor="none", edgecolor=style.JOG, lw=1.4, zorder=3, gid="limit set")
         axes.set_title(f"on side {side}", loc="left", fontsize=style.TEXT)
-        axes.set_xlim(0.0, scene.arm_length)
-        axes.set_ylim(len(rows) - 0.4, -0.6)
-        axes.set_yticks(range(len(rows)), [finding.about.name for finding in rows], fontsize=style.SMALL)
-        style.lanes(axes)
-    style.title(figure, f"{scene.name}: what the minimal model assumes, and where that breaks")
-    style.legend(figure, _legend(found, rows), 4)
-    return figure
-
-
-def _strip(axes: Axes, findings: Audit, finding: Finding, side: int, row: int) -> None:
-    first, last = float(findings.scene.sides.a[side]), findings.scene.arm_length
-    gid, look = ("cannot tell", UNKNOWN) if finding.missing else ("holds", HOLDS)
-    style.bar(axes, first, last, row, HALF, gid=gid, zorder=2, **look)
-    for lo, hi in finding.ranges.get(side, ()):
-        style.bar(axes, lo, hi, row, HALF, gid="broken", zorder=2, **BROKEN)
-
-
-def _legend(findings: Audit, rows: tuple[Finding, ...]) -> list[Any]:
-    handles: list[Any] = [Patch(label="holds", **HOLDS), Patch(label="breaks", **BROKEN)]
-    if any(finding.missing for finding in rows):
-        handles.append(Patch(label="cannot tell: a fact is missing", **UNKNOWN))
-    if findings.extents:
-        handles.append(style.key("between these lines: the limit set", color=style.JOG, lw=1.4))
-    return handles
+        axes.set(xlim=(0.0, scene.arm_length), ylim=(len(rows) - 0.4, -0.6))
+        style.lanes(axes, names)
+    missing = any(finding.missing for finding in rows)
+    border = style.key("between these lines: the limit set", color=style.JOG, lw=1.4)
+    handles = [
+        Patch(label="holds", **HOLDS),
+        Patch(label="breaks", **BROKEN),
+        Patch(label="cannot tell: a fact is missing", **UNKNOWN) if missing else None,
+        border if found.extents else None,
+    ]
+    words = f"{scene.name}: what the minimal model assumes, and where that breaks"
+    return style.finished(figure, words, handles, 4)

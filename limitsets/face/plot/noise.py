@@ -41,14 +41,10 @@ WORDS = {
 
 def _main(statistics: NoiseStatistics) -> NoisyClass:
     if not statistics.classes:
-        remedy = "nothing stays: nothing to draw"
-        raise AnswerError("the classes of the noisy scene", "none", "one at least", remedy)
+        raise AnswerError(
+            "the classes of the noisy scene", "none", "one at least", "nothing stays: nothing to draw"
+        )
     return max(statistics.classes, key=lambda part: len(part.cells))
-
-
-def _plain(axes: Axes) -> None:
-    style.open_frame(axes)
-    axes.tick_params(labelsize=style.SMALL)
 
 
 @arguments_checked
@@ -79,22 +75,15 @@ def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = Non
         axes.stairs(height, edges, color=style.INK, lw=1.0, label="transfer operator")
         some = np.flatnonzero(height > LEAST)
         if some.size:
-            axes.set_xlim(*_widened(float(edges[some[0]]), float(edges[some[-1] + 1])))
+            axes.set_xlim(*style.widened(float(edges[some[0]]), float(edges[some[-1] + 1]), 0.04))
         label = f"X = {found.goal[0]:g} {found.unit}"
         axes.axvline(found.goal[0], color=style.GOAL, lw=1.0, ls=(0, (4, 2)), label=label)
         words = f"side {side}: {100 * part.sides[side]:.2f} % of the rests"
-        axes.set_title(words, loc="left", fontsize=style.TEXT)
-        axes.set_xlabel(f"x [{found.unit}]", fontsize=style.SMALL)
+        height_of = f"share of the rests per {found.unit}" if side == sides[0] else ""
+        style.panel(axes, words, small_ticks=True, xlabel=f"x [{found.unit}]", ylabel=height_of)
         axes.xaxis.set_major_locator(MaxNLocator(5))
-        _plain(axes)
-    panels[0].set_ylabel(f"share of the rests per {found.unit}", fontsize=style.SMALL)
-    style.title(figure, f"{found.scene}: where the part rests under noise")
-    style.legend(figure, panels[-1].get_legend_handles_labels()[0], 3)
-    return figure
-
-
-def _widened(lo: float, hi: float) -> tuple[float, float]:
-    return lo - 0.04 * (hi - lo), hi + 0.04 * (hi - lo)
+    words = f"{found.scene}: where the part rests under noise"
+    return style.finished(figure, words, panels[-1].get_legend_handles_labels()[0])
 
 
 @arguments_checked
@@ -126,19 +115,16 @@ def noise_arrivals(found: NoiseStatistics, thrown: SampledStatistics | None = No
     edges = np.arange(number.size + 1) - 0.5
     left.stairs(fed.arrived[: number.size], edges, label="transfer operator", **look)
     right.step(number, fed.survivors[: number.size], where="post", **look)
-    for axes in (left, right):
+    for axes, words in (
+        (left, "share that arrives with this throw"),
+        (right, "share that has not yet arrived"),
+    ):
         _marks(axes, found)
-        axes.set_xlabel("throws", fontsize=style.SMALL)
-        _plain(axes)
-    left.set_ylabel("share that arrives with this throw", fontsize=style.SMALL)
-    right.set_ylabel("share that has not yet arrived", fontsize=style.SMALL)
-    right.set_yscale("log")
-    right.set_ylim(5e-4, 1.2)
+        style.panel(axes, small_ticks=True, xlabel="throws", ylabel=words)
+    right.set(yscale="log", ylim=(5e-4, 1.2))
     x, side = found.goal
-    words = f"throws from random starts to x > {x:g} {found.unit} on side {side}"
-    style.title(figure, f"{found.scene}: {words}")
-    style.legend(figure, left.get_legend_handles_labels()[0], 4)
-    return figure
+    words = f"{found.scene}: throws from random starts to x > {x:g} {found.unit} on side {side}"
+    return style.finished(figure, words, left.get_legend_handles_labels()[0], 4)
 
 
 def _marks(axes: Axes, statistics: NoiseStatistics) -> None:
@@ -179,24 +165,21 @@ def noise_levels(
     figure, panels = style.canvas(3.6 * len(panels_of) + 0.4, 4.0, 1, len(panels_of))
     for axes, (title, names) in zip(panels, panels_of.items(), strict=True):
         _against_level(axes, levels, names, unit)
-        axes.set_title(title, loc="left", fontsize=style.TEXT)
-        axes.set_xlabel(word, fontsize=style.SMALL)
-        axes.set_xlim(*_widened(0.0, float(levels.factors.max()) * unit))
-        if not axes.lines:
-            axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center", color=style.FAINT)
-            axes.set_yticks([])
-        elif "throws" in title:
+        measure = ("throws" if "throws" in title else "share") if axes.lines else ""
+        limits = style.widened(0.0, float(levels.factors.max()) * unit, 0.04)
+        style.panel(axes, title, small_ticks=True, xlabel=word, xlim=limits, ylabel=measure)
+        if measure == "throws":
             axes.set_ylim(bottom=0.0)
-            axes.set_ylabel("throws", fontsize=style.SMALL)
-        else:
+        elif measure:
             axes.set_yscale("log")
             # at least a decade, or rounding would look like a change
             low, high = axes.get_ylim()
             axes.set_ylim(min(low, high / 30.0), 1.3 * high)
-            axes.set_ylabel("share", fontsize=style.SMALL)
-        if axes.lines:
+        else:
+            axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center", color=style.FAINT)
+            axes.set_yticks([])
+        if measure:
             axes.legend(fontsize=style.SMALL, frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.16))
-        _plain(axes)
     return figure
 
 
@@ -258,19 +241,16 @@ def fit_residuals(found: Fit) -> Figure:
         for some, marker, size in ((own & misread, "s", 10.0), (own & strange, "x", 9.0)):
             look: dict[str, Any] = {"mfc": "none", "mec": style.INK, "mew": 1.1}
             axes.plot(x[some], found.residuals[some], ls="", marker=marker, ms=size, zorder=4, **look)
-        axes.set_title(f"side {side}: {int(own.sum())} throws", loc="left", fontsize=style.TEXT)
-        axes.set_xlabel(
-            f"{'left corner' if rows.throws.corner else 'x'} before [{unit}]", fontsize=style.SMALL
-        )
-        axes.tick_params(labelsize=style.SMALL)
-        style.open_frame(axes)
-    panels[0].set_ylabel(f"landing, measured less predicted [{unit}]", fontsize=style.SMALL)
-    style.title(figure, f"{found.scene.name}: residuals of {len(rows.throws)} throws")
-    keys = [style.key(word, ls="", marker=marker, color=colour, ms=4.5) for _, marker, colour, word in KINDS]
-    keys.append(style.key("two standard deviations", color=BARS, lw=1.4))
-    if misread.any():
-        keys.append(style.key("side recorded wrong", ls="", marker="s", mfc="none", mec=style.INK, ms=8.0))
-    if strange.any():
-        keys.append(style.key("far off", ls="", marker="x", mec=style.INK, ms=7.0))
-    style.legend(figure, keys, 5)
-    return figure
+        before = f"{'left corner' if rows.throws.corner else 'x'} before [{unit}]"
+        landing = f"landing, measured less predicted [{unit}]" if side == sides[0] else ""
+        words = f"side {side}: {int(own.sum())} throws"
+        style.panel(axes, words, small_ticks=True, xlabel=before, ylabel=landing)
+    keys = [
+        *(style.key(word, ls="", marker=marker, color=colour, ms=4.5) for _, marker, colour, word in KINDS),
+        style.key("two standard deviations", color=BARS, lw=1.4),
+        style.key("side recorded wrong", ls="", marker="s", mfc="none", mec=style.INK, ms=8.0)
+        if misread.any()
+        else None,
+        style.key("far off", ls="", marker="x", mec=style.INK, ms=7.0) if strange.any() else None,
+    ]
+    return style.finished(figure, f"{found.scene.name}: residuals of {len(rows.throws)} throws", keys, 5)

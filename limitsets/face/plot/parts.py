@@ -33,7 +33,10 @@ CENTRE: dict[str, Any] = {"marker": "o", "ms": 9, "mfc": "white", "mec": style.I
 MASS: dict[str, Any] = {"marker": "D", "ms": 8, "color": style.FLIP, "ls": ""}
 FOOT: dict[str, Any] = {"color": style.JOG, "lw": 1.3, "ls": (0, (4, 2))}
 OUTLINE: dict[str, Any] = {"facecolor": "#e8eef4", "edgecolor": style.INK, "lw": 1.8}
+SOLID: dict[str, Any] = {"facecolor": "#d9d9d9", "hatch": "////", "edgecolor": "#9a9a9a", "lw": 0}
 TIPS: dict[str, Any] = {"color": style.FLIP, "lw": 3.0, "ls": (0, (1.5, 1))}
+
+MIDDLE: dict[str, Any] = {"ha": "center", "va": "center"}
 
 # Distance of a side's name from the side [points].
 CLEAR = 4
@@ -67,32 +70,23 @@ def part(scene: Scene) -> Figure:
     wide, high = float(reach[0]) + 0.8 * size, float(reach[1]) + 0.45 * size
     figure, (axes,) = style.canvas(7.6, min(max(5.6 * high / wide, 3.2), 7.5) + 0.7)
     ends = [float(corners[:, 0].min()) - 0.4 * size, float(corners[:, 0].max()) + 0.4 * size]
-    axes.set_aspect("equal")
-    axes.set_xlim(*ends)
-    axes.set_ylim(-0.28 * size, float(corners[:, 1].max()) + 0.15 * size)
-    axes.fill_between(
-        ends, 0.0, -0.035 * size, facecolor="#d9d9d9", hatch="////", edgecolor="#9a9a9a", lw=0, gid="arm"
-    )
+    axes.set(aspect="equal", xlim=ends, ylim=(-0.28 * size, float(corners[:, 1].max()) + 0.15 * size))
+    axes.fill_between(ends, 0.0, -0.035 * size, gid="arm", **SOLID)
     axes.axhline(0.0, color=style.INK, lw=2.0, zorder=1)
     axes.add_patch(Polygon(corners, closed=True, zorder=2, gid="part", **OUTLINE))
     resting = scene.sides.rests.tolist()
     _sides(axes, scene, corners, resting)
     _centre(axes, scene, size)
-    masses = _masses(scene)
-    _added(axes, scene, masses)
-    style.note(
-        axes,
-        "\N{LEFTWARDS ARROW} to the joint",
-        (ends[0], 0.0),
-        (6, 8),
-        ha="left",
-        fontsize=style.SMALL,
-        gid="joint",
-    )
+    masses = _masses(axes, scene)
+    style.note(axes, "\N{LEFTWARDS ARROW} to the joint", (ends[0], 0.0), (6, 8), ha="left", gid="joint")
     axes.set_axis_off()
-    style.title(figure, f"{scene.name}: the part, lying on side 0")
-    style.legend(figure, _legend_of_part(masses, resting), 3)
-    return figure
+    handles = [
+        style.key("centre of mass", **CENTRE),
+        style.key("a along side 0 from its left end, d above it", **FOOT),
+        style.key("mass added", **MASS) if masses else None,
+        None if all(resting) else style.key("the part cannot rest on this side", **TIPS),
+    ]
+    return style.finished(figure, f"{scene.name}: the part, lying on side 0", handles)
 
 
 def refused_part(sketch: Sketch, why: str) -> Figure:
@@ -112,37 +106,40 @@ def refused_part(sketch: Sketch, why: str) -> Figure:
     corners, count = sketch.vertices, len(sketch.vertices)
     size = max(float(np.ptp(corners, axis=0).max()), 1e-300)
     figure, (axes,) = style.canvas(7.6, 6.0)
-    axes.set_aspect("equal")
     lo, hi = corners.min(axis=0), corners.max(axis=0)
     beside = size * np.array([0.4, 0.25])
     room = np.stack([lo - beside, hi + beside])
-    axes.set(xlim=room[:, 0], ylim=room[:, 1])
+    axes.set(aspect="equal", xlim=room[:, 0], ylim=room[:, 1])
     axes.add_patch(Polygon(corners, closed=True, zorder=2, gid="part", **(OUTLINE | {"ls": "--"})))
     axes.plot(*corners.T, ls="", marker="o", ms=4, color=style.INK, zorder=3)
     middle = corners.mean(axis=0)
     for k, corner in enumerate(corners):
         way = middle - corner  # inside, because the names of sides are outside
         shift = tuple((16.0 * way / max(float(np.hypot(*way)), 1e-300)).tolist())
-        at = tuple(corner.tolist())
-        style.note(axes, f"P{k}", at, shift, ha="center", va="center", gid="corner")
+        style.note(axes, f"P{k}", tuple(corner.tolist()), shift, gid="corner", **MIDDLE)
     ahead = np.roll(corners, -1, axis=0)
     turn = 1.0 if float(np.sum(corners[:, 0] * ahead[:, 1] - corners[:, 1] * ahead[:, 0])) >= 0.0 else -1.0
     for side in range(count):
         left, right = (corners[k] for k in side_ends(count, side))
         length = float(np.hypot(*(right - left)))
-        outward = turn * np.array([right[1] - left[1], left[0] - right[0]]) / max(length, 1e-300)
+        outward = turn * _outward(left, right)
         words = f"side {side}: {length:.5g} {sketch.unit}"
         away = _clear(words, style.SMALL, outward) * outward
         halfway = tuple((0.5 * (left + right)).tolist())
-        style.note(axes, words, halfway, tuple(away.tolist()), ha="center", va="center", zorder=4, gid="side")
+        style.note(axes, words, halfway, tuple(away.tolist()), zorder=4, gid="side", **MIDDLE)
     if sketch.centre is not None:
         axes.plot(*sketch.centre, zorder=5, gid="centre of mass", **CENTRE)
         style.note(axes, "centre of mass", sketch.centre, (9, 0), va="center", zorder=5)
     reason = "\n".join(textwrap.wrap(why, 92))
     axes.set_xlabel(f"x [{sketch.unit}]\n\n{reason}", fontsize=style.SMALL)
     axes.set_ylabel(f"y [{sketch.unit}]")
-    style.title(figure, f"{sketch.name}: the part as it is written, which is refused")
-    return figure
+    return style.finished(figure, f"{sketch.name}: the part as it is written, which is refused")
+
+
+def _outward(left: Array, right: Array) -> Array:
+    """Give the direction across a side, outward where the corners are counterclockwise."""
+    along = (right - left) / max(float(np.hypot(*(right - left))), 1e-300)
+    return np.array([along[1], -along[0]])
 
 
 def _clear(words: str, size: float, way: Array) -> float:
@@ -161,27 +158,17 @@ def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> Non
     for side in range(count):
         # the first vertex of the outline is the left end of side 0
         left, right = (corners[k] for k in side_ends(count, side))
-        along = (right - left) / np.hypot(*(right - left))
-        outward = np.array([along[1], -along[0]])
+        outward = _outward(left, right)
         words = f"side {side}: {float(scene.sides.length[side]):.5g} {scene.unit}"
         away = _clear(words, style.TEXT, outward) + (10 if side == 0 else 0)
         shift = away * outward
-        leader = None
-        if (
-            outward[1] < -0.1 and side != 0
-        ):  # an overhanging edge: its name stands beside it, not down on the arm
-            shift = np.array([away / outward[0], 0.0])
-            leader = {"arrowstyle": "-", "color": style.INK, "lw": 0.7}
-        middle = tuple((0.5 * (left + right)).tolist())
-        how: dict[str, Any] = {
-            "ha": "center",
-            "va": "center",
-            "fontsize": style.TEXT,
-            "weight": "bold",
-            "arrowprops": leader,
-        }
+        how: dict[str, Any] = {"fontsize": style.TEXT, "weight": "bold", **MIDDLE}
         if side == 0:  # above the line down from the centre of mass
-            how["bbox"] = {"boxstyle": "square,pad=0.2", "fc": "white", "ec": "none"}
+            how["bbox"] = style.PLATE | {"boxstyle": "square,pad=0.2"}
+        elif outward[1] < -0.1:  # an overhanging edge: its name stands beside it, not down on the arm
+            shift = np.array([away / outward[0], 0.0])
+            how["arrowprops"] = {"arrowstyle": "-", "color": style.INK, "lw": 0.7}
+        middle = tuple((0.5 * (left + right)).tolist())
         style.note(axes, words, middle, tuple(shift.tolist()), zorder=6, gid="side", **how)
         if not resting[side]:
             axes.plot(*np.stack([left, right], axis=-1), zorder=4, gid="no rest", **TIPS)
@@ -191,56 +178,26 @@ def _centre(axes: Axes, scene: Scene, size: float) -> None:
     """Draw the centre of mass, with its distances from the left end of side 0 and from the arm."""
     a, d = float(scene.sides.a[0]), float(scene.sides.d[0])
     axes.plot([a, a], [0.0, d], zorder=3, gid="height", **FOOT)
-    low = -0.2 * size
-    axes.annotate(
-        "", (0.0, low), (a, low), arrowprops={"arrowstyle": "<->", "color": style.JOG, "lw": 1.0}, gid="a"
-    )
+    low, arrow = -0.2 * size, {"arrowstyle": "<->", "color": style.JOG, "lw": 1.0}
+    axes.annotate("", (0.0, low), (a, low), arrowprops=arrow, gid="a")
     axes.vlines([0.0, a], low, 0.0, color=style.JOG, lw=0.6, ls=":")
     words = f"a = {a:.4g} {scene.unit}, d = {d:.4g} {scene.unit}"
     style.note(axes, words, (max(a, 0.0), low), (6, 0), va="center", color=style.JOG, gid="measure")
     axes.plot(a, d, zorder=5, gid="centre of mass", **CENTRE)
 
 
-def _masses(scene: Scene) -> list[tuple[Array, str]]:
-    """Give the masses added to a plate: their places, and their weights as the scene writes them."""
+def _masses(axes: Axes, scene: Scene) -> bool:
+    """Draw the masses added to a plate, with their weights as the scene writes them; say whether there are any."""
     points = scene.text["part"]["mass"].get("points", ())
-    masses = []
     for k, point in enumerate(points):
-        name = f"part.mass.points[{k}]"
-        about = np.array([[scene.value(f"{name}.{axis}") for axis in "xy"]]) - np.asarray(scene.centre)
-        place = turned(about, angle_on_side(scene, 0))[0] + _centre_at(scene)
-        masses.append((place, str(point["mass"])))
-    return masses
-
-
-def _added(axes: Axes, scene: Scene, masses: list[tuple[Array, str]]) -> None:
-    for place, text in masses:
+        about = np.array([[scene.value(f"part.mass.points[{k}].{axis}") for axis in "xy"]])
+        place = turned(about - np.asarray(scene.centre), angle_on_side(scene, 0))[0] + _centre_at(scene)
         axes.plot(*place, zorder=5, gid="added mass", **MASS)
         right = place[0] >= float(scene.sides.a[0])
         shift, align = ((8, 0), "left") if right else ((-8, 0), "right")
-        style.note(
-            axes,
-            text,
-            tuple(place.tolist()),
-            shift,
-            ha=align,
-            va="center",
-            zorder=6,
-            color=style.FLIP,
-            gid="mass",
-        )
-
-
-def _legend_of_part(masses: list[Any], resting: list[bool]) -> list[Any]:
-    handles = [
-        style.key("centre of mass", **CENTRE),
-        style.key("a along side 0 from its left end, d above it", **FOOT),
-    ]
-    if masses:
-        handles.append(style.key("mass added", **MASS))
-    if not all(resting):
-        handles.append(style.key("the part cannot rest on this side", **TIPS))
-    return handles
+        look = {"ha": align, "va": "center", "zorder": 6, "color": style.FLIP, "gid": "mass"}
+        style.note(axes, str(point["mass"]), tuple(place.tolist()), shift, **look)
+    return bool(points)
 
 
 # ----------------------------------------------------------------
@@ -293,39 +250,53 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
         raise AnswerError("the start x", x, allowed, "start where a part can rest")
     throws = throws_of(scene, trace(scene.map, x, side, 1))
     if not throws:
-        least = float(scene.sides.a[side])
-        allowed = f"more than {least:.6g} on side {side}"
-        if x > least:  # thrown, and not down again within a full turn
-            kappa = f"{scene.kappa:.6g} {scene.unit}"
-            raise AnswerError(
-                "the throw",
-                f"outside the model, from x = {x:.6g} on side {side}",
-                "one that lands within a full turn",
-                f"kappa is {kappa}: throw more softly, and see whether the speed has the right unit",
-            )
-        raise AnswerError("x of the throw", x, allowed, "start where a throw lifts the part")
+        raise _not_thrown(scene, x, side)
     throw, moves = throws[0], motion(scene, throws[0])
     air = _placed(scene, side, moves.flight(np.linspace(0.0, 1.0, SHOWN + 2)))
     stops = [0.0, 1.0] if moves.turning.drawn else np.linspace(0.0, 1.0, SHOWN + 1)
     rolled = _placed(scene, side, moves.turning.pose(np.array(stops)))
     everything = np.concatenate([*air, *rolled])
-    lo, hi = float(everything[:, 0].min()), float(everything[:, 0].max())
-    height = float(everything[:, 1].max() - min(0.0, scene.surface_height))
-    figure, (above, below) = _canvas(hi - lo + 2.0, height + 1.4)
+    lo, hi = float(everything[:, 0].min()) - 1.0, float(everything[:, 0].max()) + 1.0
+    bottom, top = min(0.0, scene.surface_height), float(everything[:, 1].max())
+    figure, (above, below) = _canvas(hi - lo, top - bottom + 1.4)
     for axes in (above, below):
-        _arm(axes, scene, lo - 1.0, hi + 1.0)
-        axes.set_aspect("equal")
-        axes.set_xlim(lo - 1.0, hi + 1.0)
-        axes.set_ylim(min(0.0, scene.surface_height) - 0.9, float(everything[:, 1].max()) + 0.5)
-        axes.set_xlabel(f"distance from the joint [{scene.unit}]")
-        axes.set_ylabel(f"height over the joint [{scene.unit}]")
+        _arm(axes, scene, lo, hi)
+        axes.set(
+            aspect="equal",
+            xlim=(lo, hi),
+            ylim=(bottom - 0.9, top + 0.5),
+            xlabel=f"distance from the joint [{scene.unit}]",
+            ylabel=f"height over the joint [{scene.unit}]",
+        )
         axes.label_outer()  # last: it takes the inner labels away
     _flight(above, scene, throw, moves, air)
     _landing(below, scene, throw, moves, rolled)
     caveat = " (small-angle formulas: the part hangs at its left vertex, whose path they give)"
-    style.title(figure, f"One throw of {scene.name}{'' if scene.flight == 'exact' else caveat}")
-    style.legend(figure, _legend_of_flight(len(rolled) > 2), 3)
-    return figure
+    handles = [
+        Patch(facecolor="#dcdcdc", label="at rest, before and after", **REST),
+        Patch(facecolor="#dbebf7", label="in the air", **FLYING),
+        Patch(facecolor="#b8d6ed", label="at the impact", **STRUCK),
+        style.key("path of the centre of mass", color=style.INK, ls="-.", **SMALL_CENTRE),
+        style.key("struck vertex", ms=8, **VERTEX),
+        style.key("turning to rest", color=LANDED, ls=":") if len(rolled) > 2 else None,
+    ]
+    return style.finished(
+        figure, f"One throw of {scene.name}{'' if scene.flight == 'exact' else caveat}", handles
+    )
+
+
+def _not_thrown(scene: Scene, x: float, side: int) -> AnswerError:
+    """Say why no throw begins, or none ends."""
+    least = float(scene.sides.a[side])
+    if x <= least:
+        allowed = f"more than {least:.6g} on side {side}"
+        return AnswerError("x of the throw", x, allowed, "start where a throw lifts the part")
+    return AnswerError(  # thrown, and not down again within a full turn
+        "the throw",
+        f"outside the model, from x = {x:.6g} on side {side}",
+        "one that lands within a full turn",
+        f"kappa is {scene.kappa:.6g} {scene.unit}: throw more softly, and see whether the speed has the right unit",
+    )
 
 
 def _canvas(width: float, height: float) -> tuple[Figure, list[Axes]]:
@@ -345,7 +316,7 @@ def _placed(scene: Scene, side: int, poses: Array) -> list[Array]:
 def _arm(axes: Axes, scene: Scene, lo: float, hi: float) -> None:
     h, ends = scene.surface_height, [lo, min(hi, scene.arm_length)]
     axes.plot(ends, [h, h], color=style.INK, lw=2.2, solid_capstyle="butt", zorder=1, gid="arm")
-    axes.fill_between(ends, h, h - 0.35, facecolor="#d9d9d9", hatch="////", edgecolor="#9a9a9a", lw=0)
+    axes.fill_between(ends, h, h - 0.35, **SOLID)
     if lo <= 0 <= hi:
         axes.plot([0], [0], marker="o", ms=9, mfc="white", mec=style.INK, zorder=2, gid="joint")
     style.open_frame(axes)
@@ -372,8 +343,7 @@ def _flight(axes: Axes, scene: Scene, throw: Throw, moves: Motion, air: list[Arr
     axes.plot(path[:, 0], path[:, 1], color=style.INK, lw=1.1, ls="-.", zorder=5, gid="path")
     axes.plot(stops[:, 0], stops[:, 1], ls="", zorder=6, gid="centre of mass", **SMALL_CENTRE)
     start = f"from x = {throw.x:.2f} {scene.unit} on side {throw.side}"
-    text = f"In the air: {start}, turning by {math.degrees(throw.phi):.1f}°"
-    _head(axes, text)
+    _head(axes, f"In the air: {start}, turning by {math.degrees(throw.phi):.1f}°")
 
 
 def _landing(axes: Axes, scene: Scene, throw: Throw, moves: Motion, rolled: list[Array]) -> None:
@@ -387,32 +357,18 @@ def _landing(axes: Axes, scene: Scene, throw: Throw, moves: Motion, rolled: list
     how = "roll" if throw.code == codes.ROLL else ("flip" if side != before else "jog")
     where = f"onto side {side}" if side != before else f"still on side {side}"
     note = {codes.OUTWARD: "; off the arm's end", codes.INWARD: "; into the joint"}.get(throw.code, "")
-    text = f"After the impact: a {how}, {throw.x:.2f} to {after:.2f} {scene.unit}, {where}{note}"
-    _head(axes, text)
+    _head(axes, f"After the impact: a {how}, {throw.x:.2f} to {after:.2f} {scene.unit}, {where}{note}")
 
 
 def _head(axes: Axes, text: str) -> None:
     """Write a title, in lines of phrases as wide as the panel where panels stand beside each other."""
     if axes.get_subplotspec().get_gridspec().ncols > 1:  # type: ignore[union-attr]  # of a grid
         wide = min(WIDEST, TALLEST * float(np.ptp(axes.get_xlim()) / np.ptp(axes.get_ylim())))
-        first, *phrases = text.split(", ")
-        lines = [first]
-        for phrase in phrases:
-            if len(f"{lines[-1]}, {phrase}") <= LETTERS * wide:
+        lines: list[str] = []
+        for phrase in text.split(", "):
+            if lines and len(f"{lines[-1]}, {phrase}") <= LETTERS * wide:
                 lines[-1] += f", {phrase}"
             else:
-                lines[-1] += ","
                 lines.append(phrase)
-        text = "\n".join(lines)
+        text = ",\n".join(lines)
     axes.set_title(text, fontsize=style.TEXT, loc="left")
-
-
-def _legend_of_flight(turns: bool) -> list[Any]:
-    handles: list[Any] = [
-        Patch(facecolor="#dcdcdc", label="at rest, before and after", **REST),
-        Patch(facecolor="#dbebf7", label="in the air", **FLYING),
-        Patch(facecolor="#b8d6ed", label="at the impact", **STRUCK),
-        style.key("path of the centre of mass", color=style.INK, ls="-.", **SMALL_CENTRE),
-        style.key("struck vertex", ms=8, **VERTEX),
-    ]
-    return [*handles, *([style.key("turning to rest", color=LANDED, ls=":")] if turns else [])]

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from matplotlib.patches import Patch
+
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
 from limitsets.face.plot import style
+from limitsets.feeder.scene.surroundings import BeyondSensor
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from limitsets.proofs.policies import Synthesis
+    from limitsets.proofs.policies import Policy, Synthesis
 
 
 # Largest number of rows with names; largest height of a row, and of all rows [inches].
 MOST, ROW, TALL = 60, 0.26, 16.0
 COLOURS = (style.JOG, style.FLIP, style.ROLL, style.INK)
 HATCHES = ("", "////", "....", "xxxx")
+STOP: dict[str, Any] = {"facecolor": "white", "edgecolor": style.GOAL, "lw": 1.4}
+SENSOR: dict[str, Any] = {"color": style.INK, "lw": 1.0, "ls": (0, (5, 2))}
 
 
 @arguments_checked
@@ -52,45 +56,41 @@ def policy(found: Synthesis) -> Figure:
     x, wanted = found.goal
     for side, axes in enumerate(panels):
         for k, belief in enumerate(beliefs):
-            _row(axes, k, belief.get(side, []), int(table.throw[k]))
+            throw = int(table.throw[k])
+            look = STOP if throw < 0 else _look(throw) | {"lw": 0.0}
+            axes.axhline(k, color=style.FAINT, lw=0.4, zorder=0)
+            style.bars(axes, belief.get(side, []), float(k), 0.28, **look)
         if side == wanted:
             axes.axvspan(x, max(high, x), color=style.GOAL, alpha=0.12, lw=0)
         if found.mode == "catch" or side == wanted:
             axes.axvline(x, **style.GOAL_LINE)
-        place = getattr(found.sensor, "x", None)
-        if place is not None:
-            axes.axvline(place, color=style.INK, lw=1.0, ls=(0, (5, 2)))
-        axes.set_xlim(low - 0.03 * (high - low), high + 0.03 * (high - low))
-        axes.set_title(f"side {side}", loc="left", fontsize=style.TEXT)
-        axes.set_xlabel(f"x [{unit}]", fontsize=style.SMALL)
-        axes.tick_params(labelsize=style.SMALL)
-        style.open_frame(axes)
+        if isinstance(found.sensor, BeyondSensor):
+            axes.axvline(found.sensor.x, **SENSOR)
+        style.panel(
+            axes,
+            f"side {side}",
+            small_ticks=True,
+            xlim=style.widened(low, high, 0.03),
+            xlabel=f"x [{unit}]",
+            ylabel="" if side or table.states <= MOST else "state",
+        )
     if table.states <= MOST:
         panels[0].set_yticks(range(table.states), [_label(table, k) for k in range(table.states)])
-    else:
-        panels[0].set_ylabel("state", fontsize=style.SMALL)
     panels[0].set_ylim(table.states - 0.4, -0.6)
-    style.title(figure, f"{found.scene.name}: {found.question} {found.found.throws} throws are enough")
-    style.legend(figure, _keys(found), 4)
-    return figure
+    words = f"{found.scene.name}: {found.question} {found.found.throws} throws are enough"
+    return style.finished(figure, words, _keys(found), 4)
 
 
-def _row(axes: Axes, k: int, parts: Any, throw: int) -> None:
-    axes.axhline(k, color=style.FAINT, lw=0.4, zorder=0)
-    for lo, hi in parts:
-        if throw < 0:
-            look = {"facecolor": "white", "edgecolor": style.GOAL, "lw": 1.4}
-        else:
-            look = {
-                "facecolor": COLOURS[throw % len(COLOURS)],
-                "edgecolor": "white",
-                "hatch": HATCHES[throw % len(HATCHES)],
-                "lw": 0.0,
-            }
-        style.bar(axes, lo, hi, float(k), 0.28, **look)
+def _look(throw: int) -> dict[str, Any]:
+    """Give the look of a throw by its number."""
+    return {
+        "facecolor": COLOURS[throw % len(COLOURS)],
+        "edgecolor": "white",
+        "hatch": HATCHES[throw % len(HATCHES)],
+    }
 
 
-def _label(table: Any, k: int) -> str:
+def _label(table: Policy, k: int) -> str:
     """Name a row: its state, its throw, and the next states by the answer."""
     throw = "stop" if table.throw[k] < 0 else table.throws[int(table.throw[k])]
     after = ", ".join(
@@ -102,16 +102,11 @@ def _label(table: Any, k: int) -> str:
 
 
 def _keys(synthesis: Synthesis) -> list[Any]:
-    from matplotlib.patches import Patch
-
-    keys: list[Any] = [
-        Patch(facecolor=COLOURS[k % 4], edgecolor="white", hatch=HATCHES[k % 4], label=f"throw: {name}")
-        for k, name in enumerate(synthesis.throws)
+    stops = synthesis.mode == "stop"
+    words = "side {} from here on" if stops else "caught from here on: right on side {}"
+    return [
+        *(Patch(label=f"throw: {name}", **_look(k)) for k, name in enumerate(synthesis.throws)),
+        Patch(label="stop: the part is there", **STOP) if stops else None,
+        style.key(f"goal: {words.format(synthesis.goal[1])}", **style.GOAL_LINE),
+        style.key("sensor", **SENSOR) if isinstance(synthesis.sensor, BeyondSensor) else None,
     ]
-    if synthesis.mode == "stop":
-        keys.append(Patch(facecolor="white", edgecolor=style.GOAL, lw=1.4, label="stop: the part is there"))
-    words = "side {} from here on" if synthesis.mode == "stop" else "caught from here on: right on side {}"
-    keys.append(style.key(f"goal: {words.format(synthesis.goal[1])}", **style.GOAL_LINE))
-    if hasattr(synthesis.sensor, "x"):
-        keys.append(style.key("sensor", color=style.INK, lw=1.0, ls=(0, (5, 2))))
-    return keys

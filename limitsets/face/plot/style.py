@@ -103,8 +103,9 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
         )
     domain = source.grid.domain
     if source.grid.dimension > 1:
-        remedy = "draw its basins, or a section of it"
-        raise AnswerError("the dimension of the map", source.grid.dimension, "1", remedy)
+        raise AnswerError(
+            "the dimension of the map", source.grid.dimension, "1", "draw its basins, or a section of it"
+        )
     kind = kind_of(source.map)
     return Subject(
         type(source.map).__name__,
@@ -145,6 +146,8 @@ SETS = (
 JOG_LINE, FLIP_LINE, ROLL_LINE = "-", (0, (4.5, 1.8)), (0, (4.5, 1.5, 1.0, 1.5))
 GOAL_LINE: dict[str, Any] = {"color": GOAL, "lw": 1.3, "ls": (0, (1, 1.5))}
 SMALL, TEXT = 8.5, 10.0
+# Behind words that lines would cross.
+PLATE: dict[str, Any] = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
 
 # Steps after which an orbit counts as being on its attractor.
 TRANSIENT = 2000
@@ -162,18 +165,18 @@ def canvas(
 
 
 def panels(
-    count: int, columns: int, size: tuple[float, float], room: tuple[float, float], below: str
+    count: int, columns: int, size: tuple[float, float], room: tuple[float, float], below: str = ""
 ) -> tuple[Figure, list[Axes]]:
-    """Make a figure of panels that share their limits, and label the lowest in each column.
+    """Make a figure of panels; with a label, `below`, they share their limits, and the lowest in each column has it.
 
     `size` is the size of a panel, `room` the border around all of them [inches].
     """
-    rows = math.ceil(count / columns)
+    rows, shared = math.ceil(count / columns), bool(below)
     wide, tall = size[0] * columns + room[0], size[1] * rows + room[1]
-    figure, frames = canvas(wide, tall, rows, columns, sharex=True, sharey=True)
+    figure, frames = canvas(wide, tall, rows, columns, sharex=shared, sharey=shared)
     for axes in frames[count:]:
         axes.set_axis_off()
-    for k, axes in enumerate(frames[:count]):
+    for k, axes in enumerate(frames[:count] if shared else ()):
         lowest = k + columns >= count
         axes.xaxis.set_tick_params(labelbottom=lowest)
         axes.set_xlabel(below if lowest else "")
@@ -190,8 +193,9 @@ def extents_of(source: Any) -> list[Extents]:
         known = [part for part in parts if isinstance(part, Mapping)]
         if len(known) == len(parts):
             return known
-    allowed = "attractors, limit sets or an analysis"
-    raise AnswerError("what to draw", type(source).__name__, allowed, "pass one of these")
+    raise AnswerError(
+        "what to draw", type(source).__name__, "attractors, limit sets or an analysis", "pass one of these"
+    )
 
 
 def ends_of(sets: Iterable[Extents]) -> list[float]:
@@ -240,9 +244,15 @@ def of_set(number: int) -> dict[str, Any]:
     return {"facecolor": face, "hatch": hatch, "edgecolor": INK}
 
 
-def bar(axes: Axes, lo: float, hi: float, middle: float, half: float, **look: Any) -> None:
-    """Draw a bar from lo to hi, `half` its height."""
-    axes.add_patch(Rectangle((lo, middle - half), hi - lo, 2 * half, **look))
+def bars(axes: Axes, parts: Iterable[tuple[float, float]], middle: float, half: float, **look: Any) -> None:
+    """Draw a bar for each interval, `half` its height, in the lane at the height `middle`."""
+    for lo, hi in parts:
+        axes.add_patch(Rectangle((lo, middle - half), hi - lo, 2 * half, **look))
+
+
+def widened(lo: float, hi: float, share: float) -> tuple[float, float]:
+    """Give limits of an axis that leave room at both ends, a share of the distance between them."""
+    return lo - share * (hi - lo), hi + share * (hi - lo)
 
 
 def note(axes: Axes, words: str, at: tuple[float, float], shift: tuple[float, float], **how: Any) -> None:
@@ -260,8 +270,27 @@ def open_frame(axes: Axes, *borders: str) -> None:
     axes.spines[["top", "right", *borders]].set_visible(False)
 
 
-def lanes(axes: Axes) -> None:
-    """Remove the frame except its base, for figures with one lane per name on the left."""
+def panel(
+    axes: Axes, title: str = "", *, legend: Any = "", small_ticks: bool = False, **properties: Any
+) -> None:
+    """Set properties of a panel as `Axes.set` does, with small labels, a title on the left and an open frame.
+
+    `legend` is the place of a legend inside it; with `small_ticks` the numbers of the axes are small as well.
+    """
+    axes.set(**properties)
+    axes.set_title(title, loc="left", fontsize=TEXT)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.label.set_fontsize(SMALL)
+    if small_ticks:
+        axes.tick_params(labelsize=SMALL)
+    if legend:
+        axes.legend(loc=legend, fontsize=SMALL, frameon=False)
+    open_frame(axes)
+
+
+def lanes(axes: Axes, names: Mapping[Any, str], size: float = SMALL) -> None:
+    """Write names of lanes by their heights, and remove the frame except its base."""
+    axes.set_yticks(list(names), list(names.values()), fontsize=size)
     open_frame(axes, "left")
     axes.tick_params(axis="y", length=0)
 
@@ -277,22 +306,31 @@ def key(label: str, **look: Any) -> Line2D:
     return Line2D([], [], label=label, **look)
 
 
-def key_of_goal(scene: Scene | Subject) -> list[Line2D]:
+def key_of_goal(scene: Scene | Subject) -> Line2D | None:
     """Make the legend's entry for the line that `goal` draws."""
     if not isinstance(scene.goal, OrientedBeyond):
-        return []
-    return [key(f"goal: side {scene.goal.side} beyond {scene.goal.x:g} {scene.unit}", **GOAL_LINE)]
+        return None
+    return key(f"goal: side {scene.goal.side} beyond {scene.goal.x:g} {scene.unit}", **GOAL_LINE)
 
 
-def legend(figure: Figure, handles: Sequence[Any], columns: int) -> None:
-    """Put a legend below all axes."""
-    columns = min(columns, max(len(handles), 1))
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=SMALL, frameon=False)
+def legend(figure: Figure, handles: Iterable[Any], columns: int) -> None:
+    """Put a legend below all axes; entries that are None are left out."""
+    entries = [handle for handle in handles if handle is not None]
+    columns = min(columns, max(len(entries), 1))
+    figure.legend(handles=entries, loc="outside lower center", ncols=columns, fontsize=SMALL, frameon=False)
 
 
 def title(figure: Figure, text: str) -> None:
     """Put a title above all axes."""
     figure.suptitle(text, fontsize=TEXT + 1.5)
+
+
+def finished(figure: Figure, text: str, handles: Iterable[Any] = (), columns: int = 3) -> Figure:
+    """Give the figure with its title, and a legend below all axes if it has entries."""
+    title(figure, text)
+    if handles:
+        legend(figure, handles, columns)
+    return figure
 
 
 def keep_apart(axes: Axes, share: float) -> None:

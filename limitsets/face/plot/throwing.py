@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -157,8 +158,13 @@ def _struck_rate(rho: float, arm: Array, velocity: tuple[float, float, float]) -
     return (rho * rho * rate + float(arm[0]) * up - float(arm[1]) * across) / _inertia(rho, arm)
 
 
-def _pendulum(
-    arm: Array, rate: float, ends: tuple[float, float], inertia: float, gravity: tuple[float, float]
+def pendulum_until(
+    arm: Array,
+    rate: float,
+    ends: tuple[float, float],
+    inertia: float,
+    gravity: tuple[float, float],
+    longest: float = LONGEST,
 ) -> tuple[float, float, Callable[[Array], Array], int] | None:
     """Turn until one of two angles: time, final rate, angle over time, and which; None if this takes too long."""
     from scipy.integrate import solve_ivp
@@ -186,13 +192,13 @@ def _pendulum(
         event.terminal, event.direction = True, way  # type: ignore[attr-defined]  # scipy reads them there
     swing = solve_ivp(
         rates,
-        (0.0, LONGEST),
+        (0.0, longest),
         [0.0, rate],
         "DOP853",
         dense_output=True,
         events=(low, high),
         rtol=1e-10,
-        atol=1e-12,
+        atol=1e-14,
     )
     if swing.status != 1:
         return None
@@ -267,7 +273,7 @@ def _pendulums(
     for _ in range(MOST_FACES):
         place, inertia = corners[vertex % n], _inertia(rho, arm)
         ends = _ends(corners, vertex)
-        swung = _pendulum(arm, rate, ends, inertia, gravity)
+        swung = pendulum_until(arm, rate, ends, inertia, gravity)
         if swung is None:
             return None
         took, rate, angle, counter = swung
@@ -453,7 +459,7 @@ def motion(scene: Scene, throw: Throw) -> Motion:
     gravity = -kappa * math.sin(lean), -kappa * math.cos(lean)
     exact = scene.flight == "exact"
     by_contact = [name for name in CONTACTS if getattr(scene.effects, name)]
-    path = _exact_flight(scene, throw, gravity) if exact else _small_flight(scene, throw)
+    path = partial(_exact_flight if exact else _small_flight, scene, throw)
     struck, corners = lands(scene, throw), outline(scene, throw.side)
     start = angle_on_side(scene, throw.side)
 
@@ -475,42 +481,28 @@ def motion(scene: Scene, throw: Throw) -> Motion:
         rolls=bool(scene.effects.roll),
         scatters=throw.scatters,
     )
-    shift = turning.shift
-
-    def flight(share: Array) -> Array:
-        poses = path(share)
-        poses[:, 0] += shift * share
-        poses[:, 2] += start
-        return poses
-
-    def turn(share: Array) -> Array:
-        poses = turning.pose(share)
-        poses[:, 2] += start + throw.phi
-        return poses
-
+    shift, at_impact = turning.shift, start + throw.phi
     foot = hit.corners[struck % len(corners)]
-    at_impact = np.array([hit.centre[0] + shift, hit.centre[1], start + throw.phi])
-    return Motion(flight, (float(foot[0]) + shift, float(foot[1])), at_impact, turning._replace(pose=turn))
+    return Motion(
+        lambda share: path(share) + np.outer(share, (shift, 0.0, 0.0)) + np.array([0.0, 0.0, start]),
+        (float(foot[0]) + shift, float(foot[1])),
+        np.array([hit.centre[0] + shift, hit.centre[1], at_impact]),
+        turning._replace(pose=lambda share: turning.pose(share) + np.array([0.0, 0.0, at_impact])),
+    )
 
 
-def _exact_flight(scene: Scene, throw: Throw, gravity: tuple[float, float]) -> Callable[[Array], Array]:
-    def path(share: Array) -> Array:
-        phi = throw.phi * np.asarray(share)
-        centre = centre_in_flight(scene, throw.x, throw.side, phi, -gravity[1])
-        return np.stack([centre[:, 0] + 0.5 * gravity[0] * phi * phi, centre[:, 1], phi], axis=-1)
-
-    return path
+def _exact_flight(scene: Scene, throw: Throw, share: Array) -> Array:
+    phi, lean = throw.phi * np.asarray(share), stroke_of(scene)
+    centre = centre_in_flight(scene, throw.x, throw.side, phi, throw.kappa * math.cos(lean))
+    along = -throw.kappa * math.sin(lean)
+    return np.stack([centre[:, 0] + 0.5 * along * phi * phi, centre[:, 1], phi], axis=-1)
 
 
-def _small_flight(scene: Scene, throw: Throw) -> Callable[[Array], Array]:
+def _small_flight(scene: Scene, throw: Throw, share: Array) -> Array:
     """Attach the part to its left vertex, whose path follows the small-angle formulas: (R - a - h phi, ...)."""
     a, d, h = float(scene.sides.a[throw.side]), float(scene.sides.d[throw.side]), scene.surface_height
     fall = throw.kappa - (d if scene.flight == "small-angle-2" else 0.0)
-
-    def path(share: Array) -> Array:
-        phi = throw.phi * np.asarray(share)
-        x, y = throw.x - a - h * phi, h + (throw.x - a) * phi - 0.5 * fall * phi * phi
-        cos, sin = np.cos(phi), np.sin(phi)
-        return np.stack([x + a * cos - d * sin, y + a * sin + d * cos, phi], axis=-1)
-
-    return path
+    phi = throw.phi * np.asarray(share)
+    x, y = throw.x - a - h * phi, h + (throw.x - a) * phi - 0.5 * fall * phi * phi
+    cos, sin = np.cos(phi), np.sin(phi)
+    return np.stack([x + a * cos - d * sin, y + a * sin + d * cos, phi], axis=-1)
