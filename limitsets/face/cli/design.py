@@ -2,179 +2,82 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
+import limitsets as ls
 from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import as_json
 from limitsets.base.proposals import proposed
-from limitsets.face.cli.about import About
-from limitsets.face.cli.arguments import HELP_LAID, HELP_NO_RECHECK, bounds_of, laid_ranges, number
-from limitsets.face.cli.output import (
-    Csv,
-    Form,
-    Format,
-    Json,
-    Scene,
-    Words,
-    answer,
-    opened,
-    option,
-    progress,
-    save_scene,
-    scene_file,
-    show,
-    show_scene,
-)
+from limitsets.base.tables import Table
+from limitsets.face import report
+from limitsets.face.cli.arguments import bounds_of, laid_ranges, number
+from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
+from limitsets.face.cli.design_robust import about_of, begun, of_margin, scene_file, scene_words, write_design
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
+    from limitsets.feeder.scene import Scene as SceneOf
     from limitsets.feeder.scene.laid import LaidLike
     from limitsets.parameters.design import Design
     from limitsets.parameters.design.for_goal import GoalDesign
 
 
 # ----------------------------------------------------------------
-# `limitsets design --goal`: a scene that meets its own goal, at the X that it asks for.
-
-
-def run_goal(
-    name: str,
-    vary: Sequence[str],
-    bounds: list[str] | None,
-    laid: LaidLike | None,
-    evaluations: int,
-    out: Path | None,
-    form: str,
-    csv: Path | None,
-    *,
-    json: bool,
-) -> int:
-    """Search, prove, write and print; return the exit code."""
-    with progress() as tell:
-        from limitsets.parameters.design.for_goal import design_for_goal
-
-        scene, _ = opened(name, None if out and out.suffix == ".toml" else out)
-        given = bounds_of(scene, bounds)
-        solution = design_for_goal(
-            scene, vary=vary, bounds=given, laid=laid, evaluations=evaluations, progress=tell
-        )
-        about = About(solution.model, scene_file(solution.scene, out), solution.scene)
-        files = [] if out is None else _written_of_goal(solution, out, form, about)
-    answer(
-        about.added(solution) if json else solution,
-        json,
-        lambda: _text_of_goal(solution, files, about, evaluations),
-        csv=(csv, solution.table),
-    )
-    return 0 if solution.verdict == "proved" else 1
-
-
-def _written_of_goal(solution: GoalDesign, out: Path, form: str, about: About) -> list[Path]:
-    """Write the scene, or a folder with the scene, the answer as JSON and the part."""
-    if out.suffix == ".toml":
-        return save_scene(solution.scene, out)
-    from limitsets.base.files import as_json
-    from limitsets.face import plot
-    from limitsets.face.report.writing import laid
-    from limitsets.feeder.scene import dump
-
-    texts = {
-        f"{solution.scene.name}.toml": dump(solution.scene),
-        "design.json": as_json(about.added(solution)),
-    }
-    return laid(out, [("part", plot.part(solution.scene))], lambda _: texts, form)
-
-
-def _text_of_goal(solution: GoalDesign, files: list[Path], about: About, asked: int) -> None:
-    from limitsets.parameters.design.for_goal import POPULATION
-
-    show(solution.table())
-    typer.echo(solution.message[:1].upper() + solution.message[1:] + ".")
-    typer.echo(solution.itself)
-    if solution.room > 0.0 and not any(name.startswith("part.") for name in solution.varied):
-        typer.echo("arm and throw are enough: the part stays as it is")
-    elif solution.evaluations < asked:
-        whole = asked - solution.evaluations < POPULATION
-        why = f"only whole generations of {POPULATION} are" if whole else "all designs came to rate alike"
-        typer.echo(f"{solution.evaluations} of {asked} designs were looked at: {why}")
-    met = solution.room > 0.0
-    if met and solution.ruled_out:
-        from limitsets.parameters.design.search import said
-
-        typer.echo(
-            f"{sum(solution.ruled_out.values())} of {solution.evaluations} designs were ruled out: "
-            f"{said(solution.ruled_out)}"
-        )
-    if met and solution.leaving is not None:
-        from limitsets.face.report.pages import percent
-
-        typer.echo(
-            f"careful: from {percent(solution.leaving)} of all starts (sampled) parts leave the arm; no design was"
-            " found that meets the goal and that no part leaves, and margins of this one may be 0 by that"
-        )
-    if met and solution.verdict != "proved":
-        file = next((str(path) for path in files if path.suffix == ".toml"), None)
-        save = "" if file else "add -o design.toml to this command, then "
-        command = proposed("certify", file or "design.toml")
-        typer.echo(f"next: {save}{command} (what keeps the design from a proof)")
-    show_scene(solution.scene, files, about if met else None)
-
-
-# ----------------------------------------------------------------
-# `limitsets design`: quantities of a scene for which its critical points are as wanted, or the margin large.
+# `limitsets design`: which of the three is wanted.
 
 
 FREE = "free"
 
-HELP_POINTS = "First critical point wanted on each side, like 10,10,20 or '25 cm',free,free."
-HELP_ROBUST = (
-    "Make the proved joint margin of [tolerance] large: only one side beyond X, and almost every orbit there."
-)
-HELP_GOAL = "Meet the scene's own goal, at the X that it asks for; bounds come by themselves."
-HELP_VARY = "Quantities to vary, like part.mass.center.along,throw.speed; repeatable."
-HELP_STARTS = "With --critical-points: other starts to draw at most."
-HELP_STAGES = "With --critical-points: move them there in N steps, of which the figure shows twelve at most."
-HELP_EVALUATIONS = "Designs to look at: with --robust 1200 by default, with --goal 600."
-HELP_BOUNDS = (
-    "Bounds of one of them, like part.mass.center.along='4 in':'5 in'; bare numbers are in the unit of the scene's "
-    "text; either may be left out; repeatable."
-)
 
-
+@command(form=True)
 def design(
+    run: Run,
     scene: Scene,
-    critical_points: Annotated[str | None, option("--critical-points", "R,R,R", HELP_POINTS)] = None,
-    robust: Annotated[bool, typer.Option("--robust", help=HELP_ROBUST)] = False,
-    goal: Annotated[bool, typer.Option("--goal", help=HELP_GOAL)] = False,
-    vary: Annotated[Words, option("--vary", "Q,Q", HELP_VARY)] = None,
-    bounds: Annotated[Words, option("--bounds", "Q=LO:HI", HELP_BOUNDS)] = None,
-    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", f"With --goal or --robust: {HELP_LAID}")] = None,
-    evaluations: Annotated[
-        int | None, option("--evaluations", "N", HELP_EVALUATIONS, min=1, max=1_000_000)
-    ] = None,
-    seconds: Annotated[
-        float, option("--seconds", "S", "With --robust: for the proof of each margin.", min=0.0)
-    ] = 240.0,
-    starts: Annotated[int, option("--starts", "N", HELP_STARTS, min=0, max=10_000)] = 8,
-    stages: Annotated[int | None, option("--stages", "N", HELP_STAGES, min=1, max=1000)] = None,
-    out: Annotated[
-        Path | None,
-        option("--out -o", "FILE", "NAME.toml for the scene; else a folder: scene, JSON and figure."),
-    ] = None,
-    form: Format = Form.PNG,
-    csv: Csv = None,
-    json: Json = False,
-    no_recheck: Annotated[
-        bool, typer.Option("--no-recheck", help=f"With --robust: {HELP_NO_RECHECK}")
-    ] = False,
-) -> None:
+    *,
+    critical_points: str | None = None,
+    robust: bool = False,
+    goal: bool = False,
+    vary: Words = None,
+    bounds: Words = None,
+    laid: Words = None,
+    evaluations: Annotated[int | None, limits(min=1, max=1_000_000)] = None,
+    seconds: Annotated[float, limits(min=0.0)] = 240.0,
+    starts: Annotated[int, limits(min=0, max=10_000)] = 8,
+    stages: Annotated[int | None, limits(min=1, max=1000)] = None,
+    no_recheck: bool = False,
+) -> Answer:
     """Find a scene whose critical points are as wanted, that meets its goal, or is fed in spite of large deviations.
 
     Exit 1 where none is found, or no margin is proved.
+
+    Parameters
+    ----------
+    critical_points : R,R,R
+        First critical point wanted on each side, like 10,10,20 or '25 cm',free,free.
+    robust
+        Make the proved joint margin of [tolerance] large: only one side beyond X, and almost every orbit
+        there.
+    goal
+        Meet the scene's own goal, at the X that it asks for; bounds come by themselves.
+    vary : Q,Q
+        Quantities to vary, like part.mass.center.along,throw.speed; repeatable.
+    bounds : Q=LO:HI
+        Bounds of one of them, like part.mass.center.along='4 in':'5 in'; bare numbers are in the unit of the
+        scene's text; either may be left out; repeatable.
+    laid : SIDE=LO:HI
+        With --goal or --robust: Where parts are laid down, like 0=8:20 or 0='8 in:20 in'; repeatable. The
+        goal's starts are these; default: the whole arm.
+    evaluations : N
+        Designs to look at: with --robust 1200 by default, with --goal 600.
+    seconds : S
+        With --robust: for the proof of each margin.
+    starts : N
+        With --critical-points: other starts to draw at most.
+    stages : N
+        With --critical-points: move them there in N steps, of which the figure shows twelve at most.
+    no_recheck
+        With --robust: Write certificates without checking them first.
+    out : FILE
+        NAME.toml for the scene; else a folder: scene, JSON and figure.
     """
     wanted = (critical_points is not None) + robust + goal
     if wanted != 1:
@@ -185,100 +88,115 @@ def design(
             "give one of them",
         )
     begins = laid_ranges(laid)
-    if begins and critical_points is not None:
-        raise LimitsetsError(
-            "laid", laid, "with --goal or --robust", "critical points have no starts", key="--laid"
-        )
     names = [name.strip() for words in vary or [] for name in words.split(",")]
-    if goal:
-        raise typer.Exit(
-            run_goal(
-                scene,
-                names,
-                bounds,
-                laid=begins,
-                evaluations=evaluations or 600,
-                out=out,
-                form=form,
-                csv=csv,
-                json=json,
-            )
-        )
     if critical_points is None:
-        from limitsets.face.cli.design_robust import run_robust
-
-        raise typer.Exit(
-            run_robust(
-                scene,
-                names,
-                bounds,
-                laid=begins,
-                evaluations=evaluations or 1200,
-                seconds=seconds,
-                out=out,
-                form=form,
-                csv=csv,
-                json=json,
-                recheck=not no_recheck,
-            )
+        chosen = begun(run, scene)
+        options: dict[str, Any] = {"bounds": bounds_of(chosen, bounds), "laid": begins}
+        if goal:
+            return _of_goal(run, chosen, names, evaluations=evaluations or 600, **options)
+        again = not no_recheck
+        return of_margin(
+            run, chosen, names, evaluations=evaluations or 1200, seconds=seconds, recheck=again, **options
         )
-    with progress() as tell:
-        from limitsets.parameters.design import design as run
-
-        chosen, _ = opened(scene, None if out and out.suffix == ".toml" else out)
-        solution = run(
-            chosen,
-            critical_points=_points(critical_points),
-            vary=names,
-            bounds=bounds_of(chosen, bounds),
-            starts=starts,
-            stages=stages,
-            progress=tell,
-        )
-        about = About(solution.model, scene_file(solution.scene, out), solution.scene)
-        files = [] if out is None else _written(solution, out, form, about, tell)
-    answer(
-        about.added(solution) if json else solution,
-        json,
-        lambda: _text(solution, files, about),
-        csv=(csv, solution.table),
-    )
-    raise typer.Exit(0 if solution.reached else 1)
-
-
-def _points(words: str) -> list[float | str | None]:
-    return [None if word.strip() == FREE else number(word) for word in words.split(",")]
-
-
-def _written(
-    solution: Design, out: Path, form: str, about: About, tell: Callable[[str, int, int], None]
-) -> list[Path]:
-    """Write the scene, or a folder with the scene, the answer as JSON and a figure of the design's path."""
-    from limitsets.feeder.scene import dump
-
-    if out.suffix == ".toml":
-        return save_scene(solution.scene, out)
-    from limitsets.face import plot
-    from limitsets.face.report.writing import laid
+    if begins:
+        allowed, remedy = "with --goal or --robust", "critical points have no starts"
+        raise LimitsetsError("laid", laid, allowed, remedy, key="--laid")
     from limitsets.parameters.design import limit_sets_along
 
-    drawn = plot.design(solution, limit_sets_along(solution, tell))
-    texts = {
-        f"{solution.scene.name}.toml": dump(solution.scene),
-        "design.json": as_json(about.added(solution)),
-    }
-    return laid(out, [("part", plot.part(solution.scene)), ("design", drawn)], lambda _: texts, form)
-
-
-def _text(solution: Design, files: list[Path], about: About) -> None:
-    """Print the changed quantities, how well the critical points are reached, and the scene."""
-    show(solution.table())
-    typer.echo(solution.message[:1].upper() + solution.message[1:] + ".")
-    condition = "not known" if solution.condition is None else f"{solution.condition:.4g}"
-    typer.echo(
-        f"{solution.evaluations} evaluations, {solution.how}; condition number of the derivatives: {condition}"
+    chosen = begun(run, scene)
+    solution = ls.design(
+        chosen,
+        critical_points=[
+            None if word.strip() == FREE else number(word) for word in critical_points.split(",")
+        ],
+        vary=names,
+        bounds=bounds_of(chosen, bounds),
+        starts=starts,
+        stages=stages,
+        progress=run.tell,
     )
+    about = about_of(run, solution)
+    write_design(
+        run,
+        solution.scene,
+        lambda: about.added(solution),
+        lambda: [("design", ls.plot.design(solution, limit_sets_along(solution, run.tell)))],
+    )
+    return Answer(
+        lambda: about.added(solution),
+        lambda: [
+            *_text(solution),
+            *scene_words(run, solution.scene, about if solution.reached else None),
+        ],
+        solution.table,
+        code=0 if solution.reached else 1,
+    )
+
+
+def _text(solution: Design) -> Iterator[str | Table]:
+    """Show the changed quantities, and how well the critical points are reached."""
+    yield solution.table()
+    yield solution.message[:1].upper() + solution.message[1:] + "."
+    condition = "not known" if solution.condition is None else f"{solution.condition:.4g}"
+    yield f"{solution.evaluations} evaluations, {solution.how}; condition number of the derivatives: {condition}"
     for side, reason in enumerate(solution.jacobian.reasons):
         if reason is not None:
-            typer.echo(f"no derivative on side {side}: {reason}")
-    show_scene(solution.scene, files, about if solution.reached else None)
+            yield f"no derivative on side {side}: {reason}"
+
+
+# ----------------------------------------------------------------
+# `limitsets design --goal`: a scene that meets its own goal, at the X that it asks for.
+
+
+def _of_goal(
+    run: Run, scene: SceneOf, vary: Sequence[str], evaluations: int, bounds: Any, laid: LaidLike | None
+) -> Answer:
+    """Search and prove."""
+    from limitsets.parameters.design.for_goal import design_for_goal
+
+    solution = design_for_goal(
+        scene, vary=vary, bounds=bounds, laid=laid, evaluations=evaluations, progress=run.tell
+    )
+    about = about_of(run, solution)
+    write_design(run, solution.scene, lambda: about.added(solution))
+    return Answer(
+        lambda: about.added(solution),
+        lambda: [
+            *_text_of_goal(run, solution, evaluations),
+            *scene_words(run, solution.scene, about if solution.room > 0.0 else None),
+        ],
+        solution.table,
+        code=0 if solution.verdict == "proved" else 1,
+    )
+
+
+def _text_of_goal(run: Run, solution: GoalDesign, asked: int) -> Iterator[str | Table]:
+    from limitsets.parameters.design.for_goal import POPULATION
+
+    yield solution.table()
+    yield solution.message[:1].upper() + solution.message[1:] + "."
+    yield solution.itself
+    if solution.room > 0.0 and not any(name.startswith("part.") for name in solution.varied):
+        yield "arm and throw are enough: the part stays as it is"
+    elif solution.evaluations < asked:
+        whole = asked - solution.evaluations < POPULATION
+        why = f"only whole generations of {POPULATION} are" if whole else "all designs came to rate alike"
+        yield f"{solution.evaluations} of {asked} designs were looked at: {why}"
+    met = solution.room > 0.0
+    if met and solution.ruled_out:
+        from limitsets.parameters.design.search import said
+
+        yield (
+            f"{sum(solution.ruled_out.values())} of {solution.evaluations} designs were ruled out: "
+            f"{said(solution.ruled_out)}"
+        )
+    if met and solution.leaving is not None:
+        share = report.pages.percent(solution.leaving)
+        yield (
+            f"careful: from {share} of all starts (sampled) parts leave the arm; no design was"
+            " found that meets the goal and that no part leaves, and margins of this one may be 0 by that"
+        )
+    if met and solution.verdict != "proved":
+        save = "" if run.out else "add -o design.toml to this command, then "
+        command = proposed("certify", scene_file(run, solution.scene) or "design.toml")
+        yield f"next: {save}{command} (what keeps the design from a proof)"
