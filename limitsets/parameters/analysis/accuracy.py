@@ -13,20 +13,18 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.base.files import as_table, picked
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from limitsets.feeder.scene import Scene
-    from limitsets.systems.graph import TransitionGraph
-    from limitsets.systems.sets import Attractor, LimitSet
-
+from limitsets.feeder.scene import Scene
+from limitsets.systems.cells import grid
+from limitsets.systems.graph import TransitionGraph, transitions
+from limitsets.systems.maps import has_slope, orbit
+from limitsets.systems.sets import Attractor, LimitSet, attractors, limit_set
 
 Extents = dict[int, list[tuple[float, float]]]
 
@@ -172,9 +170,6 @@ class _Trial:
 
 
 def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
-    from limitsets.systems.cells import grid
-    from limitsets.systems.graph import transitions
-    from limitsets.systems.sets import attractors
 
     stops = [time.perf_counter()]
     graph = transitions(scene.map, grid(scene.domain, cells=cells))
@@ -190,9 +185,6 @@ def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
 
 def _seconds_of_graph(scene: Scene, cells: int) -> float:
     """Time of a graph of so many cells a side, from that of one that takes a few hundredths of a second."""
-    from limitsets.systems.cells import grid
-    from limitsets.systems.graph import transitions
-
     best = math.inf
     for _ in range(TIMES):
         begin = time.perf_counter()
@@ -294,16 +286,11 @@ def best_extents(attractors: Sequence[Attractor], limits: Sequence[LimitSet]) ->
 
 def left_to_cells() -> LimitSet:
     """Say that end points were not looked for, because the borders of cells meet the error."""
-    from limitsets.systems.sets import LimitSet
-
     return LimitSet({}, (), 0, False, False, "end points were not looked for: cells meet the error asked for")
 
 
 def limit_of(graph: TransitionGraph, attractor: Attractor) -> LimitSet:
     """Its end points; the cells where the map's branches cannot be followed one by one."""
-    from limitsets.systems.maps import has_slope
-    from limitsets.systems.sets import LimitSet, limit_set
-
     if has_slope(graph.map):
         return limit_set(graph, attractor)
     advice = "with effects on a throw has more branches than this version follows"
@@ -373,8 +360,6 @@ class _Visited:
 
 def _from_inside(scene: Scene, attractor: Attractor, asked: float) -> float:
     """Distance of the cells from an orbit inside, which is followed until it is small enough."""
-    from limitsets.systems.maps import orbit
-
     parts = [
         _Visited(side, lo, hi, asked / 4.0)
         for side, pairs in sorted(attractor.extents.items())
