@@ -21,7 +21,6 @@ from limitsets.base.errors import LimitsetsError
 from limitsets.base.progress import InterruptedRun
 from limitsets.face.cli import (
     analyse,
-    animate,
     assemble,
     atlas,
     certify,
@@ -61,7 +60,7 @@ def limitsets(
     """
 
 
-for file in (scenes, analyse, throw, animate, certify, margin, design, atlas, feed, feedback, assemble):
+for file in (scenes, analyse, throw, certify, margin, design, atlas, feed, feedback, assemble):
     for command in COMMANDS[file.__name__]:
         # click would cut the summary where a line ends
         app.command(short_help=(command.__doc__ or "").partition("\n")[0])(command)

@@ -54,11 +54,11 @@ def position(scene: Scene, text: str) -> float:
     LimitsetsError
         No number, a unit of something else, or a place before the joint or beyond the arm's end.
     """
-    value = place(scene, text)
-    if not 0.0 <= value <= scene.arm_length:
-        allowed = f"a place on the arm, from 0 to {scene.arm_length:g} {scene.unit}"
+    x = place(scene, text)
+    if not 0.0 <= x <= scene.arm_length:
+        allowed = f"a place on the arm, from 0 to {scene.arm_length:.9g} {scene.unit}"
         raise LimitsetsError("x", text, allowed, "start where a part can rest", key="--x")
-    return value
+    return x
 
 
 def named(
@@ -190,16 +190,19 @@ def with_ending(file: Path) -> Path:
 
 
 def certified(
-    answer: Any, file: Path, claim: str | None = None, *, proved: bool, recheck: bool
-) -> tuple[Any, dict[str, Any]]:
+    answer: Any, file: Path | None, claim: str | None = None, *, proved: bool, recheck: bool
+) -> tuple[Any, dict[str, Any] | None]:
     """Write the certificate; return the answer without claims that the checker denies, and a record of the file.
 
-    An answer of one claim is denied by the reason for that one.
+    An answer of one claim is denied by the reason for that one.  Without a file nothing is written.
     """
     from limitsets.proofs.prover.certificate import DeniedError
 
+    if file is None:
+        return answer, None
+    written = {"file": None, "denied": False, "recheck": None}
     if not proved:
-        return answer, {"file": None, "denied": False, "recheck": None}
+        return answer, written
     begin, file = time.perf_counter(), with_ending(file)
     with saved(file) as draft:
         try:
@@ -207,19 +210,20 @@ def certified(
         except DeniedError as error:
             kept = str(file.with_name(Path(error.file or "").name))
             answer = answer.denied(error.claims if claim is None else error.claims[claim])
-            return answer, {"file": kept, "denied": True, "recheck": None}
+            return answer, written | {"file": kept, "denied": True}
         say_replaced(file, draft)
-    seconds = time.perf_counter() - begin if recheck else None
-    return answer, {"file": str(file), "denied": False, "recheck": seconds}
+    return answer, written | {"file": str(file), "recheck": time.perf_counter() - begin if recheck else None}
 
 
-def said_of(written: dict[str, Any], missing: str, *, partly: bool = False) -> str:
-    """Say in a line what became of the certificate; `missing` is the reason for having none."""
+def said_of(written: dict[str, Any] | None, missing: str, *, partly: bool = False) -> list[str]:
+    """Say in a line what became of the certificate, if one was wanted; `missing` is the reason for having none."""
+    if written is None:
+        return []
     file, seconds = written["file"], written["recheck"]
     if file is None:
-        return f"no certificate is written: {missing}"
+        return [f"no certificate is written: {missing}"]
     if written["denied"]:
-        return f"the checker denies the certificate: it is kept as {file}, and what it denies is undecided"
+        return [f"the checker denies the certificate: it is kept as {file}, and what it denies is undecided"]
     left = ", of what is proved only" if partly else ""
     done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
-    return f"certificate: {file}{left}, {done} (check it: {proposed('recheck', file)})"
+    return [f"certificate: {file}{left}, {done} (check it: {proposed('recheck', file)})"]

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import limitsets as ls
 from limitsets.base.tables import Table
 from limitsets.face import report
-from limitsets.face.cli.about import About
 from limitsets.face.cli.commands import Answer, Run, Scene, command, limits
 from limitsets.face.cli.output import processes, saved, stem_of
 
@@ -94,7 +93,7 @@ def atlas(
             ls.plot.atlas(answers).savefig(draft, dpi=report.writing.DPI)
         last.append(f"figure: {picture}")
     if answers.model is not None:
-        last.append(About(answers.model, scene).line())
+        last.append(run.about(answers.model).line())
     if certify:
         proof = Path(f"{stem_of(chosen)}-regions.proof.zip")
         with processes(workers) as pool:

@@ -11,7 +11,6 @@ import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.base.tables import Table
 from limitsets.face import report
-from limitsets.face.cli.about import About
 from limitsets.face.cli.arguments import certified, deviations, laid_ranges, own_file, said_of, with_ending
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command
 from limitsets.face.cli.output import saved
@@ -67,18 +66,18 @@ def certify(
     some = any(each.written for each in proof.claims)
     run.tell("recheck", 0, 1)
     proof, written = certified(proof, file, proved=some and not proof.effects, recheck=not no_recheck)
-    again = {"recheck": written["recheck"]}
+    again = {"recheck": written and written["recheck"]}
     records = [each | {"timings": each["timings"] | again} for each in proof.to_json()]
     missing = "nothing rechecks maps with effects" if some and proof.effects else "nothing is proved"
 
     def words() -> Iterator[str | Table]:
         yield from _text(proof)
-        yield said_of(written, missing, partly=not proof.proved)
+        yield from said_of(written, missing, partly=not proof.proved)
         if not proof.proved:
             yield f"next: {report.pages.after_unproved(proof)}"
 
-    about = About(proof.model, scene, chosen)
-    return Answer(records, words, proof.table, code=0 if proof.proved else 1, about=about)
+    code, about = 0 if proof.proved else 1, run.about(proof.model, chosen)
+    return Answer(records, words, proof.table, code=code, about=about)
 
 
 def _text(proof: Proof) -> Iterator[str | Table]:

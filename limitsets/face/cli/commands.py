@@ -14,6 +14,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from inspect import Parameter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_args, get_origin
@@ -22,10 +23,9 @@ import typer
 
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import as_json
+from limitsets.base.files import as_json, as_plain
 from limitsets.base.tables import Table
 from limitsets.face import report
-from limitsets.face.cli.about import About
 from limitsets.face.cli.output import place_for, progress, saved, show, stem_of
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from limitsets.base.campaign import Progress
     from limitsets.feeder.scene import Scene as SceneOf
+    from limitsets.feeder.scene.left_out import Model
 
 
 # ----------------------------------------------------------------
@@ -125,6 +126,45 @@ def _declared(parameter: Parameter, metavar: str, words: str) -> Parameter:
 # The run of a command, and its answer.
 
 
+@dataclass(frozen=True)
+class About:
+    """The model and the scene of an answer.
+
+    Attributes
+    ----------
+    model : Model
+        The model of the answer.
+    name : str
+        Name or file of the scene, as other commands take it.
+    scene : Scene or None
+        The scene, if the answer is to say which assumptions of the model it breaks; else None.
+    """
+
+    model: Model
+    name: str
+    scene: SceneOf | None = None
+
+    @cached_property
+    def audited(self) -> Model:
+        """The model with the assumptions that break on the limit set, computed at the first use."""
+        if self.scene is None or self.model.broken is not None:
+            return self.model
+        from limitsets.proofs.auditing import audited
+
+        return audited(self.model, self.scene)
+
+    def added(self, record: Any) -> Any:
+        """Give an answer as plain tables for JSON, each with the model."""
+        plain = as_plain(record)
+        for each in plain if isinstance(plain, list) else [plain]:
+            each["model"] = self.audited.to_json()
+        return plain
+
+    def line(self) -> str:
+        """Give the line of text that names the model."""
+        return self.audited.line(self.name)
+
+
 @dataclass
 class Run:
     """The shared options of a command as they are given, and what it has written.
@@ -143,6 +183,8 @@ class Run:
         Of --csv.
     files : list of Path
         What is written into the folder of --out.
+    source : str
+        The scene, as it is given.
     """
 
     tell: Progress
@@ -152,6 +194,7 @@ class Run:
     csv: Path | None = None
     json: bool = False
     files: list[Path] = field(default_factory=list)
+    source: str = ""
 
     @property
     def folder(self) -> Path:
@@ -170,6 +213,10 @@ class Run:
         if self.out is not None:
             place_for(scene, self.out)
         return scene
+
+    def about(self, model: Model, scene: SceneOf | None = None) -> About:
+        """Give the model of the answer; with `scene` it says which assumptions break there."""
+        return About(model, self.source, scene)
 
     def write(self, drawn: Iterable[tuple[str, Figure]], texts: Mapping[str, Any]) -> None:
         """Write figures, and texts or answers as JSON, into the folder of --out, all of them or none."""
@@ -228,7 +275,7 @@ def command(
             common = {parameter.name: options.pop(parameter.name) for parameter in shared}
             arguments = [options.pop(each.name) for each in parameters if each.kind is not each.KEYWORD_ONLY]
             with progress() as tell:
-                state = Run(tell, **common)
+                state = Run(tell, **common, source=str(arguments[0]) if arguments else "")
                 answer = function(state, *arguments, **options)
             _give(state, answer, None if "out" in own else state.out)
             raise typer.Exit(answer.code)

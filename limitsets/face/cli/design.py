@@ -12,7 +12,7 @@ from limitsets.base.tables import Table
 from limitsets.face import report
 from limitsets.face.cli.arguments import bounds_of, laid_ranges, number
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
-from limitsets.face.cli.design_robust import about_of, begun, of_margin, scene_file, scene_words, write_design
+from limitsets.face.cli.design_robust import designed, is_scene_file, of_margin, scene_file
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene as SceneOf
@@ -88,48 +88,37 @@ def design(
             "give one of them",
         )
     begins = laid_ranges(laid)
-    names = [name.strip() for words in vary or [] for name in words.split(",")]
-    if critical_points is None:
-        chosen = begun(run, scene)
-        options: dict[str, Any] = {"bounds": bounds_of(chosen, bounds), "laid": begins}
-        if goal:
-            return _of_goal(run, chosen, names, evaluations=evaluations or 600, **options)
-        again = not no_recheck
-        return of_margin(
-            run, chosen, names, evaluations=evaluations or 1200, seconds=seconds, recheck=again, **options
-        )
-    if begins:
+    if begins and critical_points is not None:
         allowed, remedy = "with --goal or --robust", "critical points have no starts"
         raise LimitsetsError("laid", laid, allowed, remedy, key="--laid")
+    names = [name.strip() for words in vary or [] for name in words.split(",")]
+    chosen = ls.load(scene) if is_scene_file(run) else run.opened(scene)
+    ends = bounds_of(chosen, bounds)
+    if goal:
+        return _of_goal(run, chosen, names, bounds=ends, laid=begins, evaluations=evaluations or 600)
+    if critical_points is None:
+        ways: dict[str, Any] = {"bounds": ends, "laid": begins, "seconds": seconds, "recheck": not no_recheck}
+        return of_margin(run, chosen, names, evaluations=evaluations or 1200, **ways)
     from limitsets.parameters.design import limit_sets_along
 
-    chosen = begun(run, scene)
     solution = ls.design(
         chosen,
         critical_points=[
             None if word.strip() == FREE else number(word) for word in critical_points.split(",")
         ],
         vary=names,
-        bounds=bounds_of(chosen, bounds),
+        bounds=ends,
         starts=starts,
         stages=stages,
         progress=run.tell,
     )
-    about = about_of(run, solution)
-    write_design(
+    return designed(
         run,
-        solution.scene,
-        lambda: about.added(solution),
-        lambda: [("design", ls.plot.design(solution, limit_sets_along(solution, run.tell)))],
-    )
-    return Answer(
-        lambda: about.added(solution),
-        lambda: [
-            *_text(solution),
-            *scene_words(run, solution.scene, about if solution.reached else None),
-        ],
-        solution.table,
-        code=0 if solution.reached else 1,
+        solution,
+        _text(solution),
+        reached=solution.reached,
+        good=solution.reached,
+        drawn=lambda: [("design", ls.plot.design(solution, limit_sets_along(solution, run.tell)))],
     )
 
 
@@ -157,17 +146,8 @@ def _of_goal(
     solution = design_for_goal(
         scene, vary=vary, bounds=bounds, laid=laid, evaluations=evaluations, progress=run.tell
     )
-    about = about_of(run, solution)
-    write_design(run, solution.scene, lambda: about.added(solution))
-    return Answer(
-        lambda: about.added(solution),
-        lambda: [
-            *_text_of_goal(run, solution, evaluations),
-            *scene_words(run, solution.scene, about if solution.room > 0.0 else None),
-        ],
-        solution.table,
-        code=0 if solution.verdict == "proved" else 1,
-    )
+    words = _text_of_goal(run, solution, evaluations)
+    return designed(run, solution, words, reached=solution.room > 0.0, good=solution.verdict == "proved")
 
 
 def _text_of_goal(run: Run, solution: GoalDesign, asked: int) -> Iterator[str | Table]:

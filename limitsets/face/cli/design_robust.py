@@ -11,8 +11,7 @@ import limitsets as ls
 from limitsets.base.files import as_json, picked
 from limitsets.base.tables import Column, Table
 from limitsets.face import report
-from limitsets.face.cli.about import About
-from limitsets.face.cli.commands import Answer, Run
+from limitsets.face.cli.commands import About, Answer, Run
 from limitsets.face.cli.output import saved
 
 if TYPE_CHECKING:
@@ -35,19 +34,9 @@ def is_scene_file(run: Run) -> bool:
     return run.out is not None and run.out.suffix == ".toml"
 
 
-def begun(run: Run, source: str) -> Scene:
-    """Load the scene to begin from, and keep the folder of --out."""
-    return ls.load(source) if is_scene_file(run) else run.opened(source)
-
-
 def scene_file(run: Run, scene: Scene) -> str:
     """Name the file of a design; empty if none is written."""
     return "" if run.out is None else str(run.out if is_scene_file(run) else run.out / f"{scene.name}.toml")
-
-
-def about_of(run: Run, solution: Any) -> About:
-    """Give the model of a design, with the file in which its scene will stand."""
-    return About(solution.model, scene_file(run, solution.scene), solution.scene)
 
 
 def save_scene(scene: Scene, file: Path) -> None:
@@ -90,6 +79,27 @@ def scene_words(run: Run, scene: Scene, about: About | None) -> Iterator[str]:
         yield f"scene (add -o {name} to save it):\n\n{ls.dump(scene)}".rstrip("\n")
 
 
+def designed(
+    run: Run,
+    solution: Any,
+    words: Iterable[str | Table],
+    *,
+    reached: bool = True,
+    good: bool,
+    drawn: Callable[[], Iterable[tuple[str, Figure]]] | None = tuple,
+) -> Answer:
+    """Write a design, where its files are not there yet (`drawn`), and answer: `words`, then its scene."""
+    about = About(solution.model, scene_file(run, solution.scene), solution.scene)
+    if drawn is not None:
+        write_design(run, solution.scene, lambda: about.added(solution), drawn)
+    return Answer(
+        lambda: about.added(solution),
+        lambda: [*words, *scene_words(run, solution.scene, about if reached else None)],
+        solution.table,
+        code=0 if good else 1,
+    )
+
+
 # ----------------------------------------------------------------
 # The search, its files and its words.
 
@@ -108,7 +118,7 @@ def of_margin(
     """Search and prove."""
     from limitsets.parameters.design.for_margin import NoDesignError
 
-    so_far = None if run.out is None else run.out
+    so_far = run.out
     if run.out is not None and not is_scene_file(run):
         so_far = run.out / f"{scene.name}-so-far.toml"
     try:
@@ -125,19 +135,13 @@ def of_margin(
         if none.miss is None:
             raise
         return _missed(run, none, scene, none.miss)
-    if is_scene_file(run):
-        save_scene(design.scene, run.folder)
-    elif run.out is not None:
+    in_folder = run.out is not None and not is_scene_file(run)
+    if in_folder:
         design = _written(run, design, recheck=recheck)
     if so_far is not None and so_far != run.out:
         so_far.unlink(missing_ok=True)
-    about = about_of(run, design)
-    return Answer(
-        lambda: about.added(design),
-        lambda: [*_text(design), *scene_words(run, design.scene, about)],
-        design.table,
-        code=0 if seconds == 0.0 or all(one.proved > 0.0 for one in design.margins) else 1,
-    )
+    proved = seconds == 0.0 or all(margin.proved > 0.0 for margin in design.margins)
+    return designed(run, design, _text(design), good=proved, drawn=None if in_folder else tuple)
 
 
 def _kept(best: Scene, file: Path) -> None:

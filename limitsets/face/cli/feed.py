@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import limitsets as ls
 from limitsets.base.tables import Table
 from limitsets.face import report
-from limitsets.face.cli.about import About
 from limitsets.face.cli.arguments import certified, deviations, laid_ranges, said_of, scattering_of
 from limitsets.face.cli.commands import Answer, Run, Scene, Seed, Words, command, limits
 
@@ -99,15 +98,13 @@ def feed(
         batches=batches,
         progress=run.tell,
     )
-    written, said = None, []
-    if certificate is not None:
-        run.tell("recheck", 0, 1)
-        feeding, written = certified(
-            feeding, certificate, "feeds", proved=feeding.written, recheck=not no_recheck
-        )
-        said.append(said_of(written, "nothing is proved, or of a map with effects, which nothing rechecks"))
+    run.tell("recheck", 0, 1)
+    feeding, written = certified(
+        feeding, certificate, "feeds", proved=feeding.written, recheck=not no_recheck
+    )
+    said = said_of(written, "nothing is proved, or of a map with effects, which nothing rechecks")
     record = feeding.to_json() | {"certificate": written}
-    about = About(feeding.model, scene, chosen)
+    about = run.about(feeding.model, chosen)
     if run.out is not None:
         drawn = [("part", ls.plot.part(chosen)), ("feeding", ls.plot.feeding(feeding))]
         run.write(drawn, {"feeding.json": about.added(record)})

@@ -10,7 +10,6 @@ import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.base.tables import Table
 from limitsets.face import report
-from limitsets.face.cli.about import About
 from limitsets.face.cli.arguments import certified, deviations, goal_at, named, place, places_of, said_of
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
 
@@ -101,13 +100,10 @@ def feedback(
         at = places_of(chosen, sweep, "--sweep")
         tried = list(zip(at, places(chosen, at, error=place(chosen, error), **options), strict=True))
         synthesis = min((each for _, each in tried), key=lambda each: (not each.solved, each.found.throws))
-    written, said = None, []
-    if certificate is not None:
-        run.tell("recheck", 0, 1)
-        synthesis, written = certified(
-            synthesis, certificate, "policy", proved=synthesis.solved, recheck=not no_recheck
-        )
-        said.append(said_of(written, "there is no policy"))
+    run.tell("recheck", 0, 1)
+    synthesis, written = certified(
+        synthesis, certificate, "policy", proved=synthesis.solved, recheck=not no_recheck
+    )
     thrown = simulate(synthesis, parts) if synthesis.solved else None
     record = synthesis.to_json() | {
         "certificate": written,
@@ -121,10 +117,14 @@ def feedback(
         run.write(drawn, {"feedback.json": record, **rows})
     return Answer(
         record,
-        lambda: [*_question(synthesis, tried), *said, *_policy(synthesis, thrown)],
+        lambda: [
+            *_question(synthesis, tried),
+            *said_of(written, "there is no policy"),
+            *_policy(synthesis, thrown),
+        ],
         synthesis.table if synthesis.solved else None,
         code=0 if synthesis.solved else 1,
-        about=About(synthesis.model, scene),
+        about=run.about(synthesis.model),
     )
 
 

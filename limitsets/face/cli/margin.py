@@ -11,9 +11,8 @@ import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.base.tables import Table, joined
 from limitsets.face import report
-from limitsets.face.cli.about import About
 from limitsets.face.cli.arguments import deviations, goal_at, laid_ranges, scattering_of
-from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
+from limitsets.face.cli.commands import About, Answer, Run, Scene, Words, command, limits
 from limitsets.face.cli.output import processes
 
 if TYPE_CHECKING:
@@ -60,7 +59,7 @@ def margin(
     margins = ls.margin(
         chosen, *(quantity or ()), reading=reading, goal=goal, laid=begins, width=width, progress=run.tell
     )
-    about = About(margins[0].model, scene, chosen)
+    about = run.about(margins[0].model, chosen)
     records: list[Any] = list(margins)
     if run.out is not None:
         run.tell("files", len(margins), len(margins) + 1)
@@ -199,7 +198,7 @@ def robustness(
         lambda: _text_of_sheet(chosen, sheet),
         sheet.table,
         code=0 if sheet.verdict == "proved" and not sheet.failed else 1,
-        about=About(sheet.model, scene),  # audited by the sheet itself, unless that was left out
+        about=run.about(sheet.model),  # audited by the sheet itself, unless that was left out
     )
 
 

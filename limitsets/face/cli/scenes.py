@@ -175,17 +175,17 @@ def _packages() -> list[dict[str, str | None]]:
 
 def _cache(*, clear: bool) -> dict[str, Any]:
     """Measure the folder of the compiled code, and delete it if asked."""
+    none = {"folder": None, "bytes": 0, "versions": 0, "cleared": False, "reason": "it cannot be written"}
     try:
         from limitsets.numbers.jit.cache import FOLDER
     except ImportError as error:  # numba is missing or broken
-        return {"folder": None, "bytes": 0, "versions": 0, "cleared": False, "reason": str(error)}
+        return none | {"reason": str(error)}
     if FOLDER is None:
-        return {"folder": None, "bytes": 0, "versions": 0, "cleared": False, "reason": "it cannot be written"}
+        return none
     root = FOLDER.parent
-    files = [each for each in root.rglob("*") if each.is_file()]
     record = {
         "folder": str(root),
-        "bytes": sum(each.stat().st_size for each in files),
+        "bytes": sum(each.stat().st_size for each in root.rglob("*") if each.is_file()),
         "versions": sum(each.is_dir() for each in root.iterdir()),
         "cleared": clear,
         "reason": None,
@@ -194,12 +194,8 @@ def _cache(*, clear: bool) -> dict[str, Any]:
         try:
             shutil.rmtree(root)
         except OSError as error:
-            raise LimitsetsError(
-                "the compiled code",
-                str(root),
-                "a folder that can be deleted",
-                f"it could not be: {error.strerror}",
-            ) from None
+            allowed, remedy = "a folder that can be deleted", f"it could not be: {error.strerror}"
+            raise LimitsetsError("the compiled code", str(root), allowed, remedy) from None
     return record
 
 
