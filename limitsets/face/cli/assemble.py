@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import limitsets as ls
 from limitsets.base.tables import Table
+from limitsets.face import report
 from limitsets.face.cli.arguments import scattering_of
 from limitsets.face.cli.commands import Answer, Run, Scene, Seed, Words, command, limits
 
@@ -79,6 +80,7 @@ def assemble(
 
 def _text(assembly: Assembly) -> Iterator[str | Table]:
     one, two = assembly.pair.scenes
+    joint, first, spans = assembly.joint, assembly.first_series, report.pages.intervals
     meet = "pass through each other"
     if assembly.contact != "none":
         how = "the cavity is thrown too" if assembly.series.carried else "the cavity stands"
@@ -96,19 +98,16 @@ def _text(assembly: Assembly) -> Iterator[str | Table]:
             f"{100 * high:.1f} %), in flight in {100 * flying.share:.1f} %: of these the rates say nothing"
         )
     yield assembly.table()
-    joint = assembly.joint
     if joint is not None:
-        first, second = joint.rates
-        yield f"fed rightly: {first.share:.4f} and {second.share:.4f}; both {joint.both.share:.4f}"
+        rates = " and ".join(f"{rate.share:.4f}" for rate in joint.rates)
+        yield f"fed rightly: {rates}; both {joint.both.share:.4f}"
         low, high = joint.error_interval
         yield f"multiplying gives {joint.product:.4f}, off by {joint.error:+.4f} ({low:+.4f} to {high:+.4f})"
-        low, high = joint.serial
-        yield f"one part after the other, or two arms: the product, {low:.4f} to {high:.4f}"
+        yield f"one part after the other, or two arms: the product, {spans([joint.serial], 4)}"
     for name, rate in assembly.survived.items():
-        low, high = rate.interval
         what = "the cavity standing" if name == "standing" else "the cavity thrown too"
-        yield f"whole after the next throw, {what}: {rate.count} of {rate.of} ({low:.3f} to {high:.3f})"
-    yield f"{assembly.first_series.count} assembled in the first {assembly.first_series.of} trials"
+        yield f"whole after the next throw, {what}: {rate.count} of {rate.of} ({spans([rate.interval])})"
+    yield f"{first.count} assembled in the first {first.of} trials"
 
 
 # ----------------------------------------------------------------
@@ -181,7 +180,7 @@ def tray(
 
 def _text_of_tray(filling: TrayFill) -> Iterator[str | Table]:
     filled, counts, unit = filling.filled, filling.counts, filling.scene.unit
-    sizes, plate = filling.passes.tray, filling.passes.plate
+    sizes, plate, spans = filling.passes.tray, filling.passes.plate, report.pages.intervals
     yield (
         f"{filling.scene.name}: depressions {sizes.depression_width:g} {unit} wide and {sizes.depression_depth:g} "
         f"{unit} deep, side {filling.passes.side} is right; unilateral contact, friction {plate.friction:g}, "
@@ -189,10 +188,8 @@ def _text_of_tray(filling: TrayFill) -> Iterator[str | Table]:
     )
     yield filling.tables()[0]
     for n in sorted({1, 10, len(filled.right) - 1} & set(range(len(filled.right)))):
-        low, high = filled.interval[n].tolist()
-        yield (
-            f"filled rightly after {n} pass{'es' if n > 1 else ''}: {filled.right[n]:.4f} ({low:.4f} to {high:.4f})"
-        )
+        passes = f"{n} pass{'es' if n > 1 else ''}"
+        yield f"filled rightly after {passes}: {filled.right[n]:.4f} ({spans([filled.interval[n]], 4)})"
     rest = filled.unfilled
     yield (
         f"the rest after endless passes: {rest['empty']:.4f} empty, {rest['wrong']:.4f} with a wrong part; "
@@ -200,15 +197,13 @@ def _text_of_tray(filling: TrayFill) -> Iterator[str | Table]:
     )
     for each in filling.histories:
         words = "parts that return" if each.returning else "new parts"
-        low, high = each.interval(each.filled.size - 1)
-        yield (
-            f"{len(each.after_pass)} histories with {words}: {each.filled[-1]:.4f} ({low:.4f} to {high:.4f})"
-        )
+        ends = spans([each.interval(each.filled.size - 1)], 4)
+        yield f"{len(each.after_pass)} histories with {words}: {each.filled[-1]:.4f} ({ends})"
     for at_once in filling.tables()[2:]:
-        yield at_once.caption
-        yield at_once
-    if filling.crowd_chain is not None:
-        right, (low, high) = filling.crowd_chain.right[-1], filling.crowd_chain.interval[-1].tolist()
-        yield f"by the chain, of as many parts one by one: right {right:.4f} ({low:.4f} to {high:.4f})"
+        yield from (at_once.caption, at_once)
+    chain = filling.crowd_chain
+    if chain is not None:
+        ends = spans([chain.interval[-1]], 4)
+        yield f"by the chain, of as many parts one by one: right {chain.right[-1]:.4f} ({ends})"
     if counts.unfinished:
         yield f"{counts.unfinished} parts did not come to rest; they are left out"

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from json import loads
 from pathlib import Path
@@ -38,31 +38,25 @@ LONGEST = 100_000
 LONG = 500
 
 
-def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Print a table; outside a terminal its columns are as wide as their text."""
+def show(listing: Table) -> None:
+    """Print a table, its numbers rounded; outside a terminal its columns are as wide as their text."""
+    heads, rows = listing.heads, listing.shown()
     if len(rows) > LONG:
-        print("\n".join(aligned(heads, [[str(cell) for cell in row] for row in rows])))
+        print("\n".join(aligned(heads, rows)))
         return
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
+    from rich import box, console, markup, table
 
     # rich reads the width from the terminal or COLUMNS; without either, lines are not broken
-    told = sys.stdout.isatty() or bool(os.environ.get("COLUMNS"))
-    grid = Table(box=SIMPLE_HEAD, pad_edge=False)
+    fitted = sys.stdout.isatty() or bool(os.environ.get("COLUMNS"))
+    grid = table.Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    # names are not broken if other columns can be: two names could look alike when cut
+    whole = not any(" " in row[0] for row in rows)
     for number, head in enumerate(heads):
-        # names are not broken if other columns can be: two names could look alike when cut
-        names = number == 0 and not any(" " in str(row[0]) for row in rows)
-        grid.add_column(escape(head), no_wrap=names or not told, overflow="fold")
+        no_wrap = not fitted or (number == 0 and whole)
+        grid.add_column(markup.escape(head), no_wrap=no_wrap, overflow="fold")
     for row in rows:
-        grid.add_row(*(escape(str(cell)) for cell in row))
-    Console(width=None if told else LONGEST).print(grid)
-
-
-def show(listing: Table) -> None:
-    """Print a table of an answer, its numbers rounded."""
-    table(listing.heads, listing.shown())
+        grid.add_row(*map(markup.escape, row))
+    console.Console(width=None if fitted else LONGEST).print(grid)
 
 
 def place_for(scene: SceneOf, folder: Path) -> None:

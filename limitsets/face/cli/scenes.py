@@ -7,6 +7,7 @@ import platform
 import re
 import shutil
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -156,20 +157,15 @@ def doctor(run: Run, *, clear: bool = False) -> Answer:
 
 def _packages() -> list[dict[str, str | None]]:
     """List the required packages, each with its installed version and the extra that requires it."""
-    try:
+    lines: list[str] = []
+    with suppress(PackageNotFoundError):  # a folder on the path, not installed
         lines = requires("limitsets") or []
-    except PackageNotFoundError:  # a folder on the path, not installed
-        return []
     packages: list[dict[str, str | None]] = []
-    for line in lines:
-        match = _REQUIREMENT.match(line)
-        if match is None or match[2] in INNER or match[1] == "limitsets":
-            continue
-        try:
-            there: str | None = version(match[1])
-        except PackageNotFoundError:
-            there = None
-        packages.append({"package": match[1], "version": there, "extra": match[2]})
+    for match in filter(None, map(_REQUIREMENT.match, lines)):
+        if match[2] not in INNER and match[1] != "limitsets":
+            packages.append({"package": match[1], "version": None, "extra": match[2]})
+            with suppress(PackageNotFoundError):
+                packages[-1]["version"] = version(match[1])
     return packages
 
 
