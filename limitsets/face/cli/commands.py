@@ -280,7 +280,8 @@ def command(
             _give(state, answer, None if "out" in own else state.out)
             raise typer.Exit(answer.code)
 
-        declared = [_declared(each, *words[each.name]) for each in (*parameters, *shared)]
+        none = "", ""  # under python -OO there are no docstrings
+        declared = [_declared(each, *words.get(each.name, none)) for each in (*parameters, *shared)]
         vars(run)["__signature__"] = inspect.Signature(declared)
         run.__name__, run.__doc__, run.__annotations__ = function.__name__, about, {}
         COMMANDS[function.__module__].append(run)
