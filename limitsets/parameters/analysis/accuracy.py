@@ -148,13 +148,6 @@ class Accuracy:
         )
 
 
-def require_error(error: float) -> float:
-    """Refuse an error that nobody can ask for."""
-    if not (isinstance(error, int | float) and math.isfinite(error) and error > 0):
-        raise AnswerError("the error", error, "a number > 0, in the scene's unit", "pass error=1e-6")
-    return float(error)
-
-
 # ---------------------------------------------------------------- before
 
 
@@ -268,14 +261,15 @@ def plan_for(scene: Scene, error: float, throws: int = 200_000) -> Plan:
     >>> plan_for(ls.load("paper-designed"), 1e-6).chosen.method
     'end points'
     """
-    asked = require_error(error)
+    if not (isinstance(error, int | float) and math.isfinite(error) and error > 0):
+        raise AnswerError("the error", error, "a number > 0, in the scene's unit", "pass error=1e-6")
     coarse = _trial(scene, COARSE, 1)  # first, and untimed: it may have to compile
     fine = _trial(scene, FINE, throws)
-    ways = [_by_cells(scene, coarse, fine, asked), _by_end_points(fine)]
-    good = sorted((way for way in ways if way.error <= asked), key=lambda way: way.seconds)
+    ways = [_by_cells(scene, coarse, fine, error), _by_end_points(fine)]
+    good = sorted((way for way in ways if way.error <= error), key=lambda way: way.seconds)
     ranked = good + sorted((way for way in ways if way not in good), key=lambda way: way.error)
     other = ranked[1] if math.isfinite(ranked[1].error) else None
-    return Plan(asked, scene.unit, ranked[0], other, bool(good))
+    return Plan(float(error), scene.unit, ranked[0], other, bool(good))
 
 
 def best_extents(attractors: Sequence[Attractor], limits: Sequence[LimitSet]) -> tuple[Extents, ...]:

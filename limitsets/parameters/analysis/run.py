@@ -26,7 +26,6 @@ from limitsets.parameters.analysis.accuracy import (
     left_to_cells,
     limit_of,
     plan_for,
-    require_error,
     verified,
 )
 from limitsets.parameters.analysis.checks import (
@@ -386,16 +385,15 @@ def analyse(
         raise AnswerError("the longest period", cycles, "an integer from 0", "pass cycles=0 for none")
     if cells is not None and error is not None:
         raise AnswerError("the cells", cells, "none beside an error", "give cells or error, not both")
-    asked_error = None if error is None else require_error(error)
-    steps = _Steps(10 + (cycles > 0) + 2 * (asked_error is not None), progress)
+    steps = _Steps(10 + (cycles > 0) + 2 * (error is not None), progress)
     with steps.step("scene"):
         read, tipping = load_to_analyse(scene)
         choice = replace(choose_effects(read), tipping=tipping)
         chosen = choice.scene
     plan = None
-    if asked_error is not None:
+    if error is not None:
         with steps.step("plan"):
-            plan = plan_for(chosen, asked_error, throws)
+            plan = plan_for(chosen, error, throws)
         if announce is not None:
             announce(plan)
     count = plan.chosen.cells if plan is not None else CELLS if cells is None else cells
