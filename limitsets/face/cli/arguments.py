@@ -196,10 +196,10 @@ def certified(
 
     An answer of one claim is denied by the reason for that one.  Without a file nothing is written.
     """
-    from limitsets.proofs.prover.certificate import DeniedError
-
     if file is None:
         return answer, None
+    from limitsets.proofs.prover.certificate import DeniedError
+
     written = {"file": None, "denied": False, "recheck": None}
     if not proved:
         return answer, written

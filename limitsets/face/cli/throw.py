@@ -253,7 +253,6 @@ def animate(
         raise LimitsetsError(
             "the cavity", "standing", "with --assemble", "name the other part", key="--standing"
         )
-    from limitsets.cell.feeding.falling import arm_end_of
     from limitsets.face.animation import require_file
 
     chosen = ls.load(scene)
@@ -265,6 +264,8 @@ def animate(
         raise LimitsetsError("the start", start, allowed, "leave it out")
     shown: Any = chosen  # or the answer that is to be shown, as far as a film needs it
     if feed:
+        from limitsets.cell.feeding.falling import arm_end_of
+
         shown = arm_end_of(chosen)
     elif feedback:
         shown = ls.feedback(chosen, progress=run.tell)
