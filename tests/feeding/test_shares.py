@@ -13,7 +13,7 @@ from limitsets.base.files import as_json
 from limitsets.cell.feeding import Feeding
 from limitsets.cell.feeding.falling import FATES, arm_end_of
 from limitsets.cell.feeding.trials import FedShares, Trials, run_trials, success_curve
-from limitsets.face.cli.feed import _text
+from limitsets.face.cli.cell import _words_of_feeding
 from limitsets.feeder.scattering import Gaussian, Scattering, Uniform
 from limitsets.parameters.noise.sampling import ManyParts, binomial_interval
 from tests.feeding.own_throws import shares
@@ -158,7 +158,7 @@ def test_where_no_part_comes_beyond_the_end_nothing_is_fed():
     assert found.shares.shares["never"] == 1.0
     assert np.isnan(found.shares.mean_throws)
     assert found.shares.quantile(0.95) is None
-    lines = [part for part in _text(found) if isinstance(part, str)]
+    lines = [part for part in _words_of_feeding(found) if isinstance(part, str)]
     assert any("no part comes beyond the end of the arm" in line for line in lines)
 
 

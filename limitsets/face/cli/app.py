@@ -19,18 +19,7 @@ import typer
 
 from limitsets.base.errors import LimitsetsError
 from limitsets.base.progress import InterruptedRun
-from limitsets.face.cli import (
-    analyse,
-    assemble,
-    atlas,
-    certify,
-    design,
-    feed,
-    feedback,
-    margin,
-    scenes,
-    throw,
-)
+from limitsets.face.cli import analyse, cell, certify, design, feedback, margin, scenes, throw
 from limitsets.face.cli.commands import COMMANDS
 
 app = typer.Typer(
@@ -60,7 +49,7 @@ def limitsets(
     """
 
 
-for file in (scenes, analyse, throw, certify, margin, design, atlas, feed, feedback, assemble):
+for file in (scenes, analyse, throw, certify, margin, design, cell, feedback):
     for command in COMMANDS[file.__name__]:
         # click would cut the summary where a line ends
         app.command(short_help=(command.__doc__ or "").partition("\n")[0])(command)
