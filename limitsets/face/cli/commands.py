@@ -31,7 +31,7 @@ from limitsets.face.cli.output import place_for, progress, saved, show, stem_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from limitsets.base.campaign import Progress
+    from limitsets.base.progress import Progress
     from limitsets.feeder.scene import Scene as SceneOf
     from limitsets.feeder.scene.left_out import Model
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.base.files import as_json, replaced
+from limitsets.base.progress import Progress
 from limitsets.face import plot
 from limitsets.face.plot.style import stretch
 from limitsets.face.report.pages import as_html, as_uri, page, percent, words
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from limitsets.parameters.analysis import Analysis
     from limitsets.proofs.auditing import Audit, Finding
 
-
-Progress = Callable[[str, int, int], None]
 
 DPI = 150
 FIGURES = ("part", "limit-set", "map", "basins", "morse", "flight")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled, bands_of, facts
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scene import Scene, load_to_analyse
@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 
 
 Extents = dict[int, list[tuple[float, float]]]
-Progress = Callable[[str, int, int], None]
 
 # Spurious sets that are written to JSON: the largest.
 SPURIOUS_WRITTEN = 20
