@@ -162,27 +162,28 @@ class _Trial:
     limits: Sequence[LimitSet]
 
 
-def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
-
-    stops = [time.perf_counter()]
+def _timed_graph(scene: Scene, cells: int) -> tuple[TransitionGraph, float]:
+    """Give the graph of so many cells a side, its attracting components found, and the seconds that this takes."""
+    begin = time.perf_counter()
     graph = transitions(scene.map, grid(scene.domain, cells=cells))
     _ = graph.condensation().attracting
-    stops.append(time.perf_counter())
+    return graph, time.perf_counter() - begin
+
+
+def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
+    graph, seconds = _timed_graph(scene, cells)
+    stops = [time.perf_counter()]
     sets = attractors(graph, throws)
     stops.append(time.perf_counter())
     limits = [limit_of(graph, each) for each in sets]
     stops.append(time.perf_counter())
-    graph_took, orbits, ends = np.diff(stops).tolist()
-    return _Trial(graph_took, orbits, ends, sets, limits)
+    orbits, ends = np.diff(stops).tolist()
+    return _Trial(seconds, orbits, ends, sets, limits)
 
 
 def _seconds_of_graph(scene: Scene, cells: int) -> float:
     """Time of a graph of so many cells a side, from that of one that takes a few hundredths of a second."""
-    best = math.inf
-    for _ in range(TIMES):
-        begin = time.perf_counter()
-        _ = transitions(scene.map, grid(scene.domain, cells=MANY)).condensation().attracting
-        best = min(best, time.perf_counter() - begin)
+    best = min(_timed_graph(scene, MANY)[1] for _ in range(TIMES))
     return float(best * (cells / MANY) ** EXPONENT_OF_SECONDS)
 
 
