@@ -185,17 +185,15 @@ def _attraction(proof: Proof, claim: Claim) -> list[str]:
     }
     growth = _down(bound["near_joint"], 6)
     starts = ", ".join(f"{_up(x, 6)} {unit} on side {side}" for side, x in bound["beyond"].items())
-    first = "From every position on the arm and every side, a part comes into the attracting cells and stays there:"
-    near = f"Nearer to the joint it takes more throws: each moves the part out, x - a by a factor of {growth} at least."
+    where, edge, foot = "and every side", "the joint", "a"
     if points is not None:
-        first = "From every position on the arm beyond R*, a part comes into the attracting cells and stays there:"
-        near = f"Nearer to R* it takes more throws: each moves the part out, x - R* by a factor of {growth} at least."
+        where, edge, foot = "beyond R*", "R*", "R*"
     return [
         *(_two_basins(proof, points) if points is not None else ()),
-        first,
+        f"From every position on the arm {where}, a part comes into the attracting cells and stays there:",
         *(f"side {side}: x = {parts} {unit}" for side, parts in extents.items()),
         f"It takes {bound['throws']} throws at most from x = {starts}, or beyond.",
-        near,
+        f"Nearer to {edge} it takes more throws: each moves the part out, x - {foot} by a factor of {growth} at least.",
     ]
 
 
