@@ -16,7 +16,6 @@ from limitsets.face.cli.commands import Answer, Run, Scene, command, limits
 
 if TYPE_CHECKING:
     from limitsets.parameters.analysis import Analysis, Plan
-    from limitsets.proofs.auditing import Audit
 
 
 MOST_CELLS = 10_000_000
@@ -49,7 +48,11 @@ def analyse(
     from limitsets.feeder.scene.checking import doubts
 
     run.opened(scene, "analysis", lambda source: load_to_analyse(source)[0])
-    analysis = ls.analyse(scene, cells, error=error, progress=run.tell, announce=_announce)
+
+    def announce(plan: Plan) -> None:
+        print(f"limitsets: {plan}", file=sys.stderr, flush=True)
+
+    analysis = ls.analyse(scene, cells, error=error, progress=run.tell, announce=announce)
     run.files = report.writing.write(analysis, run.folder, form=run.form, html=run.html, progress=run.tell)
     notes = [note for note in (analysis.choice.notice, *map(str, doubts(analysis.scene))) if note]
 
@@ -59,10 +62,6 @@ def analyse(
         yield from _lines(analysis)
 
     return Answer(analysis, words, analysis.table, notes=notes if run.json else ())
-
-
-def _announce(plan: Plan) -> None:
-    print(f"limitsets: {plan}", file=sys.stderr, flush=True)
 
 
 def _lines(analysis: Analysis) -> Iterator[str]:
@@ -142,12 +141,12 @@ def audit(run: Run, scene: Scene) -> Answer:
     if run.out is not None:
         run.tell("files", 1, 2)
         run.files = report.writing.write_audit(findings, run.out, run.form)
-    return Answer(findings, lambda: _words_of_audit(findings), findings.table)
-
-
-def _words_of_audit(findings: Audit) -> list[str | Table]:
     writing = report.writing
-    return [Table(writing.HEADS, writing.lines_of(findings)), *writing.summary(findings)]
+    return Answer(
+        findings,
+        lambda: [Table(writing.HEADS, writing.lines_of(findings)), *writing.summary(findings)],
+        findings.table,
+    )
 
 
 # ----------------------------------------------------------------
