@@ -13,7 +13,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.base.errors import SceneError
-from limitsets.face.cli.output import table
+from limitsets.face.cli.output import show
 from limitsets.face.report.robust_pages import robustness_page
 from tests.cli.command import run
 from tests.plates import LEAD_QUAD, left_by_some
@@ -36,7 +36,7 @@ def test_an_audit_is_as_wide_as_the_terminal_says(capfd, monkeypatch):
 
 def test_where_nothing_says_how_wide_no_cell_is_broken(capfd, monkeypatch):
     monkeypatch.delenv("COLUMNS", raising=False)
-    table(["head", "other"], [["a b " * 200, "c"]])
+    show(ls.tables.Table(("head", "other"), [("a b " * 200, "c")]))
     out = capfd.readouterr().out
     assert ("a b " * 200).strip() in out
     assert max(map(len, out.splitlines())) < 900  # as long as they are, no longer

@@ -276,7 +276,7 @@ def test_a_fault_while_drawing_leaves_the_old_files_whole(tmp_path, monkeypatch,
     def fails(*_, **__):
         raise fault
 
-    monkeypatch.setattr("limitsets.face.report.writing.basins", fails)
+    monkeypatch.setattr("limitsets.face.plot.basins", fails)
     with pytest.raises(fault):
         write(analysed("paper-designed"), tmp_path)
     assert bytes_of(tmp_path) == before

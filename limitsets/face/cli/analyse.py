@@ -4,31 +4,18 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-import typer
-
+import limitsets as ls
+from limitsets.base.tables import Table
+from limitsets.face import report
 from limitsets.face.cli.arguments import number
-from limitsets.face.cli.output import (
-    Csv,
-    Form,
-    Format,
-    Html,
-    Json,
-    Scene,
-    answer,
-    opened,
-    option,
-    progress,
-    show,
-    table,
-)
+from limitsets.face.cli.commands import Answer, Run, Scene, command, limits
 
 if TYPE_CHECKING:
     from limitsets.parameters.analysis import Analysis, Plan
-    from limitsets.parameters.fitting import Enough, Fit
-    from limitsets.proofs.auditing import Audit
 
 
 MOST_CELLS = 10_000_000
@@ -37,156 +24,129 @@ MOST_CELLS = 10_000_000
 MOST = 0.99
 
 
+@command(form=True, html=True)
 def analyse(
+    run: Run,
     scene: Scene,
-    cells: Annotated[
-        int | None, option("--cells", "N", "Cells per side, 4096 by default.", min=1, max=MOST_CELLS)
-    ] = None,
-    error: Annotated[
-        float | None,
-        option(
-            "--error",
-            "X",
-            "Instead of cells: largest error of the limit sets' ends, in the scene's unit of length. "
-            "What is picked for it, and what it will cost, is told before it starts.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None, option("--out -o", "DIR", "Folder of the report, ./NAME-analysis by default.")
-    ] = None,
-    html: Html = False,
-    form: Format = Form.PNG,
-    csv: Csv = None,
-    json: Json = False,
-) -> None:
-    """Find limit sets, basins and critical points, and write report.md, analysis.json and figures."""
-    with progress() as tell:
-        from limitsets.feeder.scene import load_to_analyse
-        from limitsets.feeder.scene.checking import doubts
+    *,
+    cells: Annotated[int | None, limits(min=1, max=10_000_000)] = None,
+    error: float | None = None,
+) -> Answer:
+    """Find limit sets, basins and critical points, and write report.md, analysis.json and figures.
 
-        _, folder = opened(scene, out, "analysis", lambda source: load_to_analyse(source)[0])
-        from limitsets.face.report.writing import write
-        from limitsets.parameters.analysis import analyse as run
-
-        analysis = run(scene, cells, error=error, progress=tell, announce=_announce)
-        files = write(analysis, folder, form=form, html=html, progress=tell)
-    if json:
-        for note in (analysis.choice.notice, *map(str, doubts(analysis.scene))):
-            if note:
-                print(f"limitsets: {note}", file=sys.stderr, flush=True)
-    answer(analysis, json, lambda: _text(analysis, files[0]), csv=(csv, analysis.table))
-
-
-def _announce(plan: Plan) -> None:
-    print(f"limitsets: {plan}", file=sys.stderr, flush=True)
-
-
-def _text(analysis: Analysis, page: Path) -> None:
-    from limitsets.face.report.pages import after_undecided, next_command, percent, verdict_of, void_of
+    Parameters
+    ----------
+    cells : N
+        Cells per side, 4096 by default.
+    error : X
+        Instead of cells: largest error of the limit sets' ends, in the scene's unit of length. What is picked
+        for it, and what it will cost, is told before it starts.
+    out : DIR
+        Folder of the report, ./NAME-analysis by default.
+    """
+    from limitsets.feeder.scene import load_to_analyse
     from limitsets.feeder.scene.checking import doubts
+
+    run.opened(scene, "analysis", lambda source: load_to_analyse(source)[0])
+
+    def announce(plan: Plan) -> None:
+        print(f"limitsets: {plan}", file=sys.stderr, flush=True)
+
+    analysis = ls.analyse(scene, cells, error=error, progress=run.tell, announce=announce)
+    run.files = report.writing.write(analysis, run.folder, form=run.form, html=run.html, progress=run.tell)
+    notes = [note for note in (analysis.choice.notice, *map(str, doubts(analysis.scene))) if note]
+
+    def words() -> Iterator[str | Table]:
+        yield from notes
+        yield from _limit_sets(analysis)
+        yield from _lines(analysis)
+
+    return Answer(analysis, words, analysis.table, notes=notes if run.json else ())
+
+
+def _lines(analysis: Analysis) -> Iterator[str]:
+    """Say what leaves, what is not settled, and what becomes of the goal and of the error asked for."""
     from limitsets.parameters.analysis import in_limit_sets
 
-    unit = analysis.scene.unit
-    if analysis.choice.notice:
-        typer.echo(analysis.choice.notice)
-    for doubt in doubts(analysis.scene):
-        typer.echo(str(doubt))
-    _print_limit_sets(analysis)
-    exits = ", ".join(f"{name} {percent(share)}" for name, share in analysis.basins.exits.items() if share)
+    pages, unit, accuracy = report.pages, analysis.scene.unit, analysis.accuracy
+    exits = ", ".join(
+        f"{name} {pages.percent(share)}" for name, share in analysis.basins.exits.items() if share
+    )
     if exits:
-        typer.echo(f"of all starts leave: {exits}")
+        yield f"of all starts leave: {exits}"
     broken = ", ".join(str(side) for side in in_limit_sets(analysis.other_vertex_first, analysis.extents))
     if broken:
-        typer.echo(
+        yield (
             f"careful: of some throws of the limit set from side {broken} another vertex lands first, and the model "
             "does not describe them; limitsets audit says what else is broken"
         )
-    for text in analysis.advice:
-        typer.echo(f"not settled: {text}")
-    undecided, finer = analysis.basins.undecided_between, after_undecided(analysis)
+    yield from (f"not settled: {text}" for text in analysis.advice)
+    finer = pages.after_undecided(analysis)
     if finer and analysis.attractors:
-        typer.echo(f"undecided: {percent(undecided)} of all starts; next: {finer}")
+        yield f"undecided: {pages.percent(analysis.basins.undecided_between)} of all starts; next: {finer}"
     if analysis.goal is not None:
-        void = void_of(analysis.goal, unit, analysis.scene.effects.spread)
-        said = verdict_of(analysis.goal, sum(analysis.basins.attractors))
-        typer.echo(
-            f"goal {analysis.goal.goal.kind}: {said} ({analysis.goal.how}, not proved)"
-            + (f"; but {void}" if void else "")
-        )
+        void = pages.void_of(analysis.goal, unit, analysis.scene.effects.spread)
+        verdict = pages.verdict_of(analysis.goal, sum(analysis.basins.attractors))
+        but = f"; but {void}" if void else ""
+        yield f"goal {analysis.goal.goal.kind}: {verdict} ({analysis.goal.how}, not proved){but}"
         threshold = analysis.goal.threshold
         if analysis.goal.holds is False and threshold is not None and math.isfinite(threshold):
-            typer.echo(analysis.goal.goal.explained(threshold, unit))
-        typer.echo(f"next: {next_command(analysis)}")
-    accuracy = analysis.accuracy
+            yield analysis.goal.goal.explained(threshold, unit)
+        yield f"next: {pages.next_command(analysis)}"
     if accuracy is not None and accuracy.reached is not None:
-        typer.echo(f"error of the ends: {accuracy.reached:.2g} {unit} ({accuracy.how})")
+        yield f"error of the ends: {accuracy.reached:.2g} {unit} ({accuracy.how})"
     if accuracy is not None and not accuracy.met:
-        typer.echo(f"the error of {accuracy.plan.error_wanted:g} {unit} was not met: {accuracy.advice}")
-    typer.echo(f"report: {page}")
+        yield f"the error of {accuracy.plan.error_wanted:g} {unit} was not met: {accuracy.advice}"
 
 
-def _print_limit_sets(analysis: Analysis) -> None:
-    """Print the table of each limit set, or where the starts go if there is none."""
-    from limitsets.face.report.pages import count, intervals, percent
-
-    unit = analysis.scene.unit
+def _limit_sets(analysis: Analysis) -> Iterator[str | Table]:
+    """Show each limit set as a table, or say where the starts go if there is none."""
+    pages, unit = report.pages, analysis.scene.unit
     if not analysis.attractors:
         undecided = analysis.basins.undecided_between
-        left = f"no limit set was found, and {percent(undecided)} of all starts are undecided"
-        typer.echo(left if undecided else "no start was found to stay on the arm")
+        left = f"no limit set was found, and {pages.percent(undecided)} of all starts are undecided"
+        yield left if undecided else "no start was found to stay on the arm"
         if analysis.basins.exits.get("outside-model", 0.0) > MOST:
-            kappa = f"{analysis.scene.kappa:.6g} {unit}"
-            typer.echo(
+            yield (
                 "outside the model: a throw after which the part has not landed within a full turn. "
-                f"Almost all starts are; kappa is {kappa}: has the speed the right unit?"
+                f"Almost all starts are; kappa is {analysis.scene.kappa:.6g} {unit}: has the speed the right unit?"
             )
     for k, (attractor, extents) in enumerate(zip(analysis.attractors, analysis.extents, strict=True)):
         whose = "" if analysis.scene.effects.spread is None else ", of throws without scatter"
-        typer.echo(f"limit set {k}{whose}: from {percent(analysis.basins.attractors[k])} of all starts")
+        yield f"limit set {k}{whose}: from {pages.percent(analysis.basins.attractors[k])} of all starts"
+        jogs = attractor.jogs_per_visit
         rows = [
-            [side, intervals(parts), count(*attractor.jogs_per_visit.get(side, (0, 0)))]
+            (side, pages.intervals(parts), pages.count(*jogs.get(side, (0, 0))))
             for side, parts in extents.items()
         ]
-        table(["side", f"x [{unit}]", "jogs per visit"], rows)
+        yield Table(("side", f"x [{unit}]", "jogs per visit"), rows)
 
 
 # ----------------------------------------------------------------
 # `limitsets audit`: what the model leaves out, and where the scene calls for it.
 
 
-def audit(
-    scene: Scene,
-    out: Annotated[
-        Path | None, option("--out -o", "DIR", "Write audit.md, audit.json and figures there.")
-    ] = None,
-    form: Format = Form.PNG,
-    csv: Csv = None,
-    json: Json = False,
-) -> None:
-    """Ask which assumptions of the model a scene breaks: on its limit set, and on the whole arm."""
-    with progress() as tell:
-        chosen, _ = opened(scene, out)
-        tell("assumptions", 0, 1 + (out is not None))
-        from limitsets.proofs.auditing import audit as run
+@command(form=True)
+def audit(run: Run, scene: Scene) -> Answer:
+    """Ask which assumptions of the model a scene breaks: on its limit set, and on the whole arm.
 
-        findings = run(chosen)
-        files = []
-        if out is not None:
-            from limitsets.face.report.writing import write_audit
-
-            tell("files", 1, 2)
-            files = write_audit(findings, out, form)
-    answer(findings, json, lambda: _text_of_audit(findings, files), csv=(csv, findings.table))
-
-
-def _text_of_audit(findings: Audit, files: list[Path]) -> None:
-    from limitsets.face.report.writing import HEADS, lines_of, summary
-
-    table(HEADS, lines_of(findings))
-    for line in summary(findings):
-        typer.echo(line)
-    if files:
-        typer.echo(f"report: {files[0]}")
+    Parameters
+    ----------
+    out : DIR
+        Write audit.md, audit.json and figures there.
+    """
+    chosen = run.opened(scene)
+    run.tell("assumptions", 0, 1 + (run.out is not None))
+    findings = ls.audit(chosen)
+    if run.out is not None:
+        run.tell("files", 1, 2)
+        run.files = report.writing.write_audit(findings, run.out, run.form)
+    writing = report.writing
+    return Answer(
+        findings,
+        lambda: [Table(writing.HEADS, writing.lines_of(findings)), *writing.summary(findings)],
+        findings.table,
+    )
 
 
 # ----------------------------------------------------------------
@@ -194,61 +154,37 @@ def _text_of_audit(findings: Audit, files: list[Path]) -> None:
 # found.
 
 
-HELP_FILE = (
-    "Throws: x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run; corner_before [mm], "
-    "corner_after [mm] for x where the film shows the left corner."
-)
-HELP_ERROR = "Standard deviation of a measured place: '0.5 mm', or a number in the scene's unit."
-HELP_OUT = "Write fitted.toml, fit.json and figures."
-HELP_NO_MARGIN = "Do not ask whether the goal's margin is large enough (proofs: a minute)."
-
-
-def fit(
-    scene: Scene,
-    file: Annotated[Path, typer.Argument(metavar="FILE.csv", help=HELP_FILE)],
-    error: Annotated[str | None, option("--error", "E", HELP_ERROR)] = None,
-    out: Annotated[Path | None, option("--out -o", "DIR", HELP_OUT)] = None,
-    form: Format = Form.PNG,
-    csv: Csv = None,
-    json: Json = False,
-    no_margin: Annotated[bool, typer.Option("--no-margin", help=HELP_NO_MARGIN)] = False,
-) -> None:
+@command(form=True)
+def fit(run: Run, scene: Scene, file: Path, *, error: str | None = None, no_margin: bool = False) -> Answer:
     """Fit speed, centre of mass, surface height and radius of gyration to filmed throws.
 
     Exit 1 where the goal is not proved for every machine that the film leaves possible, with its scatter.
+
+    Parameters
+    ----------
+    file : FILE.csv
+        Throws: x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run;
+        corner_before [mm], corner_after [mm] for x where the film shows the left corner.
+    error : E
+        Standard deviation of a measured place: '0.5 mm', or a number in the scene's unit.
+    no_margin
+        Do not ask whether the goal's margin is large enough (proofs: a minute).
+    out : DIR
+        Write fitted.toml, fit.json and figures.
     """
-    with progress() as tell:
-        chosen, _ = opened(scene, out)
-        from limitsets.parameters.fitting import enough
-        from limitsets.parameters.fitting import fit as run
+    from limitsets.parameters.fitting import enough
 
-        estimates = run(chosen, file, error=None if error is None else number(error), progress=tell)
-        judged = None if no_margin or chosen.goal is None else enough(estimates, progress=tell)
-        record = estimates.to_json() | {"enough": None if judged is None else judged.to_json()}
-        files = _write(estimates, record, out, form) if out is not None else []
-    answer(record, json, lambda: _text_of_fit(estimates, judged, files), csv=(csv, estimates.table))
-    raise typer.Exit(0 if judged is None or judged.verdict == "enough" else 1)
+    chosen = run.opened(scene)
+    estimates = ls.fit(chosen, file, error=None if error is None else number(error), progress=run.tell)
+    judged = None if no_margin or chosen.goal is None else enough(estimates, progress=run.tell)
+    record = estimates.to_json() | {"enough": None if judged is None else judged.to_json()}
+    if run.out is not None:
+        drawn = [("part", ls.plot.part(estimates.scene)), ("residuals", ls.plot.fit_residuals(estimates))]
+        run.write(drawn, {"fitted.toml": ls.dump(estimates.scene), "fit.json": record})
 
+    def words() -> list[str | Table]:
+        sentences = () if judged is None else judged.sentences
+        return [estimates.table(), *report.pages.lines_of(estimates), *sentences]
 
-def _write(estimates: Fit, record: dict[str, Any], out: Path, form: str) -> list[Path]:
-    from limitsets.base.files import as_json
-    from limitsets.face.plot.noise import fit_residuals
-    from limitsets.face.plot.parts import part
-    from limitsets.face.report.writing import laid
-    from limitsets.feeder.scene import dump
-
-    texts = {"fitted.toml": dump(estimates.scene), "fit.json": as_json(record)}
-    drawn = [("part", part(estimates.scene)), ("residuals", fit_residuals(estimates))]
-    return laid(out, drawn, lambda _: texts, form)
-
-
-def _text_of_fit(estimates: Fit, judged: Enough | None, files: list[Path]) -> None:
-    from limitsets.face.report.pages import lines_of
-
-    show(estimates.table())
-    for line in lines_of(estimates):
-        typer.echo(line)
-    for line in judged.sentences if judged is not None else ():
-        typer.echo(line)
-    if files:
-        typer.echo(f"written to {files[0].parent}: {', '.join(path.name for path in files)}")
+    settled = judged is None or judged.verdict == "enough"
+    return Answer(record, words, estimates.table, code=0 if settled else 1)

@@ -19,17 +19,8 @@ import typer
 
 from limitsets.base.errors import LimitsetsError
 from limitsets.base.progress import InterruptedRun
-from limitsets.face.cli.analyse import analyse, audit, fit
-from limitsets.face.cli.animate import animate
-from limitsets.face.cli.assemble import assemble, tray
-from limitsets.face.cli.atlas import atlas
-from limitsets.face.cli.certify import certify, recheck
-from limitsets.face.cli.design import design
-from limitsets.face.cli.feed import feed
-from limitsets.face.cli.feedback import feedback
-from limitsets.face.cli.margin import margin, robustness
-from limitsets.face.cli.scenes import check, doctor, explore, new, scenes
-from limitsets.face.cli.throw import plot, throw
+from limitsets.face.cli import analyse, cell, certify, design, feedback, margin, scenes, throw
+from limitsets.face.cli.commands import COMMANDS
 
 app = typer.Typer(
     pretty_exceptions_enable=False,
@@ -58,31 +49,10 @@ def limitsets(
     """
 
 
-for command in (
-    scenes,
-    analyse,
-    throw,
-    plot,
-    animate,
-    certify,
-    recheck,
-    audit,
-    margin,
-    robustness,
-    design,
-    atlas,
-    feed,
-    feedback,
-    assemble,
-    fit,
-    tray,
-    new,
-    check,
-    doctor,
-    explore,
-):
-    # click would cut the summary where a line ends
-    app.command(short_help=(command.__doc__ or "").partition("\n")[0])(command)
+for file in (scenes, analyse, throw, certify, margin, design, cell, feedback):
+    for command in COMMANDS[file.__name__]:
+        # click would cut the summary where a line ends
+        app.command(short_help=(command.__doc__ or "").partition("\n")[0])(command)
 
 
 # ----------------------------------------------------------------

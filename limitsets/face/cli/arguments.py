@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 import time
 from contextlib import suppress
+from dataclasses import replace
 from json import loads
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile, ZipFile
 
 from limitsets.base.errors import LimitsetsError
@@ -15,20 +16,12 @@ from limitsets.base.proposals import proposed
 from limitsets.face.cli.output import refuse_other, saved, say_other, stem_of
 
 if TYPE_CHECKING:
+    from limitsets.feeder.goals import Goal
+    from limitsets.feeder.scattering import Scattering
     from limitsets.feeder.scene import Scene
 
 
-HELP_NO_RECHECK = "Write certificates without checking them first."
-
-HELP_LAID = (
-    "Where parts are laid down, like 0=8:20 or 0='8 in:20 in'; repeatable. The goal's starts are these; "
-    "default: the whole arm."
-)
-
 _BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
-
-_Ends: TypeAlias = tuple[float | str | None, float | str | None]
-"""Lowest and highest: a number in the scene's unit, text with a unit, or None for no bound."""
 
 
 def number(word: str) -> float | str:
@@ -61,24 +54,41 @@ def position(scene: Scene, text: str) -> float:
     LimitsetsError
         No number, a unit of something else, or a place before the joint or beyond the arm's end.
     """
-    value = place(scene, text)
-    if not 0.0 <= value <= scene.arm_length:
-        allowed = f"a place on the arm, from 0 to {scene.arm_length:g} {scene.unit}"
+    x = place(scene, text)
+    if not 0.0 <= x <= scene.arm_length:
+        allowed = f"a place on the arm, from 0 to {scene.arm_length:.9g} {scene.unit}"
         raise LimitsetsError("x", text, allowed, "start where a part can rest", key="--x")
-    return value
+    return x
+
+
+def named(
+    words: list[str] | None, option: str, thing: str, form: str, remedy: str, *, once: bool = True
+) -> list[tuple[str, str]]:
+    """Read the words of a repeatable option, of a form like NAME=TEXT or SIDE=LO:HI; the remedy is for a wrong form."""
+    pairs: list[tuple[str, str]] = []
+    for word in words or []:
+        name, sign, text = (part.strip() for part in word.partition("="))
+        again = once and name in dict(pairs)
+        no_side = form.startswith("SIDE") and not (name.isascii() and name.isdigit())
+        if not sign or again or no_side or text.count(":") < form.count(":"):
+            remedy = f"name each {form.partition('=')[0].lower()} once" if again else remedy
+            raise LimitsetsError(thing, word, form, remedy, key=option)
+        pairs.append((name, text))
+    return pairs
 
 
 def deviations(option: str, words: list[str] | None) -> dict[str, str]:
     """Read the words of a repeatable option, QUANTITY=DEVIATION each."""
-    texts: dict[str, str] = {}
-    for word in words or []:
-        name, sign, text = word.partition("=")
-        name = name.strip()
-        if not sign or name in texts:
-            remedy = "name each quantity once" if sign else "put a sign of equality between them"
-            raise LimitsetsError(option.lstrip("-"), word, "QUANTITY=DEVIATION", remedy, key=option)
-        texts[name] = text.strip()
-    return texts
+    remedy = "put a sign of equality between them"
+    return dict(named(words, option, option.lstrip("-"), form="QUANTITY=DEVIATION", remedy=remedy))
+
+
+def scattering_of(scene: Scene, words: list[str] | None, law: str) -> Scattering | None:
+    """Read --scatter and --law; None where nothing scatters by the command."""
+    from limitsets.parameters.sheet.summary import scattering_from
+
+    random = deviations("--scatter", words)
+    return scattering_from(scene, random, law) if random else None
 
 
 def laid_ranges(words: list[str] | None) -> dict[int, list[tuple[float | str, float | str]]] | None:
@@ -87,55 +97,59 @@ def laid_ranges(words: list[str] | None) -> dict[int, list[tuple[float | str, fl
     A unit behind one end holds for both.
     """
     ranges: dict[int, list[tuple[float | str, float | str]]] = {}
-    for word in words or []:
-        side, sign, text = word.partition("=")
-        ends = [number(end.strip("'\" ")) for end in text.split(":")]
+    thing, remedy = (
+        "where parts are laid down",
+        "name a side, the sign =, and two places with : between them, like 0=8:20",
+    )
+    for side, text in named(words, "--laid", thing, form="SIDE=LO:HI", remedy=remedy, once=False):
+        lo, _, hi = text.partition(":")
+        ends = [number(end.strip("'\" ")) for end in (lo, hi)]
         units = [end.lstrip("+-.0123456789eE").strip() for end in ends if isinstance(end, str)]
-        if not sign or not side.strip().isascii() or not side.strip().isdigit() or len(ends) != 2:
-            remedy = "name a side, the sign =, and two places with : between them, like 0=8:20"
-            raise LimitsetsError("where parts are laid down", word, "SIDE=LO:HI", remedy, key="--laid")
         if len(units) == 1:
             ends = [f"{end!r} {units[0]}" if isinstance(end, float) else end for end in ends]
         ranges.setdefault(int(side), []).append((ends[0], ends[1]))
     return ranges or None
 
 
-def _ends_of(words: list[str] | None) -> dict[str, _Ends]:
-    """Read the words of --bounds, QUANTITY=LOWEST:HIGHEST each."""
-    bounds: dict[str, _Ends] = {}
-    for word in words or []:
-        name, sign, text = word.partition("=")
-        lo, colon, hi = text.partition(":")
-        if not (sign and colon) or name.strip() in bounds:
-            remedy = (
-                "name each quantity once"
-                if sign and colon
-                else "put = after the quantity, : between the bounds"
-            )
-            raise LimitsetsError("the bounds", word, "QUANTITY=LOWEST:HIGHEST", remedy, key="--bounds")
-        ends = [number(end.strip("'\" ")) if end.strip("'\" ") else None for end in (lo, hi)]
-        bounds[name.strip()] = (ends[0], ends[1])
-    return bounds
-
-
 def bounds_of(scene: Scene, words: list[str] | None) -> dict[str, tuple[float | None, float | None]]:
     """Read --bounds in the units of a scene; a bare number is in the unit in which the quantity is displayed."""
     from limitsets.feeder.scene.quantities import in_units, unit_read
 
-    def read(name: str, end: float | str | None) -> float | None:
-        if end is None:
-            return None
-        text = end if isinstance(end, str) else f"{end!r} {unit_read(scene.text, scene.unit, name)}".strip()
-        return in_units(scene.unit, name, text, key="--bounds")
-
-    bounds = {name: (read(name, lo), read(name, hi)) for name, (lo, hi) in _ends_of(words).items()}
-    for name, (lo, hi) in bounds.items():
+    bounds: dict[str, tuple[float | None, float | None]] = {}
+    thing, remedy = "the bounds", "put = after the quantity, : between the bounds"
+    for name, text in named(words, "--bounds", thing, form="QUANTITY=LOWEST:HIGHEST", remedy=remedy):
+        ends: list[float | None] = []
+        for end in text.split(":", 1):
+            word = number(end.strip("'\" "))
+            if isinstance(word, float):
+                word = f"{word!r} {unit_read(scene.text, scene.unit, name)}".strip()
+            ends.append(in_units(scene.unit, name, word, key="--bounds") if word else None)
+        lo, hi = ends
         if lo is not None and hi is not None and not lo < hi:
-            word = next(word for word in words or [] if word.split("=")[0].strip() == name)
-            raise LimitsetsError(
-                "the bounds", word, "a lower and a higher one", "turn them round", key="--bounds"
-            )
+            allowed = "a lower and a higher one"
+            raise LimitsetsError(thing, f"{name}={text}", allowed, "turn them round", key="--bounds")
+        bounds[name] = (lo, hi)
     return bounds
+
+
+def goal_at(scene: Scene, text: str) -> Goal:
+    """Ask the scene's goal at the X of --x.
+
+    Raises
+    ------
+    LimitsetsError
+        The goal has no X, or it is not on the arm.
+    """
+    from limitsets.feeder.goals import OrientedBeyond, Reaches
+
+    if not isinstance(scene.goal, OrientedBeyond | Reaches):
+        kind = None if scene.goal is None else scene.goal.kind
+        raise LimitsetsError("the goal", kind, "one that has an x", "leave --x out", key="--x")
+    x = place(scene, text)
+    if not 0 <= x < scene.arm_length:
+        allowed = f"from 0 to below the arm's length, {scene.arm_length:.9g} {scene.unit}"
+        raise LimitsetsError("the position", text, allowed, "correct it", key="--x")
+    return replace(scene.goal, x=x)
 
 
 # ----------------------------------------------------------------
@@ -176,31 +190,40 @@ def with_ending(file: Path) -> Path:
 
 
 def certified(
-    answer: Any, file: Path, claim: str, *, proved: bool, recheck: bool
-) -> tuple[Any, dict[str, Any]]:
-    """Write the certificate; return the answer without claims that the checker denies, and a record of the file."""
+    answer: Any, file: Path | None, claim: str | None = None, *, proved: bool, recheck: bool
+) -> tuple[Any, dict[str, Any] | None]:
+    """Write the certificate; return the answer without claims that the checker denies, and a record of the file.
+
+    An answer of one claim is denied by the reason for that one.  Without a file nothing is written.
+    """
+    if file is None:
+        return answer, None
     from limitsets.proofs.prover.certificate import DeniedError
 
+    written = {"file": None, "denied": False, "recheck": None}
     if not proved:
-        return answer, {"file": None, "denied": False, "recheck": None}
+        return answer, written
     begin, file = time.perf_counter(), with_ending(file)
     with saved(file) as draft:
         try:
             answer.save(draft, recheck=recheck, workers=None)
         except DeniedError as error:
             kept = str(file.with_name(Path(error.file or "").name))
-            return answer.denied(error.claims[claim]), {"file": kept, "denied": True, "recheck": None}
+            answer = answer.denied(error.claims if claim is None else error.claims[claim])
+            return answer, written | {"file": kept, "denied": True}
         say_replaced(file, draft)
-    seconds = time.perf_counter() - begin if recheck else None
-    return answer, {"file": str(file), "denied": False, "recheck": seconds}
+    return answer, written | {"file": str(file), "recheck": time.perf_counter() - begin if recheck else None}
 
 
-def said_of(written: dict[str, Any], missing: str) -> str:
-    """Say in a line what became of the certificate; `missing` is the reason for having none."""
+def said_of(written: dict[str, Any] | None, missing: str, *, partly: bool = False) -> list[str]:
+    """Say in a line what became of the certificate, if one was wanted; `missing` is the reason for having none."""
+    if written is None:
+        return []
     file, seconds = written["file"], written["recheck"]
     if file is None:
-        return f"no certificate is written: {missing}"
+        return [f"no certificate is written: {missing}"]
     if written["denied"]:
-        return f"the checker denies the certificate: it is kept as {file}"
+        return [f"the checker denies the certificate: it is kept as {file}, and what it denies is undecided"]
+    left = ", of what is proved only" if partly else ""
     done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
-    return f"certificate: {file}, {done} (check it: {proposed('recheck', file)})"
+    return [f"certificate: {file}{left}, {done} (check it: {proposed('recheck', file)})"]

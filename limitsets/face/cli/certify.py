@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import math
-import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from limitsets.base.proposals import proposed
+import limitsets as ls
+from limitsets.base.errors import AnswerError
 from limitsets.base.tables import Table
-from limitsets.face.cli.about import About
-from limitsets.face.cli.arguments import (
-    HELP_LAID,
-    HELP_NO_RECHECK,
-    deviations,
-    laid_ranges,
-    own_file,
-    say_replaced,
-    with_ending,
-)
-from limitsets.face.cli.output import Csv, Json, Out, Scene, Words, answer, option, progress, saved, table
+from limitsets.face import report
+from limitsets.face.cli.arguments import certified, deviations, laid_ranges, own_file, said_of, with_ending
+from limitsets.face.cli.commands import Answer, Run, Scene, Words, command
+from limitsets.face.cli.output import saved
 
 if TYPE_CHECKING:
     from limitsets.proofs.prover import Claim, Proof
@@ -36,101 +28,78 @@ REFUTED = {
     "almost-every": "The goal fails for starts of positive total length.",
 }
 
-HELP_CLAIM = (
-    "What to prove: attracts-all, invariant, trapping, end-points, cycles, expanding or goal; repeatable."
-)
-HELP_TOLERANCE = "A quantity that is fixed but unknown, like throw.speed='0.7 %'; repeatable."
-HELP_NOISE = (
-    "What differs at every throw: throw.speed, gravity.tilt, landing.x, like throw.speed='0.3 %'; repeatable."
-)
 
-
+@command()
 def certify(
+    run: Run,
     scene: Scene,
-    claim: Annotated[Words, option("--claim", "C", HELP_CLAIM)] = None,
-    tolerance: Annotated[Words, option("--tolerance", "Q=DEV", HELP_TOLERANCE)] = None,
-    noise: Annotated[Words, option("--noise", "Q=DEV", HELP_NOISE)] = None,
-    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", HELP_LAID)] = None,
-    out: Annotated[
-        Path | None,
-        option("--out -o", "FILE", "The certificate, NAME.proof.zip; ./ and the scene's name by default."),
-    ] = None,
-    csv: Csv = None,
-    json: Json = False,
-    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
-) -> None:
+    *,
+    claim: Words = None,
+    tolerance: Words = None,
+    noise: Words = None,
+    laid: Words = None,
+    no_recheck: bool = False,
+) -> Answer:
     """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies; it is checked first.
 
     Exit 1 where a claim is not proved.
+
+    Parameters
+    ----------
+    claim : C
+        What to prove: attracts-all, invariant, trapping, end-points, cycles, expanding or goal; repeatable.
+    tolerance : Q=DEV
+        A quantity that is fixed but unknown, like throw.speed='0.7 %'; repeatable.
+    noise : Q=DEV
+        What differs at every throw: throw.speed, gravity.tilt, landing.x, like throw.speed='0.3 %';
+        repeatable.
+    out : FILE
+        The certificate, NAME.proof.zip; ./ and the scene's name by default.
     """
     fixed, varying = deviations("--tolerance", tolerance), deviations("--noise", noise)
-    begins = laid_ranges(laid)
-    with progress() as tell:
-        from limitsets.feeder.scene import load
+    begins, chosen = laid_ranges(laid), ls.load(scene)
+    file = own_file(chosen) if run.out is None else with_ending(run.out)
+    with saved(file):  # refuses a place that cannot be written before anything is proved
+        proof = ls.certify(
+            chosen, claim or None, noise=varying, tolerance=fixed, laid=begins, progress=run.tell
+        )
+    some = any(each.written for each in proof.claims)
+    run.tell("recheck", 0, 1)
+    proof, written = certified(proof, file, proved=some and not proof.effects, recheck=not no_recheck)
+    again = {"recheck": written and written["recheck"]}
+    records = [each | {"timings": each["timings"] | again} for each in proof.to_json()]
+    missing = "nothing rechecks maps with effects" if some and proof.effects else "nothing is proved"
 
-        chosen = load(scene)
-        file = own_file(chosen) if out is None else with_ending(out)
-        from limitsets.proofs.prover import certify as run
-        from limitsets.proofs.prover.certificate import DeniedError
+    def words() -> Iterator[str | Table]:
+        yield from _text(proof)
+        yield from said_of(written, missing, partly=not proof.proved)
+        if not proof.proved:
+            yield f"next: {report.pages.after_unproved(proof)}"
 
-        with saved(file) as draft:
-            proof = run(chosen, claim or None, noise=varying, tolerance=fixed, laid=begins, progress=tell)
-            written = any(each.written for each in proof.claims) and not proof.effects
-            begin = time.perf_counter()
-            kept = ""
-            if written:
-                tell("recheck", 0, 1)
-                try:
-                    proof.save(draft, recheck=not no_recheck, workers=None)
-                except DeniedError as error:
-                    proof, kept = proof.denied(error.claims), str(file.with_name(Path(error.file or "").name))
-            say_replaced(file, draft)
-            seconds = None if no_recheck or not written else time.perf_counter() - begin
-    records = [each | {"timings": each["timings"] | {"recheck": seconds}} for each in proof.to_json()]
-    place = file if written else None
-    about = About(proof.model, scene, chosen)
-    answer(records, json, lambda: _text(proof, place, kept, seconds), csv=(csv, proof.table), about=about)
-    raise typer.Exit(0 if proof.proved else 1)
+    code, about = 0 if proof.proved else 1, run.about(proof.model, chosen)
+    return Answer(records, words, proof.table, code=code, about=about)
 
 
-def _text(proof: Proof, file: Path | None, kept: str, seconds: float | None) -> None:
-    from limitsets.face.report.pages import after_unproved
-
+def _text(proof: Proof) -> Iterator[str | Table]:
     cells = sum(attraction.cover.grid.n_cells for attraction in proof.attractions)
-    typer.echo(f"{proof.scene.name}: {cells} cells, {proof.seconds:.2g} s")
+    yield f"{proof.scene.name}: {cells} cells, {proof.seconds:.2g} s"
     for name, (lo, hi) in proof.spans.items():
-        typer.echo(f"for every {name} from {_short(lo)} to {_short(hi)}, the same at every throw")
+        yield f"for every {name} from {_short(lo)} to {_short(hi)}, the same at every throw"
     for name, text in proof.noise.items():
         value = "the model's place" if name == "landing.x" else "its value"
-        typer.echo(f"for every sequence of throws, {name} within {text} of {value}, anew at every throw")
+        yield f"for every sequence of throws, {name} within {text} of {value}, anew at every throw"
     if proof.laid:
-        from limitsets.feeder.goals import laid_words as places
+        from limitsets.feeder.goals import laid_words
 
-        typer.echo(f"for parts that are laid down at {places(proof.laid, proof.scene.unit)}")
+        yield f"for parts that are laid down at {laid_words(proof.laid, proof.scene.unit)}"
     if proof.effects:
-        typer.echo(f"with the effects {', '.join(proof.effects)}")
+        yield f"with the effects {', '.join(proof.effects)}"
     for claim in proof.claims:
-        typer.echo(f"\n{claim.claim}: {claim.verdict.upper().replace('-', ' ')}")
-        for line in _words(proof, claim):
-            typer.echo(f"  {line}")
+        yield f"\n{claim.claim}: {claim.verdict.upper().replace('-', ' ')}"
+        yield from (f"  {line}" for line in _words(proof, claim))
         if claim.counterexample:
-            _orbit(proof, claim)
-    typer.echo("")
-    if proof.effects and any(each.written for each in proof.claims):
-        typer.echo("no certificate is written: nothing rechecks maps with effects")
-    elif file is None:
-        typer.echo("nothing is proved: no certificate is written")
-    elif kept:
-        typer.echo(
-            f"the checker denies the certificate: it is kept as {kept}, and what it denies is undecided"
-        )
-    else:
-        left = "" if proof.proved else ", of what is proved only"
-        done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
-        typer.echo(f"certificate: {file}{left}, {done} (check it: {proposed('recheck', file)})")
-
-    if not proof.proved:
-        typer.echo(f"next: {after_unproved(proof)}")
+            yield from _orbit(proof, claim)
+    yield ""
 
 
 def _short(text: str) -> str:
@@ -216,17 +185,15 @@ def _attraction(proof: Proof, claim: Claim) -> list[str]:
     }
     growth = _down(bound["near_joint"], 6)
     starts = ", ".join(f"{_up(x, 6)} {unit} on side {side}" for side, x in bound["beyond"].items())
-    first = "From every position on the arm and every side, a part comes into the attracting cells and stays there:"
-    near = f"Nearer to the joint it takes more throws: each moves the part out, x - a by a factor of {growth} at least."
+    where, edge, foot = "and every side", "the joint", "a"
     if points is not None:
-        first = "From every position on the arm beyond R*, a part comes into the attracting cells and stays there:"
-        near = f"Nearer to R* it takes more throws: each moves the part out, x - R* by a factor of {growth} at least."
+        where, edge, foot = "beyond R*", "R*", "R*"
     return [
         *(_two_basins(proof, points) if points is not None else ()),
-        first,
+        f"From every position on the arm {where}, a part comes into the attracting cells and stays there:",
         *(f"side {side}: x = {parts} {unit}" for side, parts in extents.items()),
         f"It takes {bound['throws']} throws at most from x = {starts}, or beyond.",
-        near,
+        f"Nearer to {edge} it takes more throws: each moves the part out, x - {foot} by a factor of {growth} at least.",
     ]
 
 
@@ -256,82 +223,75 @@ def _up(value: float, digits: int) -> str:
     return f"{math.ceil(value * 10**digits) / 10**digits:.{digits}f}"
 
 
-def _orbit(proof: Proof, claim: Claim) -> None:
-    """Print the orbit that refutes a claim."""
+def _orbit(proof: Proof, claim: Claim) -> Iterator[str | Table]:
+    """Show the orbit that refutes a claim: its first and its last states."""
     states, scene = claim.counterexample, proof.scene
-    typer.echo("  This orbit shows it:")
+    yield "  This orbit shows it:"
     for name, (lo, hi) in claim.fixed.items():
         value = _short(lo) if _short(lo) == _short(hi) else f"any value from {_short(lo)} to {_short(hi)}"
-        typer.echo(f"  {name} = {value}")
-    heads = ["throws", f"x [{scene.unit}]", "side", *_heads(proof)]
-    rows: list[list[str]] = []
-    for k, state in enumerate(states):
-        if 0 < k < len(states) - LAST:
-            if k == 1:
-                rows.append(["..."] + [""] * (len(heads) - 1))
-            continue
-        row = [str(k), f"{0.5 * (state.lo + state.hi):.6f}", str(state.side)]
-        rows.append(row + (_thrown(proof, state) if state.kappa is not None else [""] * (len(heads) - 3)))
-    table(heads, rows)
+        yield f"  {name} = {value}"
+    thrown = _thrown(proof)
+    rows = [
+        [str(k), f"{0.5 * (state.lo + state.hi):.6f}", str(state.side)]
+        + ["" if state.kappa is None else text(state) for text in thrown.values()]
+        for k, state in enumerate(states)
+    ]
+    if len(states) > LAST + 1:
+        rows[1:-LAST] = [["...", *[""] * (len(thrown) + 2)]]
+    yield Table(("throws", f"x [{scene.unit}]", "side", *thrown), rows)
     shape = {name: lo for name, (lo, _) in claim.fixed.items() if name.startswith(("part.", "arm."))}
-    last, thrown = states[-1], scene.with_values(shape)
-    nearest, farthest = float(thrown.sides.a[last.side]), thrown.arm_length
+    last, own = states[-1], scene.with_values(shape)
+    nearest, farthest = float(own.sides.a[last.side]), own.arm_length
     if not (nearest < last.hi and last.lo <= farthest):
         ends = f"on side {last.side} it rests from x = {nearest:.6g} to {farthest:.6g} {scene.unit}"
-        typer.echo(f"  There the part has left the arm: {ends}.")
+        yield f"  There the part has left the arm: {ends}."
 
 
-def _heads(proof: Proof) -> list[str]:
-    """Name the quantities that differ from throw to throw."""
-    unit = proof.scene.unit
-    both = "throw.speed" in proof.noise and "gravity.tilt" in proof.noise
-    words = {
-        "throw.speed": f"kappa of the next throw [{unit}]" if both else "speed of the next throw",
-        "gravity.tilt": "tilt of the next throw",
-        "landing.x": f"lands off by [{unit}]",
-    }
-    return [
-        word for name, word in words.items() if name in proof.noise and not (both and name == "gravity.tilt")
-    ]
-
-
-def _thrown(proof: Proof, state: State) -> list[str]:
-    """Give the values of a throw, one for each of `_heads`."""
-    said, noise, row = proof.thrown(state), proof.noise, []
-    if "throw.speed" in noise and "gravity.tilt" in noise:
-        row.append(f"{state.kappa:.6f}")
-    elif "throw.speed" in noise and state.kappa is not None:
-        row.append(f"{100.0 * (math.sqrt(proof.scene.kappa / state.kappa) - 1.0):+.4f} %")
-    elif "gravity.tilt" in noise:
-        row.append(_short(said["gravity.tilt"]))
-    return row + ([f"{state.landing:+.6f}"] if "landing.x" in noise and state.landing is not None else [])
+def _thrown(proof: Proof) -> dict[str, Callable[[State], str]]:
+    """Name the quantities that differ from throw to throw, and how each is read off a throw."""
+    noise, unit, kappa = proof.noise, proof.scene.unit, proof.scene.kappa
+    speed, tilt = "throw.speed" in noise, "gravity.tilt" in noise
+    columns: dict[str, Callable[[State], str]] = {}
+    if speed and tilt:
+        columns[f"kappa of the next throw [{unit}]"] = lambda state: f"{state.kappa:.6f}"
+    elif speed:
+        columns["speed of the next throw"] = lambda state: (
+            f"{100.0 * (math.sqrt(kappa / (state.kappa or kappa)) - 1.0):+.4f} %"
+        )
+    elif tilt:
+        columns["tilt of the next throw"] = lambda state: _short(proof.thrown(state)["gravity.tilt"])
+    if "landing.x" in noise:
+        columns[f"lands off by [{unit}]"] = lambda state: (
+            "" if state.landing is None else f"{state.landing:+.6f}"
+        )
+    return columns
 
 
 # ----------------------------------------------------------------
 # `limitsets recheck`: check a certificate again.
 
 
-def recheck(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A certificate, NAME.proof.zip.")],
-    out: Out = None,
-    csv: Csv = None,
-    json: Json = False,
-) -> None:
+@command()
+def recheck(run: Run, file: Path) -> Answer:
     """Check a certificate by other code and in other arithmetic than those that made it.
 
     Exit 0 where every claim is proved; 1 where one fails or is proved of some starts only, or is a refutation.
+
+    Parameters
+    ----------
+    file : FILE
+        A certificate, NAME.proof.zip.
     """
-    with progress() as tell:
-        from limitsets.proofs.prover.certificate import recheck as check
-
-        report = check(file, workers=None, progress=lambda done, of: tell("cells checked", done - 1, of))
-    if report.verdict == "bad file":
-        from limitsets.base.errors import AnswerError
-
-        raise AnswerError("the certificate", str(file), "one that limitsets certify wrote", report.reason)
-
+    verdicts = ls.recheck(
+        file, workers=None, progress=lambda done, of: run.tell("cells checked", done - 1, of)
+    )
+    if verdicts.verdict == "bad file":
+        raise AnswerError("the certificate", str(file), "one that limitsets certify wrote", verdicts.reason)
     from limitsets.checker import EXITS, show
 
-    claims = Table(("claim", "verdict", "reason"), report.claims, str(file))
-    answer(report, json, lambda: show(report, str(file)), out, (csv, lambda: claims))
-    raise typer.Exit(EXITS[report.verdict])
+    def words() -> tuple[str, ...]:
+        show(verdicts, str(file))
+        return ()
+
+    claims = Table(("claim", "verdict", "reason"), verdicts.claims, str(file))
+    return Answer(verdicts, words, lambda: claims, code=EXITS[verdicts.verdict])

@@ -1,35 +1,22 @@
-"""`limitsets margin` and `robustness`: how much quantities may deviate, and the sheet of all tolerances."""
+"""`limitsets margin`, `robustness` and `atlas`: how far quantities may deviate, and what changes when they vary."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import as_json
-from limitsets.base.tables import joined
-from limitsets.face.cli.about import About
-from limitsets.face.cli.arguments import HELP_LAID, HELP_NO_RECHECK, deviations, laid_ranges, place
-from limitsets.face.cli.output import (
-    Csv,
-    Form,
-    Format,
-    Html,
-    Json,
-    Scene,
-    Words,
-    answer,
-    opened,
-    option,
-    processes,
-    progress,
-    table,
-)
+import limitsets as ls
+from limitsets.base.tables import Table, joined
+from limitsets.face import report
+from limitsets.face.cli.arguments import deviations, goal_at, laid_ranges, scattering_of
+from limitsets.face.cli.commands import About, Answer, Run, Scene, Words, command, limits
+from limitsets.face.cli.output import processes, saved, stem_of
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene as SceneOf
+    from limitsets.parameters.atlas import Atlas
     from limitsets.parameters.margins.margin_result import Margin
     from limitsets.parameters.sheet.summary import Robustness
 
@@ -37,213 +24,291 @@ if TYPE_CHECKING:
 HEADS = ("quantity", "reading", "proved safe up to", "shown to fail from")
 
 
+@command(form=True)
 def margin(
+    run: Run,
     scene: Scene,
-    quantity: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="QUANTITY", help='Like throw.speed, or "joint"; default: all there are.'),
-    ] = None,
-    reading: Annotated[str | None, option("--reading", "R", "fixed (but unknown) or per-throw.")] = None,
-    x: Annotated[str | None, option("--x", "X", "Ask the goal at another X: 20, or '50 cm'.")] = None,
-    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", HELP_LAID)] = None,
-    width: Annotated[float, option("--width", "W", "How close the two ends have to be, as a share.")] = 0.01,
-    out: Annotated[
-        Path | None, option("--out -o", "DIR", "Write margins.json, certificates, orbits, a figure.")
-    ] = None,
-    form: Format = Form.PNG,
-    csv: Csv = None,
-    json: Json = False,
-    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
-) -> None:
+    quantity: list[str] | None = None,
+    *,
+    reading: str | None = None,
+    x: str | None = None,
+    laid: Words = None,
+    width: float = 0.01,
+    no_recheck: bool = False,
+) -> Answer:
     """Bracket how much each quantity may deviate before the goal fails: proved below, refuted above.
 
     Exit 1 where nothing is proved of one of them, its two ends are farther apart than asked, or the scene scatters its
     throws: margins are those of the scene without its scatter.
-    """
-    with progress() as tell:
-        from limitsets.parameters.margins.single import margin as run
 
-        begins = laid_ranges(laid)
-        chosen, _ = opened(scene, out)
-        goal = None if x is None else _goal_at(chosen, x)
-        margins = run(
-            chosen, *(quantity or ()), reading=reading, goal=goal, laid=begins, width=width, progress=tell
-        )
-        about = About(margins[0].model, scene, chosen)
-        if out is not None:
-            tell("files", len(margins), len(margins) + 1)
-            margins = _write(margins, out, form, about, recheck=not no_recheck)
-    answer(
+    Parameters
+    ----------
+    quantity : QUANTITY
+        Like throw.speed, or "joint"; default: all there are.
+    reading : R
+        fixed (but unknown) or per-throw.
+    x : X
+        Ask the goal at another X: 20, or '50 cm'.
+    width : W
+        How close the two ends have to be, as a share.
+    out : DIR
+        Write margins.json, certificates, orbits, a figure.
+    """
+    begins, chosen = laid_ranges(laid), run.opened(scene)
+    goal = None if x is None else goal_at(chosen, x)
+    margins = ls.margin(
+        chosen, *(quantity or ()), reading=reading, goal=goal, laid=begins, width=width, progress=run.tell
+    )
+    about = run.about(margins[0].model, chosen)
+    if run.out is not None:
+        run.tell("files", len(margins), len(margins) + 1)
+        margins = _write(run, margins, about, recheck=not no_recheck)
+    again = "not rechecked" if no_recheck else "rechecked"
+    last = [] if run.out is None else [f"certificates: {again} (again: limitsets recheck FILE)"]
+    bracketed = all(each.proved > 0 and (each.closed or each.refuted is None) for each in margins)
+    return Answer(
         margins,
-        json,
-        lambda: _text(chosen, margins, out, no_recheck=no_recheck),
-        csv=(csv, lambda: joined(margins)),
+        lambda: [*_text(chosen, margins), *last],
+        lambda: joined(margins),
+        code=0 if bracketed and chosen.effects.spread is None else 1,
         about=about,
     )
-    bracketed = all(each.proved > 0 and (each.closed or each.refuted is None) for each in margins)
-    raise typer.Exit(0 if bracketed and chosen.effects.spread is None else 1)
 
 
-def _goal_at(scene: Any, text: str) -> Any:
-    """Ask the scene's goal at another X: a number in the scene's unit, or text with a unit."""
-    from dataclasses import replace
-
-    from limitsets.feeder.goals import OrientedBeyond, Reaches
-
-    if not isinstance(scene.goal, OrientedBeyond | Reaches):
-        kind = None if scene.goal is None else scene.goal.kind
-        raise LimitsetsError("the goal", kind, "one that has an x", "leave --x out", key="--x")
-    x = place(scene, text)
-    if not 0 <= x < scene.arm_length:
-        allowed = f"from 0 to below the arm's length, {scene.arm_length:.9g} {scene.unit}"
-        raise LimitsetsError("the position", text, allowed, "correct it", key="--x")
-    return replace(scene.goal, x=x)
-
-
-def _write(
-    given: tuple[Margin, ...], out: Path, form: str, about: About, *, recheck: bool
-) -> tuple[Margin, ...]:
+def _write(run: Run, given: tuple[Margin, ...], about: About, *, recheck: bool) -> tuple[Margin, ...]:
     """Write the files; return the margins without the claims that the checker denies."""
-    from limitsets.face.plot.margins import tolerance_box, tornado
-    from limitsets.face.plot.parts import part
-    from limitsets.face.report.writing import laid
     from limitsets.parameters.margins.margin_result import settled
 
-    margins = tuple(settled(each, out, recheck=recheck) for each in given)
+    margins = tuple(settled(each, run.folder, recheck=recheck) for each in given)
     single = [each for each in margins if each.reading != "tolerance"]
-    drawn = [("part", part(given[0].scene))]
-    drawn += [("margins", tornado(single))] if single else []
-    drawn += [("joint", tolerance_box(each)) for each in margins if each.reading == "tolerance"]
-    laid(out, drawn, lambda _: {"margins.json": as_json(about.added(margins))}, form)
+    drawn = [("part", ls.plot.part(given[0].scene))]
+    drawn += [("margins", ls.plot.tornado(single))] if single else []
+    drawn += [("joint", ls.plot.tolerance_box(each)) for each in margins if each.reading == "tolerance"]
+    run.write(drawn, {"margins.json": about.added(margins)})
     return margins
 
 
-def _text(given: SceneOf, margins: tuple[Margin, ...], out: Path | None, *, no_recheck: bool) -> None:
-    from limitsets.face.report.pages import goal_sentence, without_margin
-    from limitsets.face.report.robust_pages import READINGS
+def _text(given: SceneOf, margins: tuple[Margin, ...]) -> Iterator[str | Table]:
     from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
     from limitsets.parameters.margins.margin_result import bound, failing, reach_of, void_of
 
+    scene, goals = margins[0].scene, margins[0].goals
+    whose = f"{scene.name}: {WITHOUT_SCATTER}, " if given.effects.spread else f"{scene.name}: "
+    yield whose + " and ".join(report.pages.goal_sentence(goal, scene.unit) for goal in goals)
+    if len(margins) > 1 and not any(each.proved > 0.0 or each.refuted for each in margins):
+        yield f"{len(margins)} margins, all of them 0: {margins[0].reason}"
+        fails = any(each.refuted == 0.0 for each in margins)
+        yield f"next: {report.pages.without_margin(given, goals, fails=fails)}"
+        return
     rows = []
     for each in margins:
         unit = each.unit or "times"
         low, high = bound(each.proved, unit), failing(each.refuted, unit, each.direction)
-        rows.append([each.quantity, READINGS[each.reading], low, high])
-    scene = margins[0].scene
-    whose = f"{scene.name}: {WITHOUT_SCATTER}, " if given.effects.spread else f"{scene.name}: "
-    typer.echo(whose + " and ".join(goal_sentence(goal, scene.unit) for goal in margins[0].goals))
-    if len(margins) == 1 or any(each.proved > 0.0 or each.refuted for each in margins):
-        table(HEADS, rows)
-    else:
-        typer.echo(f"{len(margins)} margins, all of them 0: {margins[0].reason}")
-        fails = any(each.refuted == 0.0 for each in margins)
-        typer.echo(f"next: {without_margin(given, margins[0].goals, fails=fails)}")
-        margins = ()
+        rows.append((each.quantity, report.robust_pages.READINGS[each.reading], low, high))
+    yield Table(HEADS, rows)
     for each in margins:
         void = void_of(each.goals, reach_of(each.pieces), scene.unit)
         if void:
-            typer.echo(f"{each.quantity}: what is proved holds vacuously, {void}")
+            yield f"{each.quantity}: what is proved holds vacuously, {void}"
         if each.reason:
-            typer.echo(f"{each.quantity}: {each.reason}")
-    if out is not None:
-        typer.echo(
-            f"written to {out}: margins.json, figures, certificates"
-            f" ({'not rechecked' if no_recheck else 'rechecked'}; again: limitsets recheck FILE)"
-        )
+            yield f"{each.quantity}: {each.reason}"
 
 
 # ----------------------------------------------------------------
 # `limitsets robustness`: a sheet of tolerances, what is proved safe and what fails, and what noise does.
 
 
-HELP_QUANTITY = "A quantity, like throw.speed; repeatable. Default: all that the scene gives."
-HELP_TOLERANCE = "Of the joint margin, like throw.speed='1 %'; repeatable. Default: the scene's [tolerance]."
-HELP_SCATTER = (
-    "Noise at every throw, like throw.speed='0.5 %'; repeatable. Default: the scatter in the scene's [world]."
-)
-HELP_SECONDS = "For the proofs of the joint margin and of the curve; five times as many for the noise."
-HELP_WITHOUT = "What not to do: margins, joint, curve, noise or audit; repeatable."
-
-
+@command(form=True, html=True)
 def robustness(
+    run: Run,
     scene: Scene,
-    quantity: Annotated[Words, option("--quantity", "Q", HELP_QUANTITY)] = None,
-    reading: Annotated[
-        str | None, option("--reading", "R", "fixed (but unknown) or per-throw; default both.")
-    ] = None,
-    laid: Annotated[Words, option("--laid", "SIDE=LO:HI", HELP_LAID)] = None,
-    tolerance: Annotated[Words, option("--tolerance", "Q=DEV", HELP_TOLERANCE)] = None,
-    scatter: Annotated[Words, option("--scatter", "Q=DEV", HELP_SCATTER)] = None,
-    law: Annotated[
-        str, option("--law", "LAW", "Of --scatter: gaussian (standard deviations) or bounded.")
-    ] = "gaussian",
-    width: Annotated[float, option("--width", "W", "How close brackets have to be, as a share.")] = 0.01,
-    cells: Annotated[
-        int, option("--cells", "N", "Cells per side, for the noise.", min=8, max=100_000)
-    ] = 1024,
-    seconds: Annotated[float, option("--seconds", "S", HELP_SECONDS, min=0.0)] = 12.0,
-    workers: Annotated[
-        int | None, option("--workers", "N", "Processes that search for margins; default: one a core.", min=1)
-    ] = None,
-    without: Annotated[Words, option("--without", "PART", HELP_WITHOUT)] = None,
-    out: Annotated[
-        Path | None, option("--out -o", "DIR", "Folder of the report, ./NAME-robustness by default.")
-    ] = None,
-    html: Html = False,
-    form: Format = Form.PNG,
-    csv: Csv = None,
-    json: Json = False,
-    no_recheck: Annotated[bool, typer.Option("--no-recheck", help=HELP_NO_RECHECK)] = False,
-) -> None:
+    *,
+    quantity: Words = None,
+    reading: str | None = None,
+    laid: Words = None,
+    tolerance: Words = None,
+    scatter: Words = None,
+    law: str = "gaussian",
+    width: float = 0.01,
+    cells: Annotated[int, limits(min=8, max=100_000)] = 1024,
+    seconds: Annotated[float, limits(min=0.0)] = 12.0,
+    workers: Annotated[int | None, limits(min=1)] = None,
+    without: Words = None,
+    no_recheck: bool = False,
+) -> Answer:
     """Say how far each quantity may drift before the goal fails, and write report.md, figures and certificates.
 
     Exit 1 where the goal is not proved of the scene as it is, or the search for a margin ends with an error.
-    """
-    with progress() as tell, processes(workers) as pool:
-        chosen, folder = opened(scene, out, "robustness")
-        from limitsets.face.report.robust_pages import write_robustness
-        from limitsets.parameters.sheet.sheet_run import robustness as run
-        from limitsets.parameters.sheet.summary import scattering_from
 
-        noise = deviations("--scatter", scatter)
-        vector = deviations("--tolerance", tolerance)
-        sheet = run(
+    Parameters
+    ----------
+    quantity : Q
+        A quantity, like throw.speed; repeatable. Default: all that the scene gives.
+    reading : R
+        fixed (but unknown) or per-throw; default both.
+    tolerance : Q=DEV
+        Of the joint margin, like throw.speed='1 %'; repeatable. Default: the scene's [tolerance].
+    scatter : Q=DEV
+        Noise at every throw, like throw.speed='0.5 %'; repeatable. Default: the scatter in the scene's
+        [world].
+    width : W
+        How close brackets have to be, as a share.
+    cells : N
+        Cells per side, for the noise.
+    seconds : S
+        For the proofs of the joint margin and of the curve; five times as many for the noise.
+    workers : N
+        Processes that search for margins; default: one a core.
+    without : PART
+        What not to do: margins, joint, curve, noise or audit; repeatable.
+    out : DIR
+        Folder of the report, ./NAME-robustness by default.
+    """
+    chosen = run.opened(scene, "robustness")
+    with processes(workers) as pool:
+        sheet = ls.robustness(
             chosen,
             *(quantity or ()),
             laid=laid_ranges(laid),
             reading=reading,
-            tolerance=vector or None,
-            scatter=scattering_from(chosen, noise, law) if noise else None,
+            tolerance=deviations("--tolerance", tolerance) or None,
+            scatter=scattering_of(chosen, scatter, law),
             width=width,
             cells=cells,
             leave_out=without or (),
             seconds=seconds,
-            folder=folder,
+            folder=run.out,
             recheck=not no_recheck,
             executor=pool,
-            progress=tell,
+            progress=run.tell,
         )
-        tell("files", len(sheet.entries), len(sheet.entries) + 1)
-        files = write_robustness(sheet, folder, form, html=html)
-    about = About(sheet.model, scene)  # audited by the sheet itself, unless that was left out
-    answer(sheet, json, lambda: _text_of_sheet(chosen, sheet, files), csv=(csv, sheet.table), about=about)
-    raise typer.Exit(0 if sheet.verdict == "proved" and not sheet.failed else 1)
+    run.tell("files", len(sheet.entries), len(sheet.entries) + 1)
+    run.files = report.robust_pages.write_robustness(sheet, run.folder, run.form, html=run.html)
+    return Answer(
+        sheet,
+        lambda: _text_of_sheet(chosen, sheet),
+        sheet.table,
+        code=0 if sheet.verdict == "proved" and not sheet.failed else 1,
+        about=run.about(sheet.model),  # audited by the sheet itself, unless that was left out
+    )
 
 
-def _text_of_sheet(given: SceneOf, sheet: Robustness, files: list[Any]) -> None:
-    from limitsets.face.report.pages import without_margin
-    from limitsets.face.report.robust_pages import HEADS, lines_of, none_holds
-    from limitsets.face.report.robust_pages import answer as said
-
-    typer.echo(said(sheet).replace("**", ""))
+def _text_of_sheet(given: SceneOf, sheet: Robustness) -> Iterator[str | Table]:
+    pages = report.robust_pages
+    yield pages.answer(sheet).replace("**", "")
     if any(entry.holds for entry in sheet.singles):
-        table(HEADS, lines_of(sheet))
+        yield Table(pages.HEADS, pages.lines_of(sheet))
     elif sheet.singles:
-        typer.echo(none_holds(sheet))
-        typer.echo(f"next: {without_margin(given, sheet.goals, fails=sheet.decided == 'refuted')}")
+        yield pages.none_holds(sheet)
+        fails = sheet.decided == "refuted"
+        yield f"next: {report.pages.without_margin(given, sheet.goals, fails=fails)}"
     rests = ("rest of the curve", "rest of the noise")
     for part in dict.fromkeys(("joint", "curve", "noise", *rests, *sheet.failed)):
         reason = sheet.left_out.get(part)
         if reason and reason != "it was not asked for":
-            typer.echo(f"no {part}: {reason}")
-    typer.echo(f"report: {files[0]}")
+            yield f"no {part}: {reason}"
+    if sheet.again:
+        yield f"found by an earlier run: {sheet.again} of {len(sheet.entries)} margins"
+
+
+# ----------------------------------------------------------------
+# `limitsets atlas`: one or two quantities of a scene, varied, and what is asked at every point.
+
+
+@command(form=True)
+def atlas(
+    run: Run,
+    scene: Scene,
+    *,
+    x: str,
+    y: str | None = None,
+    variables: list[str] | None = None,
+    task: str | None = None,
+    margin: str | None = None,
+    reading: str = "fixed",
+    certify: bool = False,
+    workers: Annotated[int | None, limits(min=1)] = None,
+    cluster: str | None = None,
+    refine: bool = False,
+    coarse: Annotated[int, limits(min=2)] = 8,
+) -> Answer:
+    """Vary one or two quantities of a scene, and keep what a task says at every point.
+
+    A run that was interrupted goes on when the same command is given again.
+
+    Parameters
+    ----------
+    x : Q=LO:HI:N
+        What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'.
+    y : Q=LO:HI:N
+        A second one; without it a line of points.
+    variables : V,V
+        Which answers; default: what the task gives.
+    task : MODULE:FUNCTION
+        What is asked: a function of a scene; by default the topology of the attractors.
+    margin : Q
+        Find the goal's margin at every point, by floats: throw.speed, or joint.
+    reading : R
+        Of --margin: fixed (but unknown) or per-throw.
+    certify
+        Prove what holds in each cell of the window; writes NAME-regions.proof.zip.
+    workers : N
+        Processes; default: one a core.
+    cluster : URL
+        Compute on a Dask cluster, by its scheduler's address: tcp://10.0.0.1:8786.
+    refine
+        Compute a coarse grid, then only points near boundaries of classes; fill the rest.
+    coarse : N
+        With --refine: the coarse grid has every N-th point of each axis.
+    out : STORE
+        The store (Zarr), ./NAME-atlas.zarr by default; one that was begun is continued.
+    """
+    from limitsets.parameters.atlas.classes import is_classified
+
+    if task is not None:  # a file in the current folder can be imported, as with `python -m`
+        sys.path.insert(0, str(Path.cwd()))
+    chosen = ls.load(scene)
+    store = run.out or Path(f"{stem_of(chosen)}-atlas.zarr")
+    wanted = [name.strip() for words in variables or [] for name in words.split(",")]
+    answers = ls.atlas(
+        chosen,
+        x,
+        y,
+        task=task,
+        variables=wanted or None,
+        options=None if margin is None else {"margin": margin, "reading": reading},
+        refine=refine,
+        coarse=coarse,
+        store=store,
+        workers=workers,
+        cluster=cluster,
+        progress=run.tell,
+    )
+    last = [f"table: {run.csv}"] if run.csv is not None else []
+    if is_classified(answers.dataset):
+        picture = store.with_name(f"{store.name.removesuffix('.zarr')}.{run.form}")
+        with saved(picture) as draft:
+            ls.plot.atlas(answers).savefig(draft, dpi=report.writing.DPI)
+        last.append(f"figure: {picture}")
+    if answers.model is not None:
+        last.append(run.about(answers.model).line())
+    if certify:
+        proof = Path(f"{stem_of(chosen)}-regions.proof.zip")
+        with processes(workers) as pool:
+            regions = answers.certify(executor=pool, progress=run.tell)
+        run.tell("certificate", 0, 1)
+        regions.save(proof, workers=workers)
+        shares = ", ".join(f"{100 * share:.2f} % {word}" for word, share in regions.shares().items())
+        last.append(f"regions: {shares}: {proof}")
+    return Answer(answers, lambda: [*_words_of_atlas(answers), *last], answers.table)
+
+
+def _words_of_atlas(answers: Atlas) -> Iterator[str | Table]:
+    """Show the classes, the ranges of the answers, and the store."""
+    from limitsets.parameters.atlas.classes import is_classified, legend
+
+    for each in legend(answers.dataset) if is_classified(answers.dataset) else ():
+        yield f"{100 * each.share:6.2f} %  {each.words}"
+    yield answers.tables()[0]
+    chunks = f", {answers.kept} of its {answers.kept + answers.new} chunks by earlier runs"
+    yield f"{answers.dataset['status'].size} points{chunks if answers.kept else ''}: {answers.store}"

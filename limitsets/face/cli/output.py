@@ -7,18 +7,14 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from enum import StrEnum
 from json import loads
 from pathlib import Path
-from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
-
-import typer
+from typing import TYPE_CHECKING
 
 from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import as_json, locked, replaced
+from limitsets.base.files import locked, replaced
 from limitsets.base.progress import InterruptedRun, bar
 from limitsets.base.tables import aligned
 
@@ -26,79 +22,13 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from limitsets.base.tables import Table
-    from limitsets.face.cli.about import About
     from limitsets.feeder.scene import Scene as SceneOf
 
-
-Words: TypeAlias = list[str] | None
 
 # Folders that this process locks until it ends.
 _LOCKED: set[Path] = set()
 _LOCKS = ExitStack()
 atexit.register(_LOCKS.close)
-
-
-def option(flags: str, metavar: str, help: str, **limits: Any) -> Any:  # noqa: A002 - typer's word
-    """Declare an option that takes a value."""
-    return typer.Option(*flags.split(), metavar=metavar, help=help, **limits)
-
-
-def _names(begun: str) -> list[str]:
-    """Give the built-in scenes for the shell's completion; the shell adds files if no scene fits."""
-    from limitsets.feeder.scene import scenes
-
-    return [name for name in scenes() if name.startswith(begun)]
-
-
-Scene = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCENE",
-        help="A built-in name (see: limitsets scenes) or a TOML file.",
-        autocompletion=_names,
-    ),
-]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else, on stdout.")]
-Html = Annotated[
-    bool, typer.Option("--html", help="Write report.html too: the report in one file, figures inside.")
-]
-Out = Annotated[Path | None, option("--out -o", "FILE", "Write the JSON to this file as well.")]
-
-
-class Form(StrEnum):
-    """Of a picture."""
-
-    PNG = "png"
-    SVG = "svg"
-    PDF = "pdf"
-
-
-Format = Annotated[Form, option("--format", "FORMAT", "Of the figures: png, svg or pdf.")]
-
-
-def _require_file(file: Path | None) -> Path | None:
-    """Refuse a file that clearly cannot be written, before the computation begins."""
-    if file is not None and file.is_dir():
-        raise LimitsetsError("the table's file", str(file), "a regular file", "it is a folder; name a file")
-    if file is not None and not file.parent.is_dir():
-        raise LimitsetsError(
-            "the table's file",
-            str(file),
-            "a file in a folder that is there",
-            "make the folder, or name another",
-        )
-    return file
-
-
-Csv = Annotated[
-    Path | None,
-    option(
-        "--csv",
-        "FILE",
-        "Write the table as CSV: units in the head, numbers in full.",
-        callback=_require_file,
-    ),
-]
 
 
 # Width of a line in a pipe: larger than that of any table.
@@ -108,59 +38,37 @@ LONGEST = 100_000
 LONG = 500
 
 
-def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Print a table; outside a terminal its columns are as wide as their text."""
+def show(listing: Table) -> None:
+    """Print a table, its numbers rounded; outside a terminal its columns are as wide as their text."""
+    heads, rows = listing.heads, listing.shown()
     if len(rows) > LONG:
-        print("\n".join(aligned(heads, [[str(cell) for cell in row] for row in rows])))
+        print("\n".join(aligned(heads, rows)))
         return
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
+    from rich import box, console, markup, table
 
     # rich reads the width from the terminal or COLUMNS; without either, lines are not broken
-    told = sys.stdout.isatty() or bool(os.environ.get("COLUMNS"))
-    grid = Table(box=SIMPLE_HEAD, pad_edge=False)
+    fitted = sys.stdout.isatty() or bool(os.environ.get("COLUMNS"))
+    grid = table.Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    # names are not broken if other columns can be: two names could look alike when cut
+    whole = not any(" " in row[0] for row in rows)
     for number, head in enumerate(heads):
-        # names are not broken if other columns can be: two names could look alike when cut
-        names = number == 0 and not any(" " in str(row[0]) for row in rows)
-        grid.add_column(escape(head), no_wrap=names or not told, overflow="fold")
+        no_wrap = not fitted or (number == 0 and whole)
+        grid.add_column(markup.escape(head), no_wrap=no_wrap, overflow="fold")
     for row in rows:
-        grid.add_row(*(escape(str(cell)) for cell in row))
-    Console(width=None if told else LONGEST).print(grid)
+        grid.add_row(*map(markup.escape, row))
+    console.Console(width=None if fitted else LONGEST).print(grid)
 
 
-def show(listing: Table) -> None:
-    """Print a table of an answer, its numbers rounded."""
-    table(listing.heads, listing.shown())
+def place_for(scene: SceneOf, folder: Path) -> None:
+    """Keep a folder for a scene's report until the process ends; refuse one that cannot be, or is another scene's."""
+    from limitsets.face.report.writing import require_place
 
-
-def opened(
-    scene: str, out: Path | None, word: str = "", read: Callable[[str], SceneOf] | None = None
-) -> tuple[SceneOf, Path]:
-    """Load a scene; refuse a folder, by default NAME-WORD, that cannot be written, before the computation begins.
-
-    `read` loads the scene instead of `limitsets.load`.
-    """
-    from limitsets.feeder.scene import load
-
-    chosen = (read or load)(scene)
-    folder = out or Path(f"{stem_of(chosen)}-{word}")
-    if out or word:
-        from limitsets.face.report.writing import require_place
-
-        require_place(folder)
-        _keep(folder)
-        _require_own(folder, chosen)
-    return chosen, folder
-
-
-def _keep(folder: Path) -> None:
-    """Lock a folder for this process until it ends."""
+    require_place(folder)
     place = folder.resolve()
     if place not in _LOCKED:
         _LOCKS.enter_context(locked(place))
         _LOCKED.add(place)
+    _require_own(folder, scene)
 
 
 def stem_of(scene: SceneOf) -> str:
@@ -215,77 +123,6 @@ def saved(file: Path) -> Iterator[Path]:
         raise LimitsetsError(
             "the output file", str(file), "a place that can be written", f"it could not be: {reason}"
         ) from None
-
-
-def answer(
-    record: Any,
-    json: bool,
-    text: Callable[[], None],
-    out: Path | None = None,
-    csv: tuple[Path | None, Callable[[], Table]] | None = None,
-    about: About | None = None,
-) -> None:
-    """Print an answer as JSON or as text; write it to a file, and its table as CSV, if these are given.
-
-    The text ends with the model of the verdict (`about`); its broken assumptions are computed after the answer is out.
-    """
-    words = as_json(about.added(record) if json and about is not None else record)
-    if csv is not None and csv[0] is not None:
-        with saved(csv[0]) as draft:
-            draft.write_text(csv[1]().csv(), encoding="utf-8", newline="")
-    if out is not None:
-        with saved(out) as draft:
-            draft.write_text(words, encoding="utf-8", newline="\n")
-    if json:
-        print(words, end="")
-    else:
-        text()
-        if about is not None:
-            sys.stdout.flush()  # printed before the audit, which takes time
-            with progress() as tell:
-                tell("assumptions on the limit set", 0, 1)
-                said = about.line()
-            typer.echo(said)
-
-
-def scene_file(scene: SceneOf, out: Path | None) -> str:
-    """Name the file of a design, from `out`; empty if none is written."""
-    return "" if out is None else str(out if out.suffix == ".toml" else out / f"{scene.name}.toml")
-
-
-def save_scene(scene: SceneOf, file: Path) -> list[Path]:
-    """Write the scene alone."""
-    from limitsets.feeder.scene import dump
-
-    with saved(file) as draft:
-        draft.write_text(dump(scene), encoding="utf-8", newline="\n")
-    return [file]
-
-
-def show_scene(scene: SceneOf, files: list[Path], about: About | None) -> None:
-    """Name the file of a design, or print the design if there is no file; say so if it is a near miss only.
-
-    Parameters
-    ----------
-    scene : Scene
-        The design.
-    files : list of Path
-        Written files, with the scene.
-    about : About or None
-        The model of the design; None for a near miss, for which nothing is printed that looks like an answer.
-    """
-    from limitsets.feeder.scene import dump
-
-    file = next((str(path) for path in files if path.suffix == ".toml"), None)
-    if about is not None:
-        typer.echo(about.line())
-    elif file is None:
-        typer.echo("the values above are the nearest miss, no answer; add -o FILE.toml to save that scene")
-        return
-    if file is not None:
-        typer.echo(f"scene: {file}" + ("" if about else " (the nearest miss, no answer)"))
-        return
-    typer.echo(f"scene (add -o {quote(f'{scene.name}.toml')} to save it):\n\n{dump(scene)}".rstrip("\n"))
 
 
 class _Interrupts:

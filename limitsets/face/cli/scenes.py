@@ -6,76 +6,71 @@ import math
 import platform
 import re
 import shutil
+from collections.abc import Iterator
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
+import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.base.files import picked
 from limitsets.base.proposals import proposed
 from limitsets.base.tables import Column, Table
-from limitsets.face.cli.output import Csv, Json, Out, Scene, answer, option, progress, show
+from limitsets.face.cli.commands import Answer, Run, Scene, command, limits
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene as SceneOf
 
 
-def scenes(out: Out = None, csv: Csv = None, json: Json = False) -> None:
-    """List the built-in scenes."""
-    from limitsets.feeder.scene import load
-    from limitsets.feeder.scene import scenes as names
+SCENE_COLUMNS: dict[str, Column | str] = {
+    "name": "scene",
+    "sides": "sides",
+    "kappa": Column("kappa", show=".6g"),
+    "arm_length": Column("arm", show="g"),
+    "unit": "unit",
+    "flight": "flight",
+    "flip": "flip",
+    "goal": "goal",
+}
 
+
+@command()
+def scenes(run: Run) -> Answer:
+    """List the built-in scenes."""
     records = [
         {
             "name": scene.name,
             "sides": len(scene.sides),
-            "unit": scene.unit,
-            "kappa": scene.kappa,
-            "arm_length": scene.arm_length,
-            "flight": scene.flight,
-            "flip": scene.flip,
+            **picked(scene, "unit", "kappa", "arm_length", "flight", "flip"),
             "goal": None if scene.goal is None else scene.goal.kind,
         }
-        for scene in map(load, names())
+        for scene in map(ls.load, ls.scenes())
     ]
-
-    columns = (
-        "scene",
-        "sides",
-        Column("kappa", show=".6g"),
-        Column("arm", show="g"),
-        "unit",
-        "flight",
-        "flip",
-        "goal",
-    )
-    words = ("name", "sides", "kappa", "arm_length", "unit", "flight", "flip", "goal")
-    listing = Table(columns, [[record[word] for word in words] for record in records], "Built-in scenes")
-    answer(records, json, lambda: show(listing), out, (csv, lambda: listing))
+    rows = [[record[word] for word in SCENE_COLUMNS] for record in records]
+    listing = Table(list(SCENE_COLUMNS.values()), rows, "Built-in scenes")
+    return Answer(records, lambda: [listing], lambda: listing)
 
 
 # ---------------------------------------------------------------- `limitsets new`: a scene to start from
 
 
-def new(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE.toml", help="The file to write; it must not be there.")
-    ],
-    unit: Annotated[str, option("--unit", "UNIT", "Of its lengths: mm, cm, m, in, ...")] = "in",
-    json: Json = False,
-) -> None:
-    """Write a scene to start from: every key that a scene may have, with what it means."""
+@command(out=False, csv=False)
+def new(run: Run, file: Path, *, unit: str = "in") -> Answer:
+    """Write a scene to start from: every key that a scene may have, with what it means.
+
+    Parameters
+    ----------
+    file : FILE.toml
+        The file to write; it must not be there.
+    unit : UNIT
+        Of its lengths: mm, cm, m, in, ...
+    """
     from limitsets.feeder.scene.checking import new_scene
 
     written = new_scene(file, unit)
-
-    def text() -> None:
-        typer.echo(f"scene: {written}")
-        typer.echo(f"next: edit it, then {proposed('check', written)} and {proposed('analyse', written)}")
-
-    answer({"scene": str(written)}, json, text)
+    next_words = f"next: edit it, then {proposed('check', written)} and {proposed('analyse', written)}"
+    return Answer({"scene": str(written)}, lambda: [f"scene: {written}", next_words])
 
 
 # ----------------------------------------------------------------
@@ -85,12 +80,12 @@ def new(
 WORDS = ("key", "thing", "value", "allowed", "remedy")
 
 
-def check(scene: Scene, out: Out = None, csv: Csv = None, json: Json = False) -> None:
+@command()
+def check(run: Run, scene: Scene) -> Answer:
     """Say all that is wrong with a scene: unknown keys, values, units, contradictions, improbable values.
 
     A line each; exit 2 where anything is wrong.
     """
-    from limitsets.feeder.scene import load
     from limitsets.feeder.scene.checking import examined
 
     errors, doubts = examined(scene)
@@ -98,17 +93,11 @@ def check(scene: Scene, out: Out = None, csv: Csv = None, json: Json = False) ->
     records += [{"improbable": True, **picked(doubt, *WORDS, "file")} for doubt in doubts]
     heads = (*WORDS, "improbable")
     rows = Table(heads, [[str(record[word] or "") for word in heads] for record in records], scene)
-
-    def text() -> None:
-        for each in (*errors, *doubts):
-            typer.echo(str(each))
-        unlikely = f", {_count(len(doubts), 'improbable')}" if doubts else ""
-        typer.echo(f"{scene}: {_count(len(errors), 'wrong')}{unlikely}")
-        if not errors and (note := _beside_kappa(load(scene))):
-            typer.echo(f"{scene}: {note}")
-
-    answer(records, json, text, out, (csv, lambda: rows))
-    raise typer.Exit(2 if errors else 0)
+    unlikely = f", {_count(len(doubts), 'improbable')}" if doubts else ""
+    words = [*map(str, errors), *map(str, doubts), f"{scene}: {_count(len(errors), 'wrong')}{unlikely}"]
+    if not errors and (note := _beside_kappa(ls.load(scene))):
+        words.append(f"{scene}: {note}")
+    return Answer(records, lambda: words, lambda: rows, code=2 if errors else 0)
 
 
 def _beside_kappa(scene: SceneOf) -> str:
@@ -131,28 +120,26 @@ def _count(number: int, word: str) -> str:
 # Extras that are needed only to develop the package itself.
 INNER = ("bench", "dev")
 
+
 _REQUIREMENT = re.compile(r"""([A-Za-z0-9._-]+)[^;]*(?:;.*\bextra\s*==\s*["']([^"']+)["'])?""")
 
 
-def doctor(
-    clear: Annotated[
-        bool, typer.Option("--clear", help="Delete the compiled code; the next run compiles.")
-    ] = False,
-    out: Out = None,
-    csv: Csv = None,
-    json: Json = False,
-) -> None:
+@command()
+def doctor(run: Run, *, clear: bool = False) -> Answer:
     """Say what is installed, which extras are missing and how to get them, and where the compiled code lies.
 
     Exit 1 where a package is missing that every command needs.
+
+    Parameters
+    ----------
+    clear
+        Delete the compiled code; the next run compiles.
     """
     packages = _packages()
     missing = sorted({each["extra"] for each in packages if each["version"] is None and each["extra"]})
     lost = [each["package"] for each in packages if each["version"] is None and not each["extra"]]
-    from limitsets import __version__
-
     record = {
-        "limitsets": __version__,
+        "limitsets": ls.__version__,
         "folder": str(Path(__file__).parents[2]),
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -165,42 +152,36 @@ def doctor(
         (each["package"], each["version"] or "missing", each["extra"] or "everything") for each in packages
     ]
     table = Table(("package", "version", "needed for"), rows, "Packages")
-    answer(record, json, lambda: _text(record, table), out, (csv, lambda: table))
-    raise typer.Exit(1 if lost else 0)
+    return Answer(record, lambda: _text(record, table), lambda: table, code=1 if lost else 0)
 
 
 def _packages() -> list[dict[str, str | None]]:
     """List the required packages, each with its installed version and the extra that requires it."""
-    try:
+    lines: list[str] = []
+    with suppress(PackageNotFoundError):  # a folder on the path, not installed
         lines = requires("limitsets") or []
-    except PackageNotFoundError:  # a folder on the path, not installed
-        return []
     packages: list[dict[str, str | None]] = []
-    for line in lines:
-        match = _REQUIREMENT.match(line)
-        if match is None or match[2] in INNER or match[1] == "limitsets":
-            continue
-        try:
-            there: str | None = version(match[1])
-        except PackageNotFoundError:
-            there = None
-        packages.append({"package": match[1], "version": there, "extra": match[2]})
+    for match in filter(None, map(_REQUIREMENT.match, lines)):
+        if match[2] not in INNER and match[1] != "limitsets":
+            packages.append({"package": match[1], "version": None, "extra": match[2]})
+            with suppress(PackageNotFoundError):
+                packages[-1]["version"] = version(match[1])
     return packages
 
 
 def _cache(*, clear: bool) -> dict[str, Any]:
     """Measure the folder of the compiled code, and delete it if asked."""
+    none = {"folder": None, "bytes": 0, "versions": 0, "cleared": False, "reason": "it cannot be written"}
     try:
         from limitsets.numbers.jit.cache import FOLDER
     except ImportError as error:  # numba is missing or broken
-        return {"folder": None, "bytes": 0, "versions": 0, "cleared": False, "reason": str(error)}
+        return none | {"reason": str(error)}
     if FOLDER is None:
-        return {"folder": None, "bytes": 0, "versions": 0, "cleared": False, "reason": "it cannot be written"}
+        return none
     root = FOLDER.parent
-    files = [each for each in root.rglob("*") if each.is_file()]
     record = {
         "folder": str(root),
-        "bytes": sum(each.stat().st_size for each in files),
+        "bytes": sum(each.stat().st_size for each in root.rglob("*") if each.is_file()),
         "versions": sum(each.is_dir() for each in root.iterdir()),
         "cleared": clear,
         "reason": None,
@@ -209,35 +190,31 @@ def _cache(*, clear: bool) -> dict[str, Any]:
         try:
             shutil.rmtree(root)
         except OSError as error:
-            raise LimitsetsError(
-                "the compiled code",
-                str(root),
-                "a folder that can be deleted",
-                f"it could not be: {error.strerror}",
-            ) from None
+            allowed, remedy = "a folder that can be deleted", f"it could not be: {error.strerror}"
+            raise LimitsetsError("the compiled code", str(root), allowed, remedy) from None
     return record
 
 
-def _text(record: dict[str, Any], table: Table) -> None:
-    typer.echo(f"limitsets {record['limitsets']} in {record['folder']}")
-    typer.echo(f"Python {record['python']}, {record['platform']}")
+def _text(record: dict[str, Any], table: Table) -> Iterator[str | Table]:
+    yield f"limitsets {record['limitsets']} in {record['folder']}"
+    yield f"Python {record['python']}, {record['platform']}"
     if table.rows:
-        show(table)
+        yield table
     else:
-        typer.echo("it is not installed, but found on the path: what it needs is not listed")
+        yield "it is not installed, but found on the path: what it needs is not listed"
     for package in record["missing"]:
-        typer.echo(f"missing, and needed by every command: pip install {package}")
+        yield f"missing, and needed by every command: pip install {package}"
     for extra, line in record["missing_extras"].items():
-        typer.echo(f"extra {extra} is missing: {line}")
+        yield f"extra {extra} is missing: {line}"
     cache = record["cache"]
     if cache["folder"] is None:
-        typer.echo(f"compiled code is not kept: {cache['reason']}")
+        yield f"compiled code is not kept: {cache['reason']}"
         return
     size = f"{cache['bytes'] / 1e6:.3g} MB of {cache['versions']} versions of the source"
     done = "deleted: " if cache["cleared"] else ""
-    typer.echo(f"compiled code: {done}{size} in {cache['folder']}")
+    yield f"compiled code: {done}{size} in {cache['folder']}"
     if not cache["cleared"]:
-        typer.echo("limitsets doctor --clear deletes it; the next run compiles for about half a minute")
+        yield "limitsets doctor --clear deletes it; the next run compiles for about half a minute"
 
 
 # ----------------------------------------------------------------
@@ -245,36 +222,47 @@ def _text(record: dict[str, Any], table: Table) -> None:
 
 
 FIRST = "paper-designed"
-HELP_ADDRESS = "Where the page listens; any other than 127.0.0.1 needs --allow-origin."
-HELP_ORIGIN = "A name with its port under which browsers may ask for the page."
-HELP_ATLAS = "The store of an atlas of the scene, shown beside it; without SCENE its scene is opened."
 
 
+@command(out=False, csv=False, json=False)
 def explore(
-    scene: Annotated[
-        str | None,
-        typer.Argument(metavar="[SCENE]", help=f"A built-in name or a TOML file; {FIRST} by default."),
-    ] = None,
-    atlas: Annotated[Path | None, option("--atlas", "STORE", HELP_ATLAS)] = None,
-    port: Annotated[int, option("--port", "N", "0 for any that is free.", min=0, max=65535)] = 5006,
-    address: Annotated[str, option("--address", "HOST", HELP_ADDRESS)] = "127.0.0.1",
-    allow_origin: Annotated[list[str] | None, option("--allow-origin", "HOST:PORT", HELP_ORIGIN)] = None,
-    no_show: Annotated[bool, typer.Option("--no-show", help="Do not open a browser.")] = False,
-) -> None:
-    """Open a page where sliders move a scene, and its limit sets, basins and goal follow."""
-    from limitsets.face.explorer import explore as open_page
+    run: Run,
+    scene: str | None = None,
+    *,
+    atlas: Path | None = None,
+    port: Annotated[int, limits(min=0, max=65_535)] = 5006,
+    address: str = "127.0.0.1",
+    allow_origin: list[str] | None = None,
+    no_show: bool = False,
+) -> Answer:
+    """Open a page where sliders move a scene, and its limit sets, basins and goal follow.
+
+    Parameters
+    ----------
+    scene : SCENE
+        A built-in name or a TOML file; paper-designed by default.
+    atlas : STORE
+        The store of an atlas of the scene, shown beside it; without SCENE its scene is opened.
+    port : N
+        0 for any that is free.
+    address : HOST
+        Where the page listens; any other than 127.0.0.1 needs --allow-origin.
+    allow_origin : HOST:PORT
+        A name with its port under which browsers may ask for the page.
+    no_show
+        Do not open a browser.
+    """
     from limitsets.face.explorer.exploring import required
 
     required()
     from limitsets.face.explorer.visits import stored_atlas
 
-    with progress() as tell:
-        chosen = scene if scene is not None else FIRST if atlas is None else stored_atlas(atlas)[0]
-        explorer = open_page(chosen, atlas=atlas)
-        explorer.prepare(tell)
-    explorer.show(
-        address=address,
-        port=port,
-        origins=allow_origin or (),
-        show=not no_show,
-    )
+    chosen = scene or (FIRST if atlas is None else stored_atlas(atlas)[0])
+    explorer = ls.explore(chosen, atlas=atlas)
+    explorer.prepare(run.tell)
+
+    def words() -> tuple[str, ...]:
+        explorer.show(address=address, port=port, origins=allow_origin or (), show=not no_show)
+        return ()
+
+    return Answer(None, words)

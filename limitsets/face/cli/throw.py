@@ -1,4 +1,4 @@
-"""`limitsets throw` and `plot`: single throws, with what is worth knowing of each, and one figure."""
+"""`limitsets throw`, `plot` and `animate`: single throws, with what is worth knowing of each, a figure, a film."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
+import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.base.files import as_table
 from limitsets.base.tables import Column, Table
-from limitsets.face.cli.arguments import position
-from limitsets.face.cli.output import Csv, Form, Json, Out, Scene, answer, option, progress, saved, show
+from limitsets.face import report
+from limitsets.face.cli.arguments import place, position
+from limitsets.face.cli.commands import Answer, Form, Run, Scene, Seed, command, limits
+from limitsets.face.cli.output import saved, stem_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from matplotlib.figure import Figure
 
     from limitsets.feeder.thrower import Trace
@@ -26,41 +25,47 @@ if TYPE_CHECKING:
 MOST_THROWS = 1_000_000
 
 
+@command()
 def throw(
+    run: Run,
     scene: Scene,
-    x: Annotated[str, option("--x", "X", "Where the part rests: 8, or '20 cm'.")],
-    side: Annotated[int, option("--side", "I", "On which side.")],
-    count: Annotated[int, option("--count", "N", "How many throws.", min=1, max=MOST_THROWS)] = 1,
-    seed: Annotated[int, option("--seed", "N", "Of throws that scatter ([effects] spread).", min=0)] = 0,
-    out: Out = None,
-    csv: Csv = None,
-    json: Json = False,
-) -> None:
-    """Throw a part, and say what each throw does; ends at the first exit."""
-    from limitsets.feeder.scene import load
+    *,
+    x: str,
+    side: int,
+    count: Annotated[int, limits(min=1, max=1_000_000)] = 1,
+    seed: Seed = 0,
+) -> Answer:
+    """Throw a part, and say what each throw does; ends at the first exit.
+
+    Parameters
+    ----------
+    x : X
+        Where the part rests: 8, or '20 cm'.
+    side : I
+        On which side.
+    count : N
+        How many throws.
+    """
     from limitsets.feeder.thrower import trace
 
-    chosen = load(scene)
+    chosen = ls.load(scene)
     start = position(chosen, x)
-    with progress() as tell:
-        tell("throws (a first run compiles: up to half a minute)", 0, 1)
-        path = trace(chosen.map_of_seed(seed), start, side, count)
-    records = _records(path)
-
-    listing = _table(chosen.unit, (float(path.x[0]), int(path.side[0])), records)
-    answer(records, json, lambda: show(listing), out, (csv, lambda: listing))
+    run.tell("throws (a first run compiles: up to half a minute)", 0, 1)
+    path = trace(chosen.map_of_seed(seed), start, side, count)
+    notes = []
     if chosen.effects.auto:
-        typer.echo(
-            "limitsets: auto in [effects] is resolved by limitsets analyse; thrown with: "
-            + (", ".join(chosen.effects.on()) or "no effects"),
-            err=True,
-        )
+        effects = ", ".join(chosen.effects.on()) or "no effects"
+        notes.append(f"auto in [effects] is resolved by limitsets analyse; thrown with: {effects}")
     if path.reason is not None:
-        typer.echo(f"limitsets: outside-model: {path.reason}", err=True)
+        notes.append(f"outside-model: {path.reason}")
     if path.stopped == "stalled":
-        typer.echo(
-            "limitsets: stalled: the displacement is too small to change x any more; no fixed point", err=True
-        )
+        notes.append("stalled: the displacement is too small to change x any more; no fixed point")
+    return Answer(
+        lambda: _records(path),
+        lambda: [_table(chosen.unit, path)],
+        lambda: _table(chosen.unit, path),
+        notes=notes,
+    )
 
 
 def _records(path: Trace) -> list[dict[str, Any]]:
@@ -81,7 +86,7 @@ def _records(path: Trace) -> list[dict[str, Any]]:
     ]
 
 
-def _table(unit: str, start: tuple[float, int], records: list[dict[str, Any]]) -> Table:
+def _table(unit: str, path: Trace) -> Table:
     columns = (
         "throw",
         Column("x", unit, ".6f"),
@@ -91,15 +96,11 @@ def _table(unit: str, start: tuple[float, int], records: list[dict[str, Any]]) -
         Column("displacement", unit, "+.6g"),
         Column("another vertex lands first", show=lambda value: "yes" if value else ""),
     )
-    rows: list[tuple[Any, ...]] = [(0, *start, "start", None, None, False)]
-    for number, record in enumerate(records, start=1):
-        phi = record["phi"]
-        told = (
-            None if phi is None else math.degrees(phi),
-            record["displacement"],
-            record["other_vertex_first"],
-        )
-        rows.append((number, record["x"], record["side"], record["status"], *told))
+    rows: list[tuple[Any, ...]] = [(0, float(path.x[0]), int(path.side[0]), "start", None, None, False)]
+    for number, record in enumerate(_records(path), start=1):
+        phi = None if record["phi"] is None else math.degrees(record["phi"])
+        place = record["x"], record["side"], record["status"]
+        rows.append((number, *place, phi, record["displacement"], record["other_vertex_first"]))
     return Table(columns, rows, "Throws", "computed, not proved")
 
 
@@ -120,74 +121,167 @@ class Picture(StrEnum):
     FLIGHT = "flight"
 
 
+@command(csv=False)
 def plot(
+    run: Run,
     scene: Scene,
-    kind: Annotated[Picture, typer.Argument(metavar="KIND", help="What to draw.")],
-    out: Annotated[
-        Path | None,
-        option("--out -o", "FILE", f"File ({', '.join(FORMATS)}), ./NAME-KIND.FORMAT by default."),
-    ] = None,
-    cells: Annotated[int, option("--cells", "N", "Cells per side.", min=1, max=10_000_000)] = 4096,
-    x: Annotated[str | None, option("--x", "X", "For flight: where the part rests.")] = None,
-    side: Annotated[int | None, option("--side", "I", "For flight: on which side.")] = None,
-    form: Annotated[
-        Form | None, option("--format", "FORMAT", "png, svg or pdf; by default what FILE says, else png.")
-    ] = None,
-    json: Json = False,
-) -> None:
-    """Draw one figure of a scene."""
-    if form is not None and out is not None and out.suffix.lower() != f".{form}":
-        raise LimitsetsError("the figure's file", str(out), f"a name that ends in .{form}", "leave one out")
-    if out is not None and out.suffix.lower() not in FORMATS:
-        raise LimitsetsError(
-            "the figure's file", str(out), f"a name that ends in {', '.join(FORMATS)}", "rename it"
-        )
+    kind: Picture,
+    *,
+    cells: Annotated[int, limits(min=1, max=10_000_000)] = 4096,
+    x: str | None = None,
+    side: int | None = None,
+    form: Form | None = None,
+) -> Answer:
+    """Draw one figure of a scene.
+
+    Parameters
+    ----------
+    kind : KIND
+        What to draw.
+    cells : N
+        Cells per side.
+    x : X
+        For flight: where the part rests.
+    side : I
+        For flight: on which side.
+    form : FORMAT
+        png, svg or pdf; by default what FILE says, else png.
+    out : FILE
+        File (.png, .svg, .pdf), ./NAME-KIND.FORMAT by default.
+    """
+    if run.out is not None and run.out.suffix.lower() not in ([f".{form}"] if form else FORMATS):
+        endings = f".{form}" if form else ", ".join(FORMATS)
+        remedy = "leave one out" if form else "rename it"
+        raise LimitsetsError("the figure's file", str(run.out), f"a name that ends in {endings}", remedy)
     if (x is None) != (side is None) or (x is not None and kind is not Picture.FLIGHT):
         value = "half given" if kind is Picture.FLIGHT else "given"
         raise LimitsetsError("the throw to draw", value, "--x and --side, for a flight", "give both or none")
-    with progress() as tell:
-        from limitsets.face.report.writing import DPI
-
-        wrong: LimitsetsError | None = None
-        if kind is Picture.PART:
-            name, drawn, wrong = _part(scene)
-        else:
-            name, drawn = _figure(scene, kind, cells, x, side, tell)
-        file = out if out is not None else Path(f"{name}-{kind}.{form or Form.PNG}")
-        with saved(file) as draft:
-            drawn.savefig(draft, dpi=DPI)
-    answer({"figure": str(file)}, json, lambda: typer.echo(f"figure: {file}"))
-    if wrong is not None:
-        raise wrong
+    wrong: LimitsetsError | None = None
+    if kind is Picture.PART:
+        name, drawn, wrong = _part(scene)
+    else:
+        analysis = ls.analyse(scene, cells, progress=run.tell)
+        throw = None if x is None or side is None else (position(analysis.scene, x), side)
+        name, drawn = analysis.scene.name, report.writing.figure(analysis, str(kind), throw)
+    file = run.out or Path(f"{name}-{kind}.{form or Form.PNG}")
+    with saved(file) as draft:
+        drawn.savefig(draft, dpi=report.writing.DPI)
+    notes = [] if wrong is None else [str(wrong)]
+    return Answer({"figure": str(file)}, lambda: [f"figure: {file}"], code=2 if wrong else 0, notes=notes)
 
 
 def _part(scene: str) -> tuple[str, Figure, LimitsetsError | None]:
     """Draw the part, which needs no analysis; if it is refused, draw its readable corners and return the error."""
-    from limitsets.face.plot.parts import part, refused_part
-    from limitsets.feeder.scene import load
+    from limitsets.face.plot.parts import refused_part
     from limitsets.feeder.scene.reading import sketch
 
     try:
-        chosen = load(scene)
+        chosen = ls.load(scene)
     except LimitsetsError as error:
         outline = sketch(scene)
         if outline is None:
             raise
         return outline.name, refused_part(outline, str(error)), error
-    return chosen.name, part(chosen), None
+    return chosen.name, ls.plot.part(chosen), None
 
 
-def _figure(
-    scene: str,
-    kind: Picture,
-    cells: int,
-    x: str | None,
-    side: int | None,
-    tell: Callable[[str, int, int], None],
-) -> tuple[str, Figure]:
-    from limitsets.face.report.writing import figure
-    from limitsets.parameters.analysis import analyse as run
+# ----------------------------------------------------------------
+# `limitsets animate`: a film of throws, of feeding, of feedback, or of an orbit that violates the goal.
 
-    analysis = run(scene, cells, progress=tell)
-    throw = None if x is None or side is None else (position(analysis.scene, x), side)
-    return analysis.scene.name, figure(analysis, str(kind), throw)
+
+# Pairs thrown to find one that is assembled; drops counted for a tray, of which the film shows only the passes.
+PAIRS, FEW = 40, 20
+
+
+@command(csv=False)
+def animate(
+    run: Run,
+    scene: Scene,
+    *,
+    start: str | None = None,
+    throws: Annotated[int | None, limits(min=1)] = None,
+    feed: bool = False,
+    feedback: bool = False,
+    margin: str | None = None,
+    assemble: str | None = None,
+    standing: bool = False,
+    tray: bool = False,
+    parts: Annotated[int | None, limits(min=1, max=50)] = None,
+    reading: str | None = None,
+    fps: float = 20.0,
+    slow: float = 3.0,
+) -> Answer:
+    """Write a film: the arm swings up and stops, the part flies and lands, and where that is on the limit set.
+
+    Parameters
+    ----------
+    start : X,SIDE
+        x and side of the start: 15,2 or '38 cm,2'; default a good one, on the limit set.
+    throws : N
+        How many throws at most; default 8, and all of --feed and --feedback.
+    feed
+        Throw until the part falls into the scene's [cavity].
+    feedback
+        Find a policy for the scene's [feedback], and throw by it.
+    margin : QUANTITY
+        Show the orbit that violates the goal, at its margin of QUANTITY.
+    assemble : SCENE2
+        Throw the part together with another; both scenes in contact.
+    standing
+        With --assemble: the cavity stands, it is not thrown.
+    tray
+        Show a depression of the scene's [tray].
+    parts : N
+        With --tray: N parts a pass that push each other.
+    reading : R
+        Of the margin: fixed or per-throw.
+    fps : N
+        Frames per second.
+    slow : N
+        How many times slower than the machine.
+    out : FILE
+        A name that ends in .html or .gif; ./NAME.html by default.
+    """
+    if feed + feedback + tray + (margin is not None) + (assemble is not None) > 1:
+        value = "more than one of --feed, --feedback, --margin, --assemble, --tray"
+        raise LimitsetsError("what to show", value, "one of them", "make a film of each")
+    if reading is not None and margin is None:
+        raise LimitsetsError("the reading", reading, "with --margin", "name the quantity", key="--reading")
+    if parts is not None and not tray:
+        raise LimitsetsError("the parts", parts, "with --tray", "ask for a tray", key="--parts")
+    if standing and assemble is None:
+        raise LimitsetsError(
+            "the cavity", "standing", "with --assemble", "name the other part", key="--standing"
+        )
+    from limitsets.face.animation import require_file
+
+    chosen = ls.load(scene)
+    file = run.out or Path(f"{stem_of(chosen)}.html")
+    require_file(file)  # before anything is searched or proved
+    begin = None if start is None else _start(chosen, start)
+    if begin is not None and (tray or margin is not None or assemble is not None):
+        allowed = "none with --margin, --assemble and --tray, which have their own"
+        raise LimitsetsError("the start", start, allowed, "leave it out")
+    shown: Any = chosen  # or the answer that is to be shown, as far as a film needs it
+    if feed:
+        from limitsets.cell.feeding.falling import arm_end_of
+
+        shown = arm_end_of(chosen)
+    elif feedback:
+        shown = ls.feedback(chosen, progress=run.tell)
+    elif tray:
+        shown = ls.tray(chosen, passes=1, drops=FEW, kicks=FEW, parts=parts, batches=1, progress=run.tell)
+    elif assemble is not None:
+        shown = ls.assemble(chosen, assemble, carried=not standing, trials=PAIRS, progress=run.tell)
+    elif margin is not None:
+        (shown,) = ls.margin(chosen, margin, reading=reading, progress=run.tell)
+    ls.animate(shown, file, start=begin, throws=throws, fps=fps, slow=slow, progress=run.tell)
+    size = file.stat().st_size
+    return Answer({"film": str(file), "bytes": size}, lambda: [f"film: {file} ({size / 1e6:.2g} MB)"])
+
+
+def _start(scene: Any, text: str) -> tuple[float, int]:
+    x, comma, side = text.rpartition(",")
+    if not comma or not side.strip().isdigit():
+        raise LimitsetsError("the start", text, "X,SIDE, as in 15,2", "name both", key="--start")
+    return place(scene, x, "--start"), int(side)

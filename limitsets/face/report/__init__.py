@@ -2,4 +2,20 @@
 
 The reader of the page builds a feeder: places and sides of rest, reliability of the answer, and
 assumptions.  Numbers are read from the analysis, never computed anew here.
+
+A file is imported at its first use, so that the commands' help loads none.
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from limitsets.face.report import pages as pages
+    from limitsets.face.report import robust_pages as robust_pages
+    from limitsets.face.report import writing as writing
+else:
+
+    def __getattr__(name: str) -> Any:
+        if name not in ("pages", "robust_pages", "writing"):
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return import_module(f"{__name__}.{name}")

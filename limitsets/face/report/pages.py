@@ -64,17 +64,6 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join([line(heads), "|" + "---|" * len(heads), *(line(row) for row in rows)])
 
 
-def number(value: float | None, digits: int = 3) -> str:
-    """Write a number with a fixed count of decimals, or a dash.
-
-    Examples
-    --------
-    >>> number(19.7526), number(None)
-    ('19.753', '-')
-    """
-    return "-" if value is None else f"{value:z.{digits}f}"
-
-
 def percent(share: float) -> str:
     """Write a share; 0 % and 100 % are written only if the share is exactly that.
 

@@ -42,6 +42,9 @@ NUMBERS = {
     "escape": ("chance to leave the limit set, per throw", "rate"),
 }
 
+# How each kind is written, and how its changes are.
+FORMS = {"share": (".4g", "+.2g"), "throws": (".1f", "+.2f"), "rate": (".1e", "+.1e")}
+
 # Numbers whose changes with the noise are shown.
 MOVING = ("wrong beyond", "mean throws", "95 % throws", "escape")
 
@@ -244,31 +247,13 @@ def _places(curve: MarginsBeyond) -> Table:
     return heads, rows
 
 
-def _value(value: float | None, kind: str) -> str:
+def _written(value: float | None, kind: str, form: str) -> str:
+    """Write a number in a format, a share in percent; a difference has a sign."""
     if value is None or not math.isfinite(value):
         return "-"
-    if kind == "throws":
-        return f"{value:.1f}"
-    if value < NOTHING:
-        return "0" if value == 0.0 else f"below {NOTHING:g}"
-    return f"{value:.1e}" if kind == "rate" else f"{100.0 * value:.4g} %"
-
-
-def _error(value: float | None, kind: str) -> str:
-    """Write an error with two digits."""
-    if value is None or not math.isfinite(value) or value < NOTHING:
-        return _value(value, "share")
-    return f"{value:.2g}" if kind != "share" else f"{100.0 * value:.2g} %"
-
-
-def _change(value: float, kind: str) -> str:
-    if not math.isfinite(value):
-        return "-"
-    if kind == "throws":
-        return f"{value:+.2f}"
-    if abs(value) < NOTHING:
-        return "0"
-    return f"{value:+.1e}" if kind == "rate" else f"{100.0 * value:+.2g} %"
+    if kind != "throws" and abs(value) < NOTHING:
+        return "0" if value == 0.0 or form.startswith("+") else f"below {NOTHING:g}"
+    return f"{100.0 * value:{form}} %" if kind == "share" else f"{value:{form}}"
 
 
 def law_words(name: str, law: Law, unit: str) -> str:
@@ -295,20 +280,13 @@ def law_words(name: str, law: Law, unit: str) -> str:
 
 def _numbers(noise: NoiseStatistics, sides: int, rate: float | None) -> Table:
     rests = {f"time on side {k}": (f"rests on side {k}", "share") for k in range(sides)}
-    rows = [
-        [
-            told,
-            _value(noise.numbers.get(name), kind)
-            + (
-                in_time(noise.numbers.get(name), rate, parts=name == "mean throws")
-                if kind == "throws"
-                else ""
-            ),
-            _error(noise.errors.get(name), kind),
-        ]
-        for name, (told, kind) in (rests | NUMBERS).items()
-        if name in noise.numbers
-    ]
+    rows = []
+    for name, (caption, kind) in (rests | NUMBERS).items():
+        if name in noise.numbers:
+            value = noise.numbers[name]
+            time = in_time(value, rate, parts=name == "mean throws") if kind == "throws" else ""
+            error = _written(noise.errors.get(name), kind, ".2g")
+            rows.append([caption, _written(value, kind, FORMS[kind][0]) + time, error])
     return ["number", "computed", "change on halving"], rows
 
 
@@ -316,9 +294,10 @@ def _changes(noise: NoiseStatistics) -> Table:
     """Give the changes of the numbers with 10 % more noise of each quantity."""
     rows = []
     for quantity, slopes in noise.sensitivity.items():
-        changes = [0.1 * slopes[name].slope if name in slopes else math.nan for name in MOVING]
+        changes = {name: 0.1 * slopes[name].slope if name in slopes else math.nan for name in MOVING}
+        kinds = {name: NUMBERS[name][1] for name in MOVING}
         rows.append(
-            [quantity, *(_change(each, NUMBERS[name][1]) for each, name in zip(changes, MOVING, strict=True))]
+            [quantity, *(_written(changes[name], kinds[name], FORMS[kinds[name]][1]) for name in MOVING)]
         )
     return ["with 10 % more noise of", *(NUMBERS[name][0] for name in MOVING)], rows
 

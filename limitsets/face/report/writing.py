@@ -11,11 +11,8 @@ from typing import TYPE_CHECKING
 
 from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.base.files import as_json, replaced
+from limitsets.base.progress import Progress
 from limitsets.face import plot
-from limitsets.face.plot.basin import basins, morse
-from limitsets.face.plot.limit_sets import limit_set
-from limitsets.face.plot.limit_sets import map as map_of_scene
-from limitsets.face.plot.parts import flight, part
 from limitsets.face.plot.style import stretch
 from limitsets.face.report.pages import as_html, as_uri, page, percent, words
 from limitsets.systems.maps import FLIP
@@ -26,8 +23,6 @@ if TYPE_CHECKING:
     from limitsets.parameters.analysis import Analysis
     from limitsets.proofs.auditing import Audit, Finding
 
-
-Progress = Callable[[str, int, int], None]
 
 DPI = 150
 FIGURES = ("part", "limit-set", "map", "basins", "morse", "flight")
@@ -66,19 +61,17 @@ def figure(analysis: Analysis, kind: str, throw: tuple[float, int] | None = None
         For another kind.
     """
     scene, sets = analysis.scene, analysis.extents
-    if kind == "part":
-        return part(scene)
-    if kind == "limit-set":
-        return limit_set(scene, sets)
-    if kind == "map":
-        return map_of_scene(scene, sets)
-    if kind == "basins":
-        return basins(scene, analysis.basins, sets)
-    if kind == "morse":
-        return morse(analysis.morse, scene.name, scene.unit)
-    if kind == "flight":
-        return flight(scene, *(throw or _typical_throw(analysis)))
-    raise LimitsetsError("the kind of figure", kind, ", ".join(FIGURES), "correct the word")
+    drawings: dict[str, Callable[[], Figure]] = {
+        "part": lambda: plot.part(scene),
+        "limit-set": lambda: plot.limit_set(scene, sets),
+        "map": lambda: plot.map(scene, sets),
+        "basins": lambda: plot.basins(scene, analysis.basins, sets),
+        "morse": lambda: plot.morse(analysis.morse, scene.name, scene.unit),
+        "flight": lambda: plot.flight(scene, *(throw or _typical_throw(analysis))),
+    }
+    if kind not in drawings:
+        raise LimitsetsError("the kind of figure", kind, ", ".join(drawings), "correct the word")
+    return drawings[kind]()
 
 
 def require_place(folder: str | Path) -> None:

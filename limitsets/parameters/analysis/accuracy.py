@@ -13,20 +13,18 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.base.files import as_table, picked
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from limitsets.feeder.scene import Scene
-    from limitsets.systems.graph import TransitionGraph
-    from limitsets.systems.sets import Attractor, LimitSet
-
+from limitsets.feeder.scene import Scene
+from limitsets.systems.cells import grid
+from limitsets.systems.graph import TransitionGraph, transitions
+from limitsets.systems.maps import has_slope, orbit
+from limitsets.systems.sets import Attractor, LimitSet, attractors, limit_set
 
 Extents = dict[int, list[tuple[float, float]]]
 
@@ -150,13 +148,6 @@ class Accuracy:
         )
 
 
-def require_error(error: float) -> float:
-    """Refuse an error that nobody can ask for."""
-    if not (isinstance(error, int | float) and math.isfinite(error) and error > 0):
-        raise AnswerError("the error", error, "a number > 0, in the scene's unit", "pass error=1e-6")
-    return float(error)
-
-
 # ---------------------------------------------------------------- before
 
 
@@ -171,33 +162,28 @@ class _Trial:
     limits: Sequence[LimitSet]
 
 
-def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
-    from limitsets.systems.cells import grid
-    from limitsets.systems.graph import transitions
-    from limitsets.systems.sets import attractors
-
-    stops = [time.perf_counter()]
+def _timed_graph(scene: Scene, cells: int) -> tuple[TransitionGraph, float]:
+    """Give the graph of so many cells a side, its attracting components found, and the seconds that this takes."""
+    begin = time.perf_counter()
     graph = transitions(scene.map, grid(scene.domain, cells=cells))
     _ = graph.condensation().attracting
-    stops.append(time.perf_counter())
+    return graph, time.perf_counter() - begin
+
+
+def _trial(scene: Scene, cells: int, throws: int) -> _Trial:
+    graph, seconds = _timed_graph(scene, cells)
+    stops = [time.perf_counter()]
     sets = attractors(graph, throws)
     stops.append(time.perf_counter())
     limits = [limit_of(graph, each) for each in sets]
     stops.append(time.perf_counter())
-    graph_took, orbits, ends = np.diff(stops).tolist()
-    return _Trial(graph_took, orbits, ends, sets, limits)
+    orbits, ends = np.diff(stops).tolist()
+    return _Trial(seconds, orbits, ends, sets, limits)
 
 
 def _seconds_of_graph(scene: Scene, cells: int) -> float:
     """Time of a graph of so many cells a side, from that of one that takes a few hundredths of a second."""
-    from limitsets.systems.cells import grid
-    from limitsets.systems.graph import transitions
-
-    best = math.inf
-    for _ in range(TIMES):
-        begin = time.perf_counter()
-        _ = transitions(scene.map, grid(scene.domain, cells=MANY)).condensation().attracting
-        best = min(best, time.perf_counter() - begin)
+    best = min(_timed_graph(scene, MANY)[1] for _ in range(TIMES))
     return float(best * (cells / MANY) ** EXPONENT_OF_SECONDS)
 
 
@@ -276,14 +262,15 @@ def plan_for(scene: Scene, error: float, throws: int = 200_000) -> Plan:
     >>> plan_for(ls.load("paper-designed"), 1e-6).chosen.method
     'end points'
     """
-    asked = require_error(error)
+    if not (isinstance(error, int | float) and math.isfinite(error) and error > 0):
+        raise AnswerError("the error", error, "a number > 0, in the scene's unit", "pass error=1e-6")
     coarse = _trial(scene, COARSE, 1)  # first, and untimed: it may have to compile
     fine = _trial(scene, FINE, throws)
-    ways = [_by_cells(scene, coarse, fine, asked), _by_end_points(fine)]
-    good = sorted((way for way in ways if way.error <= asked), key=lambda way: way.seconds)
+    ways = [_by_cells(scene, coarse, fine, error), _by_end_points(fine)]
+    good = sorted((way for way in ways if way.error <= error), key=lambda way: way.seconds)
     ranked = good + sorted((way for way in ways if way not in good), key=lambda way: way.error)
     other = ranked[1] if math.isfinite(ranked[1].error) else None
-    return Plan(asked, scene.unit, ranked[0], other, bool(good))
+    return Plan(float(error), scene.unit, ranked[0], other, bool(good))
 
 
 def best_extents(attractors: Sequence[Attractor], limits: Sequence[LimitSet]) -> tuple[Extents, ...]:
@@ -294,16 +281,11 @@ def best_extents(attractors: Sequence[Attractor], limits: Sequence[LimitSet]) ->
 
 def left_to_cells() -> LimitSet:
     """Say that end points were not looked for, because the borders of cells meet the error."""
-    from limitsets.systems.sets import LimitSet
-
     return LimitSet({}, (), 0, False, False, "end points were not looked for: cells meet the error asked for")
 
 
 def limit_of(graph: TransitionGraph, attractor: Attractor) -> LimitSet:
     """Its end points; the cells where the map's branches cannot be followed one by one."""
-    from limitsets.systems.maps import has_slope
-    from limitsets.systems.sets import LimitSet, limit_set
-
     if has_slope(graph.map):
         return limit_set(graph, attractor)
     advice = "with effects on a throw has more branches than this version follows"
@@ -373,8 +355,6 @@ class _Visited:
 
 def _from_inside(scene: Scene, attractor: Attractor, asked: float) -> float:
     """Distance of the cells from an orbit inside, which is followed until it is small enough."""
-    from limitsets.systems.maps import orbit
-
     parts = [
         _Visited(side, lo, hi, asked / 4.0)
         for side, pairs in sorted(attractor.extents.items())

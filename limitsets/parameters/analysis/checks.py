@@ -9,18 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches, evaluate
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-    from limitsets.systems.graph import TransitionGraph
-    from limitsets.systems.sets import Attractor, Basins
-
+from limitsets.feeder.scene import Scene
+from limitsets.feeder.thrower import impact_angles
+from limitsets.proofs.auditing.judging import where
+from limitsets.systems.graph import TransitionGraph
+from limitsets.systems.graph.components import reach
+from limitsets.systems.maps import advance, along, codes, has_slope, images, monotone_pieces
+from limitsets.systems.sets import Attractor, Basins
 
 # ----------------------------------------------------------------
 # Places at which an assumption of the model is broken: a flag beside the answers, never a state of the map.
@@ -59,9 +60,6 @@ def other_vertex_first(scene: Scene) -> dict[int, list[tuple[float, float]]]:
     >>> [(side, round(lo, 4)) for side, parts in found.items() for lo, _ in parts]
     [(0, 20.1517), (1, 26.4235)]
     """
-    from limitsets.feeder.thrower import impact_angles
-    from limitsets.proofs.auditing.judging import where
-
     if scene.effects.landing:
         return {side: [] for side in range(len(scene.sides))}
     by_side = {}
@@ -135,8 +133,6 @@ class GoalOutcome:
 
 def _may_leave(graph: TransitionGraph) -> float:
     """Share of the starts from which some path leaves the arm."""
-    from limitsets.systems.graph.components import reach
-
     leads_out = reach(graph.ranges, graph.components(), graph.ranges.exits) != 0
     weight = graph.grid.measure
     return float(weight[leads_out].sum() / weight.sum())
@@ -144,8 +140,6 @@ def _may_leave(graph: TransitionGraph) -> float:
 
 def _after_any_throw(graph: TransitionGraph) -> Extents:
     """Where a part can rest after one throw or more: the image of the whole domain holds all later images."""
-    from limitsets.systems.maps import along, has_slope, monotone_pieces
-
     if not has_slope(graph.map):
         return _seen_after_a_throw(graph)
     domain = graph.grid.domain
@@ -163,8 +157,6 @@ def _after_any_throw(graph: TransitionGraph) -> Extents:
 
 def _seen_after_a_throw(graph: TransitionGraph) -> Extents:
     """Find the same from images of the cells' ends, where the map's branches cannot be followed one by one."""
-    from limitsets.systems.maps import images
-
     by_side: dict[int, list[tuple[float, float]]] = {}
     for side, (edges,) in enumerate(graph.grid.edges):
         there = images(graph.map, edges, side)
@@ -287,8 +279,6 @@ def against_starts(graph: TransitionGraph, attractors: Sequence[Attractor], basi
     -------
     Starts
     """
-    from limitsets.systems.maps import advance, codes
-
     grid, rng = graph.grid, np.random.default_rng(0)
     length = grid.domain.hi[:, 0] - grid.domain.lo[:, 0]
     side = rng.choice(grid.sides, STARTS, p=length / length.sum())

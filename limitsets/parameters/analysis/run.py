@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from limitsets.base.arguments import arguments_checked
 from limitsets.base.errors import AnswerError
 from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base.progress import Progress, shown_in_notebooks
 from limitsets.base.tables import Column, Table, Tabled, bands_of, facts
+from limitsets.feeder.goals import Goal
+from limitsets.feeder.scene import Scene, load_to_analyse
 from limitsets.parameters.analysis.accuracy import (
     CELLS as BY_CELLS,
 )
@@ -24,7 +26,6 @@ from limitsets.parameters.analysis.accuracy import (
     left_to_cells,
     limit_of,
     plan_for,
-    require_error,
     verified,
 )
 from limitsets.parameters.analysis.checks import (
@@ -34,21 +35,19 @@ from limitsets.parameters.analysis.checks import (
     goal_outcome,
     other_vertex_first,
 )
+from limitsets.proofs.auditing import EffectChoice, choose_effects
+from limitsets.systems.cells import CellSet, Grid, grid
+from limitsets.systems.graph import TransitionGraph, morse_graph, transitions
+from limitsets.systems.maps import critical_points
+from limitsets.systems.maps.critical import CriticalPoint
+from limitsets.systems.sets import Attractor, Basins, Cycle, LimitSet, attractors, basins, spurious
+from limitsets.systems.sets import cycles as cycles_of
 
 if TYPE_CHECKING:
     import networkx as nx
 
-    from limitsets.feeder.goals import Goal
-    from limitsets.feeder.scene import Scene
-    from limitsets.proofs.auditing import EffectChoice
-    from limitsets.systems.cells import CellSet, Grid
-    from limitsets.systems.graph import TransitionGraph
-    from limitsets.systems.maps.critical import CriticalPoint
-    from limitsets.systems.sets import Attractor, Basins, Cycle, LimitSet
-
 
 Extents = dict[int, list[tuple[float, float]]]
-Progress = Callable[[str, int, int], None]
 
 # Spurious sets that are written to JSON: the largest.
 SPURIOUS_WRITTEN = 20
@@ -271,10 +270,6 @@ class _GridAnswer(NamedTuple):
 
 def _on_grid(scene: Scene, cells: int, throws: int, steps: _Steps) -> _GridAnswer:
     """Look at one grid."""
-    from limitsets.systems.cells import grid
-    from limitsets.systems.graph import transitions
-    from limitsets.systems.sets import attractors, basins
-
     with steps.step("transitions"):
         graph = transitions(scene.map, grid(scene.domain, cells=cells))
     with steps.step("attractors"):
@@ -385,27 +380,19 @@ def analyse(
     >>> found.goal.holds, round(found.goal.threshold, 3)  # beyond 20 in every part lies on side 2
     (True, 19.753)
     """
-    from limitsets.feeder.scene import load_to_analyse
-    from limitsets.proofs.auditing import choose_effects
-    from limitsets.systems.graph import morse_graph
-    from limitsets.systems.maps import critical_points
-    from limitsets.systems.sets import cycles as cycles_of
-    from limitsets.systems.sets import spurious
-
     if cycles < 0:
         raise AnswerError("the longest period", cycles, "an integer from 0", "pass cycles=0 for none")
     if cells is not None and error is not None:
         raise AnswerError("the cells", cells, "none beside an error", "give cells or error, not both")
-    asked_error = None if error is None else require_error(error)
-    steps = _Steps(10 + (cycles > 0) + 2 * (asked_error is not None), progress)
+    steps = _Steps(10 + (cycles > 0) + 2 * (error is not None), progress)
     with steps.step("scene"):
         read, tipping = load_to_analyse(scene)
         choice = replace(choose_effects(read), tipping=tipping)
         chosen = choice.scene
     plan = None
-    if asked_error is not None:
+    if error is not None:
         with steps.step("plan"):
-            plan = plan_for(chosen, asked_error, throws)
+            plan = plan_for(chosen, error, throws)
         if announce is not None:
             announce(plan)
     count = plan.chosen.cells if plan is not None else CELLS if cells is None else cells
