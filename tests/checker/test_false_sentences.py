@@ -18,22 +18,15 @@ FOOT = 4.4179581  # a of side 2
 
 def chances(starts, x, within, laws=None):
     """Parts of the small-angle scene that end at x or beyond on side 2."""
-    return certificate(
-        "small",
-        laws or {"landing.x": "0.05 in"},
-        starts,
-        {"right": [[2, f"{x} in", None]]},
-        mesh("small", STEPS, {2: [x]}),
-        within,
-    )
+    laws, right = laws or {"landing.x": "0.05 in"}, {"right": [[2, f"{x} in", None]]}
+    return certificate("small", laws, starts, right, mesh("small", STEPS, {2: [x]}), within)
 
 
 def test_a_scatter_beyond_all_nodes_is_refused(tmp_path):
     """An arm of 40 in hardly ever catches a part that is scattered over 20 000 in both ways: nearly all exit."""
     rows = np.array([[0.0, 1e-6], [0.0, 0.6], [0.0, 0.6]])
-    report = verdict(
-        chances([[2, "15 in", "16 in"]], 18.0, {"exits": rows}, {"landing.x": "20000 in"}), tmp_path
-    )
+    forged = chances([[2, "15 in", "16 in"]], 18.0, {"exits": rows}, {"landing.x": "20000 in"})
+    report = verdict(forged, tmp_path)
     assert (report.verdict, report.reason) == ("bad file", "landings are too far out")
 
 
@@ -117,18 +110,9 @@ def one_throw(goal, begins, name="own"):
         "within": 1,
         "first": {"any": 0},
     }
-    header = {
-        "format": "limitsets-proof",
-        "version": 2,
-        "map": {"name": "throw", "version": 1, **scene["model"]},
-        "noise": {"landing.x": "1 in"},
-        "tolerance": None,
-        "boxes": [],
-        "claims": [{"claim": "policy", "section": section}],
-    }
+    header = forge.alone(scene, "policy", section, noise={"landing.x": "1 in"})
     arrays = {
-        "edges.0": np.array([5.0, 28.0]),
-        "edges.1": np.array([5.0, 28.0]),
+        **{f"edges.{side}": np.array([5.0, 28.0]) for side in (0, 1)},
         "edges.2": np.array([begins, 4.4, 4.6, 28.0]),
         "0.jog": jog,
         "0.flip": flip,

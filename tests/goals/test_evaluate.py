@@ -20,18 +20,9 @@ from limitsets.feeder.goals import (
 )
 from limitsets.feeder.scene import load
 from limitsets.parameters.margins.single import goals_of
+from tests.test_paper import LIMIT_SETS
 
-# the limit sets of two paper scenes (docs/model.md)
-DESIGNED = {
-    0: [(15.205338825681, 19.75268801485)],
-    1: [(12.637023572659, 17.439819281769)],
-    2: [(8.9140259080455, 23.383151921158)],
-}
-INITIAL = {
-    0: [(13.522673689975, 20.915912223359)],
-    1: [(18.994941734574, 19.975954977782), (20.434045200511, 21.554457325114)],
-    2: [(16.262705754072, 21.886351326378)],
-}
+DESIGNED, INITIAL = LIMIT_SETS["paper-designed"], LIMIT_SETS["paper-initial"]
 
 
 @pytest.mark.parametrize(

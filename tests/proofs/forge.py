@@ -9,6 +9,7 @@ import hashlib
 import io
 import json
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import networkx as nx
@@ -36,15 +37,11 @@ LENGTHS = (5.75, 3.6, 6.75)
 
 def scene(model: str) -> dict:
     flight, flip, along, above, kappa, height, arm = MODELS[model]
+    center = {"side": 2, "along": along, "above": above}
+    mass = {"center": center, "radius_of_gyration": "1.25 in"}
     return {
         "name": f"forged-{model}",
-        "part": {
-            "sides": ["5.75 in", "3.6 in", "6.75 in"],
-            "mass": {
-                "center": {"side": 2, "along": along, "above": above},
-                "radius_of_gyration": "1.25 in",
-            },
-        },
+        "part": {"sides": ["5.75 in", "3.6 in", "6.75 in"], "mass": mass},
         "arm": {"surface_height": height, "length": arm},
         "throw": {"kappa": kappa},
         "model": {"flight": flight, "flip": flip},
@@ -169,6 +166,63 @@ class Forged:
     def write(self, path: Path) -> Path:
         path.write_bytes(self.bytes())
         return path
+
+
+def alone(raw: dict, claim: str, section: dict, **more: object) -> dict:
+    """The header of a claim that needs no boxes."""
+    of_map = {"name": "throw", "version": 1, **raw["model"]}
+    header = {"format": "limitsets-proof", "version": 2, "map": of_map, "noise": None, "tolerance": None}
+    return header | {"boxes": [], "claims": [{"claim": claim, "section": section}]} | more
+
+
+def opened(path: Path) -> Forged:
+    """A certificate that can be spoiled and sealed again."""
+    with zipfile.ZipFile(path) as file, np.load(io.BytesIO(file.read("arrays.npz"))) as arrays:
+        return Forged(json.loads(file.read("header.json")), dict(arrays))
+
+
+def _place(header: dict, path: tuple) -> tuple:
+    *words, last = path
+    for word in words:
+        header = header[word]
+    return header, last
+
+
+def put(*path_and_value: object) -> Callable[[Forged], None]:
+    """A change of a header: an entry, its path and its value."""
+    *path, value = path_and_value
+
+    def change(f: Forged) -> None:
+        table, last = _place(f.header, tuple(path))
+        table[last] = value
+
+    return change
+
+
+def leave_out(*path: object) -> Callable[[Forged], None]:
+    """A change of a header: an entry less."""
+
+    def change(f: Forged) -> None:
+        table, last = _place(f.header, path)
+        del table[last]
+
+    return change
+
+
+def rewritten(path: Path, target: Path, change: Callable[[dict], None]) -> Path:
+    """The same certificate with another header."""
+    with zipfile.ZipFile(path) as file:
+        header, arrays = json.loads(file.read("header.json")), file.read("arrays.npz")
+    change(header)
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as file:
+        file.writestr("header.json", json.dumps(header))
+        file.writestr("arrays.npz", arrays)
+    return target
+
+
+def with_section(path: Path, target: Path, change: Callable[[dict], None]) -> Path:
+    """The same certificate with another section of its first claim."""
+    return rewritten(path, target, lambda header: change(header["claims"][0]["section"]))
 
 
 def graded(start: float, end: float, first: float, ratio: float, widest: float) -> np.ndarray:
@@ -303,52 +357,29 @@ def forge(
         cells = inside[starts[i] : starts[i + 1]]
         x = np.concatenate([edges[i][:-1][cells], edges[i][1:][cells]])
         slopes += [m.slope(i, x, k).min() for k in (m.k_lo, m.k_hi) if len(x)]
-    claims = [
-        {
-            "claim": "attracts-all",
-            "section": {
-                "near_joint": {str(i): near_joint(m, i, begin[i], edges[i][0]) for i in range(3)},
-                "max_rank": int(rank.max()),
-            },
-        },
-        {"claim": "invariant", "section": {}},
-        {"claim": "trapping", "section": {}},
-        {"claim": "expanding", "section": {"least_slope": float(1 + (min(slopes) - 1) * 0.7).hex()}},
-        {"claim": "goal", "section": {"kind": "oriented_beyond", "x": "20 in", "side": 2}},
-    ]
-    claims[4]["section"] |= starts_of(m, edges, rank, claims[0]["section"]["near_joint"], landing)
+    near = {str(i): near_joint(m, i, begin[i], edges[i][0]) for i in range(3)}
+    goal = {"kind": "oriented_beyond", "x": "20 in", "side": 2}
+    sections = {
+        "attracts-all": {"near_joint": near, "max_rank": int(rank.max())},
+        "invariant": {},
+        "trapping": {},
+        "expanding": {"least_slope": float(1 + (min(slopes) - 1) * 0.7).hex()},
+        "goal": goal | starts_of(m, edges, rank, near, landing),
+    }
+    claims = [{"claim": claim, "section": section} for claim, section in sections.items()]
+    parameters: dict = {"a": [*map(box, m.a)], "d": [*map(box, m.d)], "length": [*map(box, LENGTHS)]}
+    parameters |= {"kappa": box(m.k_lo, m.k_hi), "surface_height": box(m.h)}
+    parameters |= {"arm_length": box(m.arm), "radius_of_gyration": box(m.rho)}
+    spread = {"throw.speed": f"{noise * 100:.6g} %"} if noise else {}
+    spread |= {"landing.x": f"{landing!r} in"} if landing else {}
     header = {
         "format": "limitsets-proof",
         "version": 2,
-        "map": {
-            "name": "throw",
-            "version": 1,
-            "flight": MODELS[model][0],
-            "flip": MODELS[model][1],
-            "formulas": [],
-        },
+        "map": {"name": "throw", "version": 1, **data["model"], "formulas": []},
         "state": "x of the centre of mass at rest, and the side it rests on",
-        "noise": {
-            **({"throw.speed": f"{noise * 100:.6g} %"} if noise else {}),
-            **({"landing.x": f"{landing!r} in"} if landing else {}),
-        }
-        or None,
+        "noise": spread or None,
         "tolerance": None,
-        "boxes": [
-            {
-                "scene": data,
-                "prefix": "0.",
-                "parameters": {
-                    "a": [box(a) for a in m.a],
-                    "d": [box(d) for d in m.d],
-                    "length": [box(length) for length in LENGTHS],
-                    "kappa": box(m.k_lo, m.k_hi),
-                    "surface_height": box(m.h),
-                    "arm_length": box(m.arm),
-                    "radius_of_gyration": box(m.rho),
-                },
-            }
-        ],
+        "boxes": [{"scene": data, "prefix": "0.", "parameters": parameters}],
         "claims": claims,
         "arrays": {},
         "producer": {"name": "forge"},
@@ -421,11 +452,12 @@ def at_rest(m: Plain, union: list, pieces: list[tuple], grow: float) -> tuple[li
                     x0, x1 = (m.jog, m.flip)[throw](i, np.array([lo, hi]), m.kappa).tolist()
                     if x0 - grow <= x1 + grow:
                         images[(i + throw) % 3].append((x0 - grow, x1 + grow))
+        pairs = (
+            [(*a, *b) for a in one for b in joined(other)] for one, other in zip(union, images, strict=True)
+        )
         smaller = [
-            joined(
-                [(max(a, c), min(b, d)) for a, b in one for c, d in joined(other) if max(a, c) <= min(b, d)]
-            )
-            for one, other in zip(union, images, strict=True)
+            joined([(max(a, c), min(b, d)) for a, b, c, d in side if max(a, c) <= min(b, d)])
+            for side in pairs
         ]
         if smaller == union:
             return union, count
@@ -497,17 +529,12 @@ def with_sets(f: Forged, model: str) -> Forged:
         for one, other in zip(outer[i], inner[i], strict=True)
         for which, out, within in zip(("lo", "hi"), one, other, strict=True)
     ]
+    written = [[i, lo.hex(), hi.hex(), branch, sign] for i, lo, hi, branch, sign in pieces]
+    sections = {
+        "invariant": {},
+        "end-points": {"images": images, "ends": ends, "pieces": written},
+        "cycles": {"cycles": cycles_of(m, spans, 2), "complete": False},
+    }
     f = f.copy()
-    f.header["claims"] = [
-        {"claim": "invariant", "section": {}},
-        {
-            "claim": "end-points",
-            "section": {
-                "images": images,
-                "ends": ends,
-                "pieces": [[i, lo.hex(), hi.hex(), branch, sign] for i, lo, hi, branch, sign in pieces],
-            },
-        },
-        {"claim": "cycles", "section": {"cycles": cycles_of(m, spans, 2), "complete": False}},
-    ]
+    f.header["claims"] = [{"claim": claim, "section": section} for claim, section in sections.items()]
     return f

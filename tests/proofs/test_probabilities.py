@@ -20,6 +20,7 @@ from limitsets.proofs.chances.absorption import absorption_brackets
 from limitsets.proofs.prover.certificate import DeniedError
 from tests.closed_forms import ladder
 from tests.proofs import forge
+from tests.proofs.forge import put
 from tests.proofs.test_recheck import checker, verdict
 
 pytestmark = pytest.mark.usefixtures("precision")
@@ -55,18 +56,13 @@ def certificate(model, laws, starts, absorbing, edges, within, **more):
         "quantiles": [],
         "mean": None,
     } | more
-    header = {
-        "format": "limitsets-proof",
-        "version": 2,
-        "map": {"name": "throw", "version": 1, **scene["model"]},
-        "noise": None,
-        "tolerance": None,
-        "boxes": [],
-        "claims": [{"claim": "probabilities", "section": section}],
-    }
+    header = forge.alone(scene, "probabilities", section)
     arrays = {f"edges.{side}": each for side, each in enumerate(edges)}
     arrays |= {f"within.{k}": np.asarray(each, dtype=float) for k, each in enumerate(within.values())}
     return forge.Forged(header, arrays).seal()
+
+
+AT = ("claims", 0, "section")
 
 
 def section_of(forged):
@@ -85,14 +81,9 @@ def by_hand(off_lo=0.0, off_hi=0.0):
     said = np.stack([EXACT - 1e-3 + off_lo, EXACT + 1e-3 + off_hi], axis=1)
     said = np.stack([np.minimum(*said.T), np.maximum(*said.T)], axis=1)
     steps = [np.linspace(2, 40, 20), np.linspace(2, 40, 20), np.linspace(14.5, 18.5, 1200)]
-    return certificate(
-        "small",
-        {"landing.x": "0.05 in"},
-        [[2, "15 in", "16 in"]],
-        {"right": [[2, "18 in", None]]},
-        mesh("small", steps, {2: [18.0]}),
-        {"right": said},
-    )
+    starts, places = [[2, "15 in", "16 in"]], {"right": [[2, "18 in", None]]}
+    edges = mesh("small", steps, {2: [18.0]})
+    return certificate("small", {"landing.x": "0.05 in"}, starts, places, edges, {"right": said})
 
 
 def test_a_chain_solved_by_hand_is_proved(tmp_path):
@@ -169,17 +160,14 @@ def entries_of(forged, tmp_path):
 def good(tmp_path_factory):
     """The certificate that claims what the checker finds, and no more."""
     with flint.ctx.workprec(checker.balls.PRECISION):
-        chances, module, links = (
-            sys.modules[f"{checker.__name__}.{name}"] for name in ("brackets", "brackets", "links")
-        )
-        claim = chances.read_chances(*entries_of(noisy(), tmp_path_factory.mktemp("probabilities")))
+        module, links = (sys.modules[f"{checker.__name__}.{name}"] for name in ("brackets", "links"))
+        claim = module.read_chances(*entries_of(noisy(), tmp_path_factory.mktemp("probabilities")))
         whole = module.mesh_of(claim.edges)
         chain = links.chain_of(claim.noisy, whole, *module.kinds_of(claim, whole), lambda more: None)
         row = module.start_row(claim, whole)
         found = {name: module.check_within(chain, row, name, said)[1] for name, said in claim.within.items()}
-    return noisy(
-        found, quantiles=[["any", "50 %", *median_of(found["any"])]], mean=[(12.2).hex(), (12.4).hex()]
-    )
+    quantiles = [["any", "50 %", *median_of(found["any"])]]
+    return noisy(found, quantiles=quantiles, mean=[(12.2).hex(), (12.4).hex()])
 
 
 def median_of(pair):
@@ -189,9 +177,7 @@ def median_of(pair):
 @pytest.mark.sweep
 def test_brackets_of_the_checker_hold_what_is_thrown(good, thrown, tmp_path):
     right, wrong, times = thrown
-    claimed = dict(
-        zip(section_of(good)["names"], (good.arrays[f"within.{k}"] for k in range(3)), strict=True)
-    )
+    claimed = {name: good.arrays[f"within.{k}"] for k, name in enumerate(section_of(good)["names"])}
     for name, counts in (("right", right), ("wrong", wrong)):
         low, high = interval(counts)
         assert (low <= claimed[name][:, 1]).all()
@@ -206,18 +192,6 @@ def test_brackets_of_the_checker_hold_what_is_thrown(good, thrown, tmp_path):
 
 
 # ------------------------------------------------------------------------------------------------- forgeries
-
-
-def changed(word, value, *path):
-    """Change an entry of the section."""
-
-    def change(forged):
-        at = section_of(forged)
-        for key in path:
-            at = at[key]
-        at[word] = value
-
-    return change
 
 
 def moved(name, column, by):
@@ -246,45 +220,33 @@ def without_edges(forged):
         forged.arrays[f"edges.{side}"][-1] = 28.0
 
 
-def fewer_sides(forged):
-    del forged.arrays["edges.2"]
-
-
 def shifted(forged):
     """Brackets of n throws said of n + 1."""
-    forged.arrays["within.0"] = np.concatenate(
-        [forged.arrays["within.0"][:1], forged.arrays["within.0"][:-1]]
-    )
-
-
-def sides_swapped(forged):
-    places = section_of(forged)["absorbing"]
-    places["right"][0][0], places["wrong"][0][0] = 0, 2
-
-
-def swapped(forged):
-    section_of(forged)["names"][:2] = "wrong", "right"
+    rows = forged.arrays["within.0"]
+    forged.arrays["within.0"] = np.concatenate([rows[:1], rows[:-1]])
 
 
 FALSE = {
-    "landing narrower": changed("uniform", "0.1 in", "laws", "landing.x"),
-    "speed narrower": changed("uniform", "0.2 %", "laws", "throw.speed"),
-    "start law moved": changed(1, "10 in", "starts", 0),
+    "landing narrower": put(*AT, "laws", "landing.x", "uniform", "0.1 in"),
+    "speed narrower": put(*AT, "laws", "throw.speed", "uniform", "0.2 %"),
+    "start law moved": put(*AT, "starts", 0, 1, "10 in"),
     "a start dropped": lambda forged: section_of(forged)["starts"].pop(),
     "nodes dropped": without_edges,
     "P lower end raised": moved("within.0", 0, 0.02),
     "P upper end lowered": moved("within.0", 1, -0.02),
     "quantile lowered": quantile_of(-1),
     "quantile raised": quantile_of(1),
-    "share raised": changed(1, "99 %", "quantiles", 0),
-    "mean raised": changed("mean", [(12.35).hex(), None]),
-    "mean bounded": changed("mean", [(12.0).hex(), (12.2).hex()]),
-    "X moved": changed(1, "19 in", "absorbing", "right", 0),
-    "side swapped": sides_swapped,
-    "names swapped": swapped,
+    "share raised": put(*AT, "quantiles", 0, 1, "99 %"),
+    "mean raised": put(*AT, "mean", [(12.35).hex(), None]),
+    "mean bounded": put(*AT, "mean", [(12.0).hex(), (12.2).hex()]),
+    "X moved": put(*AT, "absorbing", "right", 0, 1, "19 in"),
+    "sides swapped": lambda f: [
+        put(*AT, "absorbing", word, 0, 0, side)(f) for word, side in (("right", 0), ("wrong", 2))
+    ],
+    "names swapped": put(*AT, "names", ["wrong", "right", "any"]),
     "n shifted": shifted,
-    "kappa changed": changed("kappa", "30 in", "scene", "throw"),
-    "strata few": changed("strata", 1),
+    "kappa changed": put(*AT, "scene", "throw", "kappa", "30 in"),
+    "strata few": put(*AT, "strata", 1),
 }
 
 
@@ -299,26 +261,24 @@ def test_what_has_become_false_is_not_proved(good, tmp_path, name):
 
 
 ODD = {
-    "uniform laws only": changed("landing.x", {"gaussian": "0.2 in"}, "laws"),
+    "uniform laws only": put(*AT, "laws", "landing.x", {"gaussian": "0.2 in"}),
     "landing.x missing": lambda forged: section_of(forged)["laws"].pop("landing.x"),
-    "nothing is rechecked": changed("uniform", "0 in", "laws", "landing.x"),
-    "reaches 100": changed("uniform", "120 %", "laws", "throw.speed"),
-    "stretches of starts overlap": changed(0, 1, "starts", 2),
-    "overlap": changed("wrong", [[2, "21 in", None]], "absorbing"),
-    "name no places": changed("exits", [[2, "10 in", "11 in"]], "absorbing"),
-    "names are not": changed("names", ["right", "elsewhere", "any"]),
-    "a place is not one of the arm": changed(1, "1 in", "starts", 2),
-    "the arrays are others": fewer_sides,
+    "nothing is rechecked": put(*AT, "laws", "landing.x", "uniform", "0 in"),
+    "reaches 100": put(*AT, "laws", "throw.speed", "uniform", "120 %"),
+    "stretches of starts overlap": put(*AT, "starts", 2, 0, 1),
+    "overlap": put(*AT, "absorbing", "wrong", [[2, "21 in", None]]),
+    "name no places": put(*AT, "absorbing", "exits", [[2, "10 in", "11 in"]]),
+    "names are not": put(*AT, "names", ["right", "elsewhere", "any"]),
+    "a place is not one of the arm": put(*AT, "starts", 2, 1, "1 in"),
+    "the arrays are others": lambda f: f.arrays.pop("edges.2"),
     "do not span the arm": lambda f: f.arrays.update({"edges.0": f.arrays["edges.0"][10:].copy()}),
     "do not ascend": lambda f: f.arrays.update({"edges.0": f.arrays["edges.0"][::-1].copy()}),
-    "strata is not": changed("strata", 65),
-    "kappa > ell": changed("kappa", "3 in", "scene", "throw"),
-    "a quantile is none": changed(1, "120 %", "quantiles", 0),
-    "bounds of the mean": changed("mean", [(3.0).hex(), (2.0).hex()]),
+    "strata is not": put(*AT, "strata", 65),
+    "kappa > ell": put(*AT, "scene", "throw", "kappa", "3 in"),
+    "a quantile is none": put(*AT, "quantiles", 0, 1, "120 %"),
+    "bounds of the mean": put(*AT, "mean", [(3.0).hex(), (2.0).hex()]),
     "has no boxes": lambda forged: forged.header.update(noise={"landing.x": "0.2 in"}),
-    "claims of probabilities": lambda forged: forged.header["claims"].append(
-        {"claim": "invariant", "section": {}}
-    ),
+    "claims of probabilities": lambda f: f.header["claims"].append({"claim": "invariant", "section": {}}),
     "different models": lambda forged: forged.header["map"].update(flip="energy"),
     "not the one the header describes": None,
 }
@@ -342,18 +302,12 @@ def test_what_is_odd_is_refused_in_words(good, tmp_path, said):
 
 @pytest.mark.sweep
 def test_brackets_are_saved_and_rechecked(tmp_path):
-    found = absorption_brackets(
-        "paper-initial",
-        Scattering(speed=Uniform(0.005), landing=Uniform(0.2)),
-        right=(20.0, 2),
-        wrong=20.0,
-        cells=150,
-        throws=4,
-    )
+    scatter = Scattering(speed=Uniform(0.005), landing=Uniform(0.2))
+    words = {"right": (20.0, 2), "wrong": 20.0, "cells": 150, "throws": 4}
+    found = absorption_brackets("paper-initial", scatter, **words)
     low, high = found.mean
-    assert (
-        low < high < 25
-    )  # cells at the joint lead to themselves: only their neighbour's throws bound the mean
+    # cells at the joint lead to themselves: only their neighbour's throws bound the mean
+    assert low < high < 25
     file = found.save(tmp_path / "initial.proof.zip")
     report = ls.recheck(file)
     assert (report.verdict, report.claims) == ("proved", [("probabilities", "proved", "")])
