@@ -23,13 +23,9 @@ def test_a_uniform_grid_has_equal_cells():
     assert np.allclose(cover.measure, 0.125)
 
 
-@pytest.mark.parametrize(("depth", "shape"), [(12, (64, 64)), (13, (128, 64)), (16, (256, 256)), (1, (2, 1))])
-def test_depth_splits_the_axes_in_turn_beginning_with_the_first(depth, shape):
-    assert tuple(ls.grid([(0.0, 1.0), (0.0, 1.0)], depth=depth).shape[0]) == shape
-
-
-def test_in_three_dimensions_too():
-    assert tuple(ls.grid([(0, 1), (0, 1), (0, 1)], depth=7).shape[0]) == (8, 4, 4)
+def test_depth_splits_the_axes_in_turn_beginning_with_the_first():
+    for depth, shape in ((12, (64, 64)), (13, (128, 64)), (16, (256, 256)), (1, (2, 1)), (7, (8, 4, 4))):
+        assert tuple(ls.grid([(0.0, 1.0)] * len(shape), depth=depth).shape[0]) == shape
 
 
 def test_graded_cells_are_the_default_where_there_is_an_anchor():
@@ -59,12 +55,7 @@ def test_every_point_lies_in_the_cell_it_is_given(cells, share, side):
 
 
 def test_points_outside_are_in_no_cell():
-    assert cover_index([0.999, 28.0001]) == [-1, -1]
-    assert cover_index([28.0])[0] == 99
-
-
-def cover_index(x):
-    return ls.grid(ANCHORED, cells=100).index(x, 0).tolist()
+    assert ls.grid(ANCHORED, cells=100).index([0.999, 28.0001, 28.0], 0).tolist() == [-1, -1, 99]
 
 
 def test_index_runs_the_last_axis_fastest():
@@ -80,30 +71,23 @@ def test_refining_keeps_the_old_borders_and_the_measure():
     assert np.isclose(fine.measure.sum(), cover.measure.sum(), rtol=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("domain", "options", "word"),
-    [
+def test_grids_that_cannot_be_are_refused():
+    for domain, options, word in (
         ([(1.0, 0.0)], {}, "lo < hi"),
         ([(0.0, float("inf"))], {}, "finite"),
         ("nonsense", {}, "domain"),
         ([(0.0, 1.0)], {"cells": 0}, "integer from 1"),
         ([(0.0, 1.0)], {"cells": 2.5}, "integer from 1; pass cells=1024$"),
-        (
-            [(0.0, 1.0), (0.0, 1.0)],
-            {"cells": -5},
-            "integer from 1, or 2 of them; pass cells=1024, or one per",
-        ),
+        ([(0.0, 1.0)] * 2, {"cells": -5}, "integer from 1, or 2 of them; pass cells=1024, or one per"),
         ([(0.0, 1.0)], {"cells": (2, 2)}, "integer from 1"),
         ([(0.0, 1.0)], {"grading": "fine"}, "uniform or graded"),
         ([(0.0, 1.0)], {"grading": "graded"}, "anchor"),
         ([(0.0, 1.0)], {"depth": 0}, "integer from 1"),
         ([(0.0, 1.0), (0.0, 1.0)], {"depth": 40}, "at most"),
         ([(1.0, 1.0 + 1e-14)], {"cells": 1000}, "spacing"),
-    ],
-)
-def test_grids_that_cannot_be_are_refused(domain, options, word):
-    with pytest.raises(GridError, match=word):
-        ls.grid(domain, **options)
+    ):
+        with pytest.raises(GridError, match=word):
+            ls.grid(domain, **options)
 
 
 def test_an_anchor_inside_the_box_is_refused():

@@ -1,6 +1,8 @@
 """The command line called within the process of the tests."""
 
+import json
 import re
+import shlex
 from pathlib import Path
 
 from limitsets.face.cli import main
@@ -10,13 +12,42 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 PROGRESS = re.compile(r" \([0-9]+ of [0-9]+\)$")  # of what takes over two seconds
 
 
-def run(capfd, *words):
-    """Exit code, and what goes to each stream: to the second only lines that name the command."""
-    code = main(words)
+def run(capfd, line="", *words):
+    """Exit code, and what goes to each stream: to the second only lines that name the command.
+
+    The line is split as a shell does it; each of the words behind it stays whole.
+    """
+    code = main([*shlex.split(line), *words])
     out, err = capfd.readouterr()
     assert "Traceback" not in err
     assert all(line.startswith("limitsets: ") for line in err.splitlines())
     return code, out, err
+
+
+def prints(capfd, *words, code=0):
+    """What a command prints that ends with this code."""
+    ended, out, err = run(capfd, *words)
+    assert ended == code, err
+    return out
+
+
+def json_of(capfd, *words, code=0):
+    """What it prints with --json."""
+    return json.loads(prints(capfd, *words, "--json", code=code))
+
+
+def refusal(capfd, *words):
+    """The one line that a command refuses bad input with; nothing goes to the first stream."""
+    code, out, err = run(capfd, *words)
+    assert (code, out) == (2, "")
+    assert len([line for line in err.splitlines() if not PROGRESS.search(line)]) == 1
+    assert "bug" not in err
+    return err
+
+
+def names_in(folder="."):
+    """Names of what lies in a folder."""
+    return {path.name for path in Path(folder).iterdir()}
 
 
 def documented(section, page="json.md"):

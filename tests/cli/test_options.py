@@ -14,7 +14,7 @@ from typer.main import get_command
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.face.cli.app import app
-from tests.cli.command import PROGRESS, documented, run
+from tests.cli.command import DOCS, PROGRESS, documented, json_of, prints, run
 from tests.feeding.scenes import with_cavity
 
 # ----------------------------------------------------------------
@@ -44,21 +44,7 @@ def test_every_command_that_prints_a_table_saves_it(name):
 
 
 def test_throws_in_full(capfd):
-    code, out, _ = run(
-        capfd,
-        "throw",
-        "paper-designed",
-        "--x",
-        "15",
-        "--side",
-        "2",
-        "--count",
-        "5",
-        "--json",
-        "--csv",
-        "t.csv",
-    )
-    assert code == 0
+    out = prints(capfd, "throw paper-designed --x 15 --side 2 --count 5 --json --csv t.csv")
     rows, throws = rows_of("t.csv"), json.loads(out)
     assert list(rows[0])[:5] == ["throw", "x [in]", "side", "status", "turned by [deg]"]
     assert [float(row["x [in]"]) for row in rows] == [15.0, *(each["x"] for each in throws)]
@@ -68,8 +54,7 @@ def test_throws_in_full(capfd):
 
 def test_limit_sets_in_full_and_figures_of_another_form(capfd):
     words = ("--cells", "512", "--csv", "sets.csv", "--format", "svg", "--html", "--json")
-    code, out, _ = run(capfd, "analyse", "paper-designed", *words)
-    assert code == 0
+    out = prints(capfd, "analyse paper-designed", *words)
     (found,) = json.loads(out)["attractors"]
     bands = [(int(side), *part) for side, parts in found["extents"].items() for part in parts]
     rows = rows_of("sets.csv")
@@ -85,7 +70,7 @@ def test_limit_sets_in_full_and_figures_of_another_form(capfd):
 
 
 def test_a_page_links_to_figures_that_it_cannot_show(capfd):
-    assert run(capfd, "audit", "paper-designed", "-o", "out", "--format", "pdf", "--csv", "a.csv")[0] == 0
+    prints(capfd, "audit paper-designed -o out --format pdf --csv a.csv")
     assert Path("out/audit.pdf").read_bytes().startswith(b"%PDF")
     page = Path("out/audit.md").read_text(encoding="utf-8")
     assert "(audit.pdf)" in page
@@ -98,7 +83,7 @@ def test_a_page_links_to_figures_that_it_cannot_show(capfd):
 
 def test_the_form_of_one_figure(capfd):
     words = ("plot", "paper-designed", "flight", "--cells", "256")
-    assert run(capfd, *words, "--format", "svg")[0] == 0
+    prints(capfd, *words, "--format", "svg")
     assert Path("paper-designed-flight.svg").read_bytes().startswith(b"<?xml")
     code, _, err = run(capfd, *words, "--format", "svg", "-o", "a.png")
     assert (code, len(err.splitlines())) == (2, 1)
@@ -106,13 +91,13 @@ def test_the_form_of_one_figure(capfd):
 
 @pytest.mark.parametrize("file", [".", "no folder/t.csv"])
 def test_a_table_that_cannot_be_written_is_refused_first(file, capfd):
-    code, out, err = run(capfd, "throw", "paper-designed", "--x", "15", "--side", "2", "--csv", file)
+    code, out, err = run(capfd, "throw paper-designed --x 15 --side 2 --csv", file)
     assert (code, out, len(err.splitlines())) == (2, "", 1)
 
 
 def test_a_table_is_replaced_whole(capfd):
     Path("t.csv").write_text("old\n" * 1000)
-    assert run(capfd, "scenes", "--csv", "t.csv")[0] == 0
+    prints(capfd, "scenes --csv t.csv")
     assert [row["scene"] for row in rows_of("t.csv")] == ls.scenes()
     assert [path.name for path in Path().iterdir()] == ["t.csv"]
 
@@ -200,8 +185,7 @@ def test_feed_says_in_its_first_line_that_the_scatter_is_not_used(capfd):
 def test_the_levels_of_the_noise_can_be_left_out(capfd):
     scene = noisy(effects={"spread": "gaussian"})
     assert "times the noise" in run(capfd, "feed", scene, *QUICK)[1]
-    code, out, _ = run(capfd, "feed", scene, *QUICK, "--no-level")
-    assert code == 0
+    out = prints(capfd, "feed", scene, *QUICK, "--no-level")
     assert "times the noise" not in out
 
 
@@ -220,7 +204,7 @@ def test_the_cavities_of_two_scenes_are_told_in_words():
 
 @pytest.mark.parametrize(("name", "file"), [("mine", "mine.proof.zip"), ("mine.zip", "mine.zip")])
 def test_a_certificate_without_an_ending_gets_one(capfd, name, file):
-    _, out, _ = run(capfd, "certify", "paper-designed", "--claim", "invariant", "-o", name)
+    _, out, _ = run(capfd, "certify paper-designed --claim invariant -o", name)
     assert f"{file}" in out
     assert [path.name for path in Path().glob("mine*")] == [file]
 
@@ -231,21 +215,18 @@ def test_where_there_is_no_policy_the_next_thing_is_told(capfd):
     tree["feedback"] = {"sensor": {"beyond": "20 in"}, "throws": throws}
     ls.dump(ls.load(tree), "one.toml")
     words = ("--starts", "2=17:18", "--cells", "64", "--throws", "1")
-    code, out, _ = run(capfd, "feedback", "one.toml", *words)
-    assert code == 1
+    out = prints(capfd, "feedback one.toml", *words, code=1)
     assert "not with 1 throws on these cells" in out
     assert "next: more --throws or --cells, --sweep LO:HI:N for another place of the sensor" in out
 
 
 def test_analyse_tells_what_is_improbable(capfd):
     ls.dump(ls.load("paper-designed").with_values({"throw.speed": "160 rpm"}), "fast.toml")
-    _, out, _ = run(capfd, "analyse", "fast.toml", "--cells", "64")
+    _, out, _ = run(capfd, "analyse fast.toml --cells 64")
     assert "throw.speed: careful, '160 rpm'" in out
-    _, out, err = run(capfd, "analyse", "fast.toml", "--cells", "64", "--json")
+    _, out, err = run(capfd, "analyse fast.toml --cells 64 --json")
     assert "throw.speed: careful, '160 rpm'" in err
-    assert "careful" not in run(capfd, "analyse", "paper-designed", "--cells", "64")[1].replace(
-        "careful: of", ""
-    )
+    assert "careful" not in run(capfd, "analyse paper-designed --cells 64")[1].replace("careful: of", "")
 
 
 # ----------------------------------------------------------------
@@ -253,53 +234,41 @@ def test_analyse_tells_what_is_improbable(capfd):
 
 
 VARY = "part.mass.center.along,part.mass.center.above,throw.speed"
-SHORT = ("--quantity", "arm.surface_height", "--seconds", "0", "--without", "noise", "--without", "audit")
+SHORT = "--quantity arm.surface_height --seconds 0 --without noise --without audit"
 IN_ITS_TEXT = ("effects", "basins", "starts", "goal", "units")
 
 
 @pytest.mark.parametrize(
     ("section", "words"),
     [
-        ("scenes", ()),
-        ("throw", ("paper-designed", "--x", "8", "--side", "2")),
-        ("plot", ("paper-designed", "part")),
-        ("new", ("new.toml",)),
-        ("audit", ("paper-designed",)),
-        ("margin", ("paper-designed", "throw.speed", "--width", "0.2")),
-        ("design --critical-points", ("paper-initial", "--critical-points", "10,10,20", "--vary", VARY)),
-        ("robustness", ("paper-designed", "-o", "sheet", *SHORT)),
-        ("animate", ("paper-designed", "-o", "run.html")),
+        ("scenes", ""),
+        ("throw", "paper-designed --x 8 --side 2"),
+        ("plot", "paper-designed part"),
+        ("new", "new.toml"),
+        ("audit", "paper-designed"),
+        ("margin", "paper-designed throw.speed --width 0.2"),
+        ("design --critical-points", f"10,10,20 paper-initial --vary {VARY}"),
+        ("robustness", f"paper-designed -o sheet {SHORT}"),
+        ("animate", "paper-designed -o run.html"),
     ],
 )
 def test_the_keys_are_those_of_the_page(capfd, section, words):
-    code, out, _ = run(capfd, section.partition(" ")[0], *words, "--json")
-    record = json.loads(out)
-    assert code == 0
+    record = json_of(capfd, f"{section} {words}")
     assert set(record[0] if isinstance(record, list) else record) == documented(section)
 
 
 def test_keys_of_an_analysis(capfd):
-    tree = ls.load("paper-designed").as_dict()
-    ls.dump(ls.load(tree), "mine.toml")
-    code, out, _ = run(capfd, "analyse", "mine.toml", "--cells", "256", "--json")
-    record = json.loads(out)
-    assert code == 0
+    record = json_of(capfd, "analyse paper-designed --cells 256")
     assert set(record) == documented("analyse")
-    page = Path(__file__).resolve().parents[2] / "docs" / "json.md"
-    text = page.read_text(encoding="utf-8").split("## analyse", 1)[1].split("\n## ", 1)[0]
-    inner = [
-        *(record[key] for key in IN_ITS_TEXT),
-        *record["attractors"],
-        *record["cycles"],
-        *record["spurious"],
-    ]
+    text = (DOCS / "json.md").read_text(encoding="utf-8").split("## analyse", 1)[1].split("\n## ", 1)[0]
+    lists = ("attractors", "cycles", "spurious")
+    inner = [*(record[key] for key in IN_ITS_TEXT), *(each for name in lists for each in record[name])]
     missing = {key for table in inner for key in table if key not in text}
     assert not missing
 
 
 def test_keys_of_a_proof_and_of_its_recheck(capfd):
-    code, out, _ = run(capfd, "certify", "paper-designed", "--json")
-    assert code == 0
+    out = prints(capfd, "certify paper-designed --json")
     assert set(json.loads(out)[0]) == documented("The JSON of `limitsets certify --json`", "certificates.md")
-    code, out, _ = run(capfd, "recheck", "paper-designed.proof.zip", "--json")
+    code, out, _ = run(capfd, "recheck paper-designed.proof.zip --json")
     assert (code, set(json.loads(out))) == (0, documented("recheck"))

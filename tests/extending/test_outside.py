@@ -51,14 +51,8 @@ def added() -> Iterator[None]:
 
 
 def worn(how: str = "loose", lost: float = 0.0, creep: str = "1e-9 in", **tables):
-    return ls.load(
-        {
-            **DESIGNED.as_dict(),
-            "effects": {"wear": how},
-            "world": {"lost": lost, "creep": creep},
-            **tables,
-        }
-    )
+    own = {"effects": {"wear": how}, "world": {"lost": lost, "creep": creep}}
+    return ls.load({**DESIGNED.as_dict(), **own, **tables})
 
 
 def test_without_it_a_scene_knows_nothing_of_it():
@@ -147,10 +141,8 @@ def test_the_goal_is_asked_answered_and_reported():
     # the limit set of the paper's scene ends at 23.38 (docs/model.md)
     assert evaluate(scene.goal, {0: [(15.2, 19.8)], 2: [(8.9, 23.38)]}) == (True, 23.38)
     text = page(ls.analyse(scene, cells=1024), {})
-    assert (
-        "Asked: no part rests beyond x = 24 in (asked of the limit set). **It holds of the limit set**"
-        in text
-    )
+    asked = "Asked: no part rests beyond x = 24 in (asked of the limit set)"
+    assert f"{asked}. **It holds of the limit set**" in text
     assert "The farthest part is at x = 23.3" in text
     false = GoalOutcome(outside.KeepsBelow(20.0), False, 23.38)
     assert verdict_of(false, 1.0) == "does not hold"
@@ -164,9 +156,8 @@ def test_the_goal_is_asked_answered_and_reported():
 def test_the_goal_is_proved_and_refuted_and_no_certificate_is_written(tmp_path):
     proved = ls.certify(asking("24 in"), claims=["goal"])
     assert [(each.verdict, each.starts) for each in proved.claims] == [("proved", "every")]
-    assert sentence(proved.claims[0].section).startswith(
-        "In the attracting cells, no part rests beyond x = 24 in."
-    )
+    said = "In the attracting cells, no part rests beyond x = 24 in."
+    assert sentence(proved.claims[0].section).startswith(said)
     with pytest.raises(AnswerError, match=r"keeps_below.*goals that the checker knows"):
         proved.save(tmp_path / "p.proof.zip")
     (refuted,) = ls.certify(asking("22 in"), claims=["goal"]).claims

@@ -23,6 +23,7 @@ from limitsets.feeder.geometry import (
     triangle_of,
 )
 
+PAPER = [5.75, 3.6, 6.75]
 PENTAGON = [(math.cos(2 * math.pi * k / 5), math.sin(2 * math.pi * k / 5)) for k in range(5)]
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 
@@ -36,9 +37,8 @@ def test_sides_come_in_flip_order() -> None:
 
 
 def test_triangle_has_the_lengths_it_was_given_in_flip_order() -> None:
-    lengths = [5.75, 3.6, 6.75]
-    corners = triangle(lengths)
-    for side, expected in enumerate(lengths):
+    corners = triangle(PAPER)
+    for side, expected in enumerate(PAPER):
         left, right = side_ends(3, side)
         assert math.dist(corners[left], corners[right]) == pytest.approx(expected, rel=4e-16)
     # the paper calls it right-angled; between its sides 0 and 1 it has 89.36 deg
@@ -57,47 +57,32 @@ def test_height_of_needles_keeps_its_digits(lengths: tuple[float, float, float])
     assert triangle_of(lengths)[2][1] == pytest.approx(float(exact), rel=2e-15)
 
 
-def test_triangle_serves_other_numbers() -> None:
+def test_triangle_serves_other_numbers_and_in_balls_encloses_the_exact_one() -> None:
+    flint = pytest.importorskip("flint")
     with mpmath.workdps(50):
         corners = triangle_of([mpmath.mpf(3), mpmath.mpf(4), mpmath.mpf(6)], sqrt=mpmath.sqrt)
         assert abs(mpmath.hypot(corners[2][0] - 3, corners[2][1]) - 6) < mpmath.mpf(10) ** -48
+        exact = triangle_of([mpmath.mpf(value) for value in PAPER], sqrt=mpmath.sqrt)
+    balls = triangle_of([flint.arb(value) for value in PAPER], sqrt=flint.arb.sqrt)
+    for ball, value in zip(sum(balls, ()), sum(exact, ()), strict=True):
+        assert ball.overlaps(flint.arb(mpmath.nstr(value, 45)))
 
 
-def test_triangle_in_balls_encloses_the_float_one() -> None:
-    flint = pytest.importorskip("flint")
-    lengths = [5.75, 3.6, 6.75]
-    balls = triangle_of([flint.arb(value) for value in lengths], sqrt=flint.arb.sqrt)
-    with mpmath.workdps(50):
-        exact = triangle_of([mpmath.mpf(value) for value in lengths], sqrt=mpmath.sqrt)
-    assert all(
-        ball.overlaps(flint.arb(mpmath.nstr(value, 45)))
-        for pair, known in zip(balls, exact, strict=True)
-        for ball, value in zip(pair, known, strict=True)
-    )
-
-
-@pytest.mark.parametrize(
-    ("lengths", "words"),
-    [
+def test_refuses_lengths_of_no_triangle() -> None:
+    for lengths, words in (
         ([1, 2], "3, a triangle"),
         ([1, 2, 3, 4], "by its vertices"),
         ([1, 2, 3], "triangle inequality"),
         ([10, 2, 3], "side 0"),
         ([2, 10, 3], "side 1"),
+        ([2, 10, 3], r"too long by 5\b"),
         ([2, 0, 3], "side 1"),
         ([2, -1, 3], "above 0"),
         ([math.inf, 1, 1], "above 0"),
         ([math.nan, 1, 1], "above 0"),
-    ],
-)
-def test_refuses_lengths_of_no_triangle(lengths: list[float], words: str) -> None:
-    with pytest.raises(GeometryError, match=words):
-        triangle(lengths)
-
-
-def test_broken_triangle_says_by_how_much() -> None:
-    with pytest.raises(GeometryError, match=r"too long by 5\b"):
-        triangle([2, 10, 3])
+    ):
+        with pytest.raises(GeometryError, match=words):
+            triangle(lengths)
 
 
 @pytest.mark.parametrize("vertices", [SQUARE, PENTAGON, [(0, 0), (4, 0), (0, 3)]])
@@ -106,15 +91,12 @@ def test_accepts_convex_polygons_wherever_they_lie(vertices: list[tuple[float, f
         assert convex_polygon(np.array(vertices) + shift).shape == (len(vertices), 2)
 
 
-@pytest.mark.parametrize(
-    ("vertices", "words"),
-    [
+def test_refuses_what_is_no_convex_polygon() -> None:
+    for vertices, words in (
         (SQUARE[::-1], "reverse the list"),
         (PENTAGON[::-1], "clockwise"),
-        (
-            [PENTAGON[2 * k % 5] for k in range(5)],
-            "crosses itself",
-        ),  # the pentagram turns left at every corner
+        # the pentagram turns left at every corner
+        ([PENTAGON[2 * k % 5] for k in range(5)], "crosses itself"),
         ([PENTAGON[3 * k % 5] for k in range(5)], "crosses itself"),
         ([(0, 0), (1, 1), (1, 0), (0, 1)], "crosses itself"),  # a bow tie
         ([(0, 0), (2, 0), (0.5, 0.5), (0, 2)], "inward at vertex 2"),
@@ -131,11 +113,9 @@ def test_accepts_convex_polygons_wherever_they_lie(vertices: list[tuple[float, f
         ([0, 1, 2], "pair"),
         ([(0, 0, 0)] * 4, "pair"),
         ([(0, 0), (1, 0), (math.inf, 1)], "finite"),
-    ],
-)
-def test_refuses_what_is_no_convex_polygon(vertices: list[tuple[float, float]], words: str) -> None:
-    with pytest.raises(GeometryError, match=words):
-        convex_polygon(vertices)
+    ):
+        with pytest.raises(GeometryError, match=words):
+            convex_polygon(vertices)
 
 
 def test_boundary_is_inside_and_beyond_it_is_not() -> None:
@@ -146,7 +126,6 @@ def test_boundary_is_inside_and_beyond_it_is_not() -> None:
         require_inside(square, (1.25, 0.5), "the point")
 
 
-PAPER = [5.75, 3.6, 6.75]
 # along, above on side 2; a and d of the three sides (docs/model.md, the four paper scenes)
 SCENES = [
     (3.2444722, 1.7898493, (2.05089, 3.36103, 3.24447), (0.21620, 2.04836, 1.78985)),
@@ -182,9 +161,8 @@ def test_balls_enclose_the_exact_values() -> None:
     flint = pytest.importorskip("flint")
     corners = triangle_of([flint.arb(length) for length in PAPER], sqrt=flint.arb.sqrt)
     along = flint.arb(4.2255778, 1e-3)
-    balls = rest_of(
-        corners, OnSide(2, along, flint.arb(0.708249)), sqrt=flint.arb.sqrt, atan2=flint.arb.atan2
-    )
+    centre = OnSide(2, along, flint.arb(0.708249))
+    balls = rest_of(corners, centre, sqrt=flint.arb.sqrt, atan2=flint.arb.atan2)
     for offset in (-9e-4, 0.0, 9e-4):
         sides = resting_sides(triangle(PAPER), OnSide(2, 4.2255778 + offset, 0.708249))
         for side, row in enumerate(balls):
@@ -198,10 +176,6 @@ def test_unit_square() -> None:
     assert sides.d.tolist() == [0.375, 0.25, 0.625, 0.75]
     np.testing.assert_allclose(sides.corner, math.pi / 2)
     assert len(sides) == 4
-
-
-def test_arrays_are_read_only() -> None:
-    sides = resting_sides(triangle(PAPER), (2.0, 1.0))
     with pytest.raises(ValueError, match="read-only"):
         sides.a[0] = 1.0
 
@@ -242,19 +216,16 @@ def test_centre_measured_on_any_side_is_the_same_point(part: tuple, side: int) -
     np.testing.assert_allclose(by_side.d, by_point.d, atol=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("centre", "words"),
-    [
+def test_part_that_cannot_rest_says_where_and_by_how_much() -> None:
+    for centre, words in (
         ((-0.5, 0.5), "side 0, .*tips over the left end by 0.5 in"),
         ((4.25, 0.5), "side 0, .*right end by 0.25 in"),
         ((1.0, 0.0), "height .* side 0 is '0 in'"),
         ((1.0, -0.5), "height .* side 0 is '-0.5 in'"),
-    ],
-)
-def test_part_that_cannot_rest_says_where_and_by_how_much(centre: tuple[float, float], words: str) -> None:
-    slanted = convex_polygon([(0, 0), (4, 0), (7, 3), (-3, 3)])
-    with pytest.raises(GeometryError, match=words):
-        require_rest(resting_sides(slanted, centre), "in")
+    ):
+        slanted = convex_polygon([(0, 0), (4, 0), (7, 3), (-3, 3)])
+        with pytest.raises(GeometryError, match=words):
+            require_rest(resting_sides(slanted, centre), "in")
 
 
 def test_refuses_a_side_that_is_not_there() -> None:
@@ -262,25 +233,23 @@ def test_refuses_a_side_that_is_not_there() -> None:
         resting_sides(triangle(PAPER), OnSide(3, 1.0, 1.0))
 
 
-def test_rectangle() -> None:
-    found = plate_with_points(np.array([(0, 0), (3, 0), (3, 2), (0, 2)]), 0.5)
-    assert found.mass == pytest.approx(3.0)
-    assert found.centre == pytest.approx((1.5, 1.0))
-    assert found.radius_of_gyration == pytest.approx(math.sqrt((9 + 4) / 12))
+CIRCLE = np.linspace(0, 2 * math.pi, 400, endpoint=False)
 
 
-def test_equilateral_triangle() -> None:
-    found = plate_with_points(triangle([2, 2, 2]), 1.0)
-    assert found.mass == pytest.approx(math.sqrt(3))
-    assert found.centre == pytest.approx((1.0, 1 / math.sqrt(3)))
-    assert found.radius_of_gyration == pytest.approx(2 / math.sqrt(12))
-
-
-def test_circle_by_a_fine_polygon() -> None:
-    angles = np.linspace(0, 2 * math.pi, 400, endpoint=False)
-    found = plate_with_points(np.column_stack([np.cos(angles), np.sin(angles)]), 1.0)
-    assert found.mass == pytest.approx(math.pi, rel=1e-4)
-    assert found.radius_of_gyration == pytest.approx(math.sqrt(0.5), rel=1e-4)
+@pytest.mark.parametrize(
+    ("corners", "density", "mass", "centre", "gyration", "within"),
+    [
+        (np.array([(0, 0), (3, 0), (3, 2), (0, 2)]), 0.5, 3.0, (1.5, 1.0), math.sqrt((9 + 4) / 12), 1e-12),
+        (triangle([2, 2, 2]), 1.0, math.sqrt(3), (1.0, 1 / math.sqrt(3)), 2 / math.sqrt(12), 1e-12),
+        (np.stack([np.cos(CIRCLE), np.sin(CIRCLE)], 1), 1.0, math.pi, (0.0, 0.0), math.sqrt(0.5), 1e-4),
+    ],
+    ids=["rectangle", "equilateral triangle", "circle by a fine polygon"],
+)
+def test_plates_with_known_moments(corners, density, mass, centre, gyration, within) -> None:
+    found = plate_with_points(corners, density)
+    assert found.mass == pytest.approx(mass, rel=within)
+    assert found.centre == pytest.approx(centre, abs=within)
+    assert found.radius_of_gyration == pytest.approx(gyration, rel=within)
 
 
 def test_paper_plate_and_its_lead_weight() -> None:
@@ -310,19 +279,14 @@ def test_serves_other_numbers() -> None:
         assert abs(found.radius_of_gyration**2 - mpmath.mpf(13) / 12) < mpmath.mpf(10) ** -38
 
 
-@pytest.mark.parametrize(
-    ("density", "points", "words"),
-    [
+def test_refuses_masses_that_cannot_be() -> None:
+    for density, points, words in (
         (0.0, [], "density"),
         (-1.0, [], "density"),
         (math.nan, [], "density"),
         (1.0, [(1, 1, 0.0)], "mass of point 0"),
         (1.0, [(1, 1, 1.0), (1, 1, -2.0)], "mass of point 1"),
         (1.0, [(-0.5, 1, 1.0)], "point mass 0 .*outside, 0.5 .length. beyond side 1"),
-    ],
-)
-def test_refuses_masses_that_cannot_be(
-    density: float, points: list[tuple[float, float, float]], words: str
-) -> None:
-    with pytest.raises(GeometryError, match=words):
-        plate_with_points(triangle([4, 3, 5]), density, points)
+    ):
+        with pytest.raises(GeometryError, match=words):
+            plate_with_points(triangle([4, 3, 5]), density, points)

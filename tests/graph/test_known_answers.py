@@ -15,7 +15,6 @@ from scipy.sparse import csgraph
 import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.systems.cells import CellSet, Grid
-from limitsets.systems.graph import components as surveys
 from limitsets.systems.graph import components as walk
 from limitsets.systems.graph import segment_tree
 from limitsets.systems.graph.components import descend, reach, strong_components
@@ -40,9 +39,8 @@ LESLIE = [
 
 @pytest.mark.parametrize(("depth", "cells", "edges", "chain"), LESLIE)
 def test_leslie(depth, cells, edges, chain):
-    graph = ls.transitions(
-        ls.maps.Leslie(), ls.grid([(-0.001, 90), (-0.001, 70)], depth=depth), method="corners-padded"
-    )
+    rectangle = ls.grid([(-0.001, 90), (-0.001, 70)], depth=depth)
+    graph = ls.transitions(ls.maps.Leslie(), rectangle, method="corners-padded")
     assert graph.n_cells == cells
     assert graph.number_of_cell_edges() == edges
     morse = ls.morse_graph(graph)
@@ -51,6 +49,9 @@ def test_leslie(depth, cells, edges, chain):
     assert morse.number_of_nodes() == len(chain)
     assert morse.number_of_edges() == len(chain) - 1
     assert [morse.nodes[k]["attracting"] for k in path] == [False] * (len(chain) - 1) + [True]
+
+
+CORNERS = [(0, 0), (1, 0), (0, 1), (1, 1)]
 
 
 @pytest.mark.parametrize("cells", [(64, 32), (128, 128)])
@@ -63,42 +64,31 @@ def test_the_product_map_recurs_at_its_four_fixed_points_in_diamond_order(cells)
     at = {}
     for k, data in morse.nodes(data=True):
         lo, hi = graph.grid.boxes(data["members"].numbers(), 0)
-        near = [
-            point
-            for point in [(0, 0), (0, 1), (1, 0), (1, 1)]
-            if (lo - 2 * width <= point).all() and (point <= hi + 2 * width).all()
-        ]
-        assert len(near) == 1
-        at[k] = near[0]
-    assert set(at.values()) == {(0, 0), (0, 1), (1, 0), (1, 1)}
+        close = [((lo - 2 * width <= point) & (point <= hi + 2 * width)).all() for point in CORNERS]
+        assert sum(close) == 1
+        at[k] = CORNERS[close.index(True)]
+    assert set(at.values()) == set(CORNERS)
     order = {(at[a], at[b]) for a, b in nx.transitive_closure_dag(morse).edges if at[a] != at[b]}
-    assert order == {
-        ((1, 1), (1, 0)),
-        ((1, 1), (0, 1)),
-        ((1, 1), (0, 0)),
-        ((1, 0), (0, 0)),
-        ((0, 1), (0, 0)),
-    }
+    low, right, up, high = CORNERS
+    assert order == {(high, right), (high, up), (high, low), (right, low), (up, low)}
     assert [at[k] for k, data in morse.nodes(data=True) if data["attracting"]] == [(0, 0)]
+
+
+def linear(x, y, cells):
+    """Graph of the map (x, y) -> (x * first, y * second) on a square."""
+    return ls.transitions(Linear2(x, 0.0, 0.0, y), ls.grid([(-1, 1), (-1, 1)], cells=cells), method="corners")
 
 
 def test_a_line_of_fixed_points_is_covered():
     """F = (x, y/2): the x axis attracts, and each of its cells is recurrent."""
-    graph = ls.transitions(
-        Linear2(1.0, 0.0, 0.0, 0.5), ls.grid([(-1, 1), (-1, 1)], cells=32), method="corners"
-    )
-    recurrent = graph.recurrent_set()
-    axis = CellSet.of(
-        graph.grid, graph.grid.index(np.stack([graph.grid.edges[0][0], np.zeros(33)], axis=1), 0)
-    )
-    assert axis <= recurrent
+    graph = linear(1.0, 0.5, 32)
+    places = np.stack([graph.grid.edges[0][0], np.zeros(33)], axis=1)
+    assert CellSet.of(graph.grid, graph.grid.index(places, 0)) <= graph.recurrent_set()
 
 
 def test_the_unstable_set_of_a_saddle_covers_its_axis():
     """diag(0.5, 2): what can be reached from the fixed point's cell covers the y axis."""
-    graph = ls.transitions(
-        Linear2(0.5, 0.0, 0.0, 2.0), ls.grid([(-1, 1), (-1, 1)], cells=33), method="corners"
-    )
+    graph = linear(0.5, 2.0, 33)
     (origin,) = graph.grid.index([[0.0, 0.0]], 0)
     reached = [n for n in nx.descendants(graph, int(origin)) if n < graph.n_cells]
     middles = graph.grid.centres(0)
@@ -107,28 +97,22 @@ def test_the_unstable_set_of_a_saddle_covers_its_axis():
     assert axis <= CellSet.of(graph.grid, [*reached, int(origin)])
 
 
-@pytest.mark.parametrize("method", ["corners", "corners-padded"])
-def test_two_states_share_the_square(method):
-    graph = ls.transitions(TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method=method)
+@pytest.mark.parametrize(
+    ("params", "domain", "cells", "method", "states"),
+    [
+        # corners see both branches in the cells along x = 0, one column or two of 32
+        (TwoState(1.0), [(-2, 2), (-2, 2)], 32, "corners", 2),
+        (TwoState(1.0), [(-2, 2), (-2, 2)], 32, "corners-padded", 2),
+        (TwoState(0.3), [(-2, 2), (-2, 2)], 32, "corners", 1),
+        (ThreeState(), [(-3, 3)], 60, None, 3),
+    ],
+)
+def test_equal_states_share_the_domain_and_no_cell_is_without_a_label(params, domain, cells, method, states):
+    graph = ls.transitions(params, ls.grid(domain, cells=cells), method)
     found = ls.attractors(graph)
     share = ls.basins(graph, found)
-    assert len(found) == 2
-    # corners see both branches in the cells along x = 0, one column or two of 32
-    assert share.attractors == pytest.approx((0.5, 0.5), abs=1 / 32)
-    assert sum(share.attractors) + share.undecided_between == pytest.approx(1.0, abs=1e-12)
-
-
-def test_one_state_for_small_r():
-    graph = ls.transitions(TwoState(0.3), ls.grid([(-2, 2), (-2, 2)], cells=32), method="corners")
-    assert len(ls.attractors(graph)) == 1
-
-
-def test_three_states_and_no_cell_without_a_label():
-    graph = ls.transitions(ThreeState(), ls.grid([(-3, 3)], cells=60))
-    found = ls.attractors(graph)
-    share = ls.basins(graph, found)
-    assert len(found) == 3
-    assert share.attractors == pytest.approx((1 / 3, 1 / 3, 1 / 3), abs=2 / 60)
+    assert len(found) == states
+    assert share.attractors == pytest.approx((1 / states,) * states, abs=1 / 30)
     assert sum(share.attractors) + share.undecided_between == pytest.approx(1.0, abs=1e-12)
 
 
@@ -155,7 +139,10 @@ def test_spurious_recurrent_cells_are_told_from_dynamics():
     assert not any(int(fixed) in cells for cells in false)
 
 
-@pytest.mark.parametrize("method", ["end-points", "corners", "corners-padded"])
+METHODS = pytest.mark.parametrize("method", ["end-points", "corners", "corners-padded"])
+
+
+@METHODS
 def test_a_cell_on_which_the_flip_is_undecided_gets_the_image_of_both_branches(method):
     scene = ls.load("paper-designed")
     graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=64), method=method)
@@ -164,7 +151,7 @@ def test_a_cell_on_which_the_flip_is_undecided_gets_the_image_of_both_branches(m
     assert set(graph.grid.side_of(successors[successors < graph.n_cells]).tolist()) == {0, 2}
 
 
-@pytest.mark.parametrize("method", ["end-points", "corners", "corners-padded"])
+@METHODS
 def test_images_of_cells_hold_the_images_of_their_points(method):
     scene = ls.load("paper-initial")
     graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=300), method=method)
@@ -207,29 +194,14 @@ def graphs(draw):
         first.append(len(side))
     exits = rng.choice([0, 0, 0, 1], grid.n_cells).astype(np.uint8)
     shape = (len(side), dimension)
-    return TransitionGraph(
-        ls.maps.Logistic(1.0),
-        grid,
-        build(
-            grid,
-            np.array(first),
-            np.array(side, dtype=np.int32),
-            np.array(lo, dtype=np.int32).reshape(shape),
-            np.array(hi, dtype=np.int32).reshape(shape),
-            exits,
-        ),
-        "made up",
-    )
-
-
-def matrix(graph):
-    pointer, targets = expand(graph.ranges)
-    return sparse.csr_matrix((np.ones(targets.size), targets, pointer), shape=(graph.n_cells, graph.n_cells))
+    ends = (np.array(bound, dtype=np.int32).reshape(shape) for bound in (lo, hi))
+    ranges = build(grid, np.array(first), np.array(side, dtype=np.int32), *ends, exits)
+    return TransitionGraph(ls.maps.Logistic(1.0), grid, ranges, "made up")
 
 
 @given(graphs())
 @settings(max_examples=150)
-def test_edges_are_those_of_the_boxes(graph):
+def test_edges_are_those_of_the_boxes_and_components_those_of_scipy_in_topological_order(graph):
     pointer, targets = expand(graph.ranges)
     assert count_edges(graph.ranges) == targets.size
     for cell in range(graph.n_cells):
@@ -238,16 +210,13 @@ def test_edges_are_those_of_the_boxes(graph):
         assert np.array_equal(inside, reached[reached < graph.n_cells])
     assert graph.to_networkx().number_of_edges() == graph.number_of_edges()
     assert graph.to_networkx().number_of_nodes() == graph.number_of_nodes()
-
-
-@given(graphs())
-@settings(max_examples=150)
-def test_components_agree_with_scipy_and_come_in_topological_order(graph):
     parts = strong_components(graph.ranges)
-    count, oracle = csgraph.connected_components(matrix(graph), connection="strong")
+    matrix = sparse.csr_matrix(
+        (np.ones(targets.size), targets, pointer), shape=(graph.n_cells, graph.n_cells)
+    )
+    count, oracle = csgraph.connected_components(matrix, connection="strong")
     assert parts.count == count
     assert len({*zip(parts.label.tolist(), oracle.tolist(), strict=True)}) == count  # a renaming, one to one
-    pointer, targets = expand(graph.ranges)
     sources = np.repeat(np.arange(graph.n_cells), np.diff(pointer))
     assert (parts.label[targets] <= parts.label[sources]).all()
     assert np.array_equal(np.sort(parts.order), np.arange(graph.n_cells))
@@ -259,7 +228,7 @@ def test_components_agree_with_scipy_and_come_in_topological_order(graph):
 
 @given(graphs())
 @settings(max_examples=100)
-def test_reachability_agrees_with_networkx(graph):
+def test_reachability_and_destinations_agree_with_networkx(graph):
     plain = graph.to_networkx()
     parts = strong_components(graph.ranges)
     target = graph.n_cells // 2
@@ -270,26 +239,16 @@ def test_reachability_agrees_with_networkx(graph):
     seen = set(np.flatnonzero(descend(graph.ranges, np.array([target]))).tolist())
     sinks = set(range(graph.n_cells, len(graph)))
     assert seen | {target} == (nx.descendants(plain, target) | {target}) - sinks
-
-
-@given(graphs())
-@settings(max_examples=100)
-def test_destinations_agree_with_networkx(graph):
-    plain = graph.to_networkx()
-    ends = [set(part) for part in nx.attracting_components(plain)]
-    found = graph.condensation()
-    recurrent = graph.recurrent_components()
+    found, recurrent = graph.condensation(), graph.recurrent_components()
     attractors = [
         set(cells.tolist()) for cells, good in zip(recurrent, found.attracting, strict=True) if good
     ]
     left = {
         int(c) for cells, good in zip(recurrent, found.attracting, strict=True) if not good for c in cells
     }
-    assert sorted(map(sorted, attractors)) == sorted(
-        sorted(part)
-        for part in ends
-        if min(part) < graph.n_cells and (len(part) > 1 or plain.has_edge(*2 * tuple(part)))
-    )
+    ends = [sorted(part) for part in nx.attracting_components(plain)]
+    closed = [part for part in ends if len(part) > 1 or plain.has_edge(part[0], part[0])]
+    assert sorted(map(sorted, attractors)) == sorted(part for part in closed if part[0] < graph.n_cells)
     for cell in range(graph.n_cells):
         reachable = nx.descendants(plain, cell) | {cell}
         numbers = [k for k, part in enumerate(attractors) if part & reachable]
@@ -301,33 +260,31 @@ def test_destinations_agree_with_networkx(graph):
             assert found.destination[cell] == options[0]
 
 
+def on_a_line(lo, hi):
+    """A box of neighbours for each cell of a line."""
+    n = lo.size
+    ends = (bound[:, None].astype(np.int32) for bound in (lo, hi))
+    grid = ls.grid([(0.0, 1.0)], cells=n)
+    return build(grid, np.arange(n + 1), np.zeros(n, np.int32), *ends, np.zeros(n, np.uint8))
+
+
 @pytest.mark.parametrize("count", [3, 60, 130])
 def test_more_components_than_one_sweep_holds(count):
     """A chain of `count` fixed cells with a transient cell between neighbours: the order is a chain."""
     n = 2 * count - 1
-    grid = ls.grid([(0.0, 1.0)], cells=n)
     rows = np.arange(n)
     # An even cell leads to itself and the odd one below it, an odd cell to the even one below it.
-    lo, hi = np.where(rows % 2 == 0, np.maximum(rows - 1, 0), rows - 1)[:, None], rows[:, None].copy()
-    hi[rows % 2 == 1] -= 1
-    ranges = build(
-        grid,
-        np.arange(n + 1),
-        np.zeros(n, np.int32),
-        lo.astype(np.int32),
-        hi.astype(np.int32),
-        np.zeros(n, np.uint8),
-    )
-    graph = TransitionGraph(ls.maps.Logistic(1.0), grid, ranges, "made up")
+    lo, hi = np.where(rows % 2 == 0, np.maximum(rows - 1, 0), rows - 1), rows - rows % 2
+    ranges = on_a_line(lo, hi)
+    graph = TransitionGraph(ls.maps.Logistic(1.0), ls.grid([(0.0, 1.0)], cells=n), ranges, "made up")
     morse = ls.morse_graph(graph)
     assert len(morse) == count
     assert nx.is_directed_acyclic_graph(morse)
     assert nx.dag_longest_path_length(morse) == count - 1
     assert morse.number_of_edges() == count - 1
     assert (graph.condensation().destination[:2] == 0).all()
-    assert (
-        graph.condensation().destination[2:] == UNDECIDED
-    ).all()  # from there on an unstable cell can be reached
+    # from there on an unstable cell can be reached
+    assert (graph.condensation().destination[2:] == UNDECIDED).all()
 
 
 # ----------------------------------------------------------------
@@ -394,35 +351,23 @@ def test_sweeps_are_those_of_the_walk(r, seed):
     assert np.array_equal(segment_tree.descend(r, start), walk.descend(r, start))
     for component in range(plain.count):
         cells = np.flatnonzero(plain.label == component).astype(np.int32)
-        assert segment_tree.leaves(r, plain.label, cells) == surveys._leaves(r, plain.label, cells)
+        assert segment_tree.leaves(r, plain.label, cells) == walk._leaves(r, plain.label, cells)
 
 
 def test_the_tree_is_chosen_for_wide_images_only():
     n = 2000
     for width, chosen in ((3, False), (500, True)):
-        lo = np.maximum(np.arange(n) - width // 2, 0)[:, None].astype(np.int32)
-        hi = np.minimum(lo + width, n - 1).astype(np.int32)
-        r = build(
-            ls.grid([(0, 1)], cells=n), np.arange(n + 1), np.zeros(n, np.int32), lo, hi, np.zeros(n, np.uint8)
-        )
+        lo = np.maximum(np.arange(n) - width // 2, 0)
+        r = on_a_line(lo, np.minimum(lo + width, n - 1))
         assert segment_tree.is_wide(r) is chosen
         assert walk.strong_components(r).count == 1
 
 
-@pytest.mark.parametrize("width", [10_000])
-def test_wide_images_of_many_cells(width):
+def test_wide_images_of_many_cells():
     """2e5 cells that each lead to the next 10 000 below: a chain of single cells, 2e9 implied edges."""
     n = 200_000
     at = np.arange(n)
-    lo, hi = np.maximum(at - width, 0), np.maximum(at - 1, 0)
-    r = build(
-        ls.grid([(0, 1)], cells=n),
-        np.arange(n + 1),
-        np.zeros(n, np.int32),
-        lo[:, None].astype(np.int32),
-        hi[:, None].astype(np.int32),
-        np.zeros(n, np.uint8),
-    )
+    r = on_a_line(np.maximum(at - 10_000, 0), np.maximum(at - 1, 0))
     parts = walk.strong_components(r)
     assert parts.count == n
     assert parts.recurrent.sum() == 1  # cell 0, which leads to itself
@@ -479,9 +424,7 @@ def test_condensation(graph, plain, given):
     components = list(nx.strongly_connected_components(plain)) if given else None
     ours = nx.condensation(graph, scc=components)
     oracle = nx.condensation(plain, scc=components)
-    assert same(
-        nx.get_node_attributes(ours, "members").values(), nx.get_node_attributes(oracle, "members").values()
-    )
+    assert same(*(nx.get_node_attributes(dense, "members").values() for dense in (ours, oracle)))
     assert all(node in ours.nodes[ours.graph["mapping"][node]]["members"] for node in plain)
 
     def edges(dense):
@@ -505,9 +448,6 @@ def test_a_node_that_is_none_is_networkx_own_error(graph):
 
 
 def test_the_rest_of_networkx_by_conversion(graph, plain):
-    assert nx.number_weakly_connected_components(
-        graph.to_networkx()
-    ) == nx.number_weakly_connected_components(plain)
     before = nx.config.fallback_to_nx
     try:
         nx.config.fallback_to_nx = True
@@ -516,14 +456,11 @@ def test_the_rest_of_networkx_by_conversion(graph, plain):
         nx.config.fallback_to_nx = before
 
 
-def test_every_node_but_none_has_successors(graph):
+def test_every_node_has_successors_and_components_gives_labels_without_making_sets(graph):
     assert all(graph.successors(node).size for node in graph)
     assert len(graph) == graph.number_of_nodes() == graph.n_cells + 4
     assert graph.is_directed()
     assert not graph.is_multigraph()
-
-
-def test_components_gives_labels_without_making_sets(graph):
     label = graph.components().label
     assert isinstance(label, np.ndarray)
     assert label.dtype == np.int32

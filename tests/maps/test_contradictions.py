@@ -16,10 +16,6 @@ from limitsets.systems.graph import building as memory
 # Kernels of a map of one's own that contradict each other: one line each, of the package's family of errors.
 
 
-class Base(NamedTuple):
-    slope: float
-
-
 def made(name, **kernels):
     """Register a class of its own."""
     return ls.register(NamedTuple(name, [("slope", float)]), **kernels)
@@ -30,18 +26,13 @@ def tent(params, x, side):
 
 
 def tent_on(params, x, side, branch):
-    return (
-        (params.slope * x, side, params.slope)
-        if branch == 0
-        else (params.slope * (1 - x), side, -params.slope)
-    )
+    up = (params.slope * x, side, params.slope)
+    return up if branch == 0 else (params.slope * (1 - x), side, -params.slope)
 
 
 def tent_box(low, high, lo, hi, side):
-    one, two = (
-        iv.mul((low.slope, high.slope), (lo, hi)),
-        iv.mul((low.slope, high.slope), iv.sub((1.0, 1.0), (lo, hi))),
-    )
+    slope = (low.slope, high.slope)
+    one, two = iv.mul(slope, (lo, hi)), iv.mul(slope, iv.sub((1.0, 1.0), (lo, hi)))
     left, right = (one[0], one[1], side, 0), (two[0], two[1], side, 1)
     return (1 if (hi < 0.5) | (lo >= 0.5) else 2), left if lo < 0.5 else right, right, (0.0, 0.0)
 
@@ -91,12 +82,8 @@ def other_box(low, high, lo, hi, side):
 
 def other_side_box(low, high, lo, hi, side):
     count, first, second, witness = tent_box(low, high, lo, hi, side)
-    return (
-        count,
-        (first[0], first[1], 1 - side, first[3]),
-        (second[0], second[1], 1 - side, second[3]),
-        witness,
-    )
+    other = (first[0], first[1], 1 - side, first[3]), (second[0], second[1], 1 - side, second[3])
+    return count, other[0], other[1], witness
 
 
 def root(params, x, side):
@@ -114,45 +101,33 @@ TWO = ("left", "right")
 GRID = [(0.0, 1.0)]
 
 
-@pytest.mark.parametrize(
-    ("kernels", "method", "words"),
-    [
+TENT = {"image": tent, "branches": TWO}
+
+
+def test_a_contradiction_is_one_line():
+    for kernels, method, words in (
         ({"image": misspelt}, None, ["image of Case", "'slop'", "(slope)", "test_contradictions.py, line"]),
         ({"image": no_code}, None, ["image of Case", "2 values", "3 values"]),
         ({"image": a_number}, None, ["image of Case", "float64", "a tuple"]),
         ({"image": unknown_name}, None, ["image of Case", "hepler"]),
-        (
-            {"image": third_branch, "branches": TWO},
-            None,
-            ["code", "image of Case", "is 2", "0 left, 1 right"],
-        ),
+        (TENT | {"image": third_branch}, None, ["code", "image of Case", "is 2", "0 left, 1 right"]),
         ({"image": tent}, None, ["code", "is 1", "0 map", "branches="]),
-        (
-            {"image": tent, "image_on": other_image, "branches": TWO},
-            None,
-            ["image_on on branch 0 (left)", "x = "],
-        ),
-        ({"image": tent, "image_on": other_side, "branches": TWO}, None, ["image_on on branch", "side"]),
-        ({"image": tent, "image_on": swapped_branches, "branches": TWO}, None, ["image_on on branch 0"]),
-        (
-            {"image": tent, "image_on": no_side, "branches": TWO},
-            None,
-            ["image_on of Case", "float64", "a tuple"],
-        ),
-        ({"image": tent, "image_box": other_box, "branches": TWO}, "boxes", ["image_box of Case", "x = "]),
-        ({"image": tent, "image_box": other_side_box, "branches": TWO}, "boxes", ["image_box of Case"]),
+        (TENT | {"image_on": other_image}, None, ["image_on on branch 0 (left)", "x = "]),
+        (TENT | {"image_on": other_side}, None, ["image_on on branch", "side"]),
+        (TENT | {"image_on": swapped_branches}, None, ["image_on on branch 0"]),
+        (TENT | {"image_on": no_side}, None, ["image_on of Case", "float64", "a tuple"]),
+        (TENT | {"image_box": other_box}, "boxes", ["image_box of Case", "x = "]),
+        (TENT | {"image_box": other_side_box}, "boxes", ["image_box of Case"]),
         ({"image": root, "image_box": root_box}, "boxes", ["image_box of Case", "nan"]),
-    ],
-)
-def test_a_contradiction_is_one_line(kernels, method, words):
-    case = made("Case", **kernels)
-    with pytest.raises(MapError) as caught:
-        ls.transitions(case(0.7), ls.grid(GRID, cells=64), method)
-    text = str(caught.value)
-    assert "\n" not in text
-    assert len(text) < 400
-    for word in words:
-        assert word in text
+    ):
+        case = made("Case", **kernels)
+        with pytest.raises(MapError) as caught:
+            ls.transitions(case(0.7), ls.grid(GRID, cells=64), method)
+        text = str(caught.value)
+        assert "\n" not in text
+        assert len(text) < 400
+        for word in words:
+            assert word in text
 
 
 @pytest.mark.parametrize(
@@ -228,9 +203,8 @@ def place_in(error):
 def test_a_margin_that_changes_sign_beside_the_switch_of_image_is_refused(off, way):
     params = Beside(1.8, 0.5 + way * off)
     for method in (None, "boxes"):
-        with pytest.raises(
-            MapError, match=r"'\d \(\w+\)'; allowed: \d \(\w+\), as its kernel image"
-        ) as caught:
+        said = r"'\d \(\w+\)'; allowed: \d \(\w+\), as its kernel image"
+        with pytest.raises(MapError, match=said) as caught:
             ls.transitions(params, INSIDE, method)
         x = place_in(caught.value)
         # there the two do differ: by the plain functions
@@ -306,9 +280,8 @@ def test_switches_that_differ_by_rounding_are_one(shift):
         params = OneOver(slope, shift)
         x = shift + 1.0 / slope
         near = x + np.spacing(x) * np.arange(-3, 4)
-        differing += any(
-            one_over(params, v, 0)[2] != (one_over_margin(params, v, 0) > 0.0) for v in near.tolist()
-        )
+        signs = [one_over_margin(params, v, 0) > 0.0 for v in near.tolist()]
+        differing += [one_over(params, v, 0)[2] for v in near.tolist()] != signs
         ls.transitions(params, ls.grid([(shift + 0.01, shift + 1.1)], cells=16))
     assert differing > 0
 
@@ -375,16 +348,13 @@ def test_the_plane():
 
 
 @pytest.mark.parametrize(
-    ("domain", "cells", "method"),
-    [
-        ([(-2, 2)] * 2, 512, None),
-        ([(-2, 2)] * 2, 512, "boxes"),
-        ([(0, 1)], 4096, None),
-    ],
+    ("dimension", "cells", "method"), [(2, 512, None), (2, 512, "boxes"), (1, 4096, None)]
 )
-def test_a_graph_that_does_not_fit_is_refused_and_the_one_proposed_is_not(monkeypatch, domain, cells, method):
-    map_ = ls.maps.Henon() if len(domain) == 2 else ls.maps.Logistic(3.5)
-    monkeypatch.setattr(memory, "_free_bytes", lambda: 2_000_000 if len(domain) == 2 else 100_000)
+def test_a_graph_that_does_not_fit_is_refused_and_the_one_proposed_is_not(
+    monkeypatch, dimension, cells, method
+):
+    map_, domain = (ls.maps.Henon(), [(-2, 2)] * 2) if dimension == 2 else (ls.maps.Logistic(3.5), [(0, 1)])
+    monkeypatch.setattr(memory, "_free_bytes", lambda: 2_000_000 if dimension == 2 else 100_000)
     monkeypatch.setattr(memory, "SMALL", 0)
     with pytest.raises(AnswerError, match=r"about .* GB.*that are free here.*ask for fewer cells") as caught:
         ls.transitions(map_, ls.grid(domain, cells=cells), method)
@@ -465,24 +435,10 @@ def test_an_array_in_place_of_a_state_is_named(params, domain, start):
         ls.orbit(params, start, 0, 3)
 
 
-class Entries(NamedTuple):
-    r: float
-
-
-class Unpacked(NamedTuple):
-    r: float
-
-
-class TwoOfOne(NamedTuple):
-    r: float
-
-
-class OneOfTwo(NamedTuple):
-    r: float
-
-
-class Compared(NamedTuple):
-    r: float
+# Classes of one parameter each.
+Entries, Unpacked, TwoOfOne, OneOfTwo, Compared = (
+    NamedTuple(name, [("r", float)]) for name in ("Entries", "Unpacked", "TwoOfOne", "OneOfTwo", "Compared")
+)
 
 
 def _entries(params, x, side):
@@ -513,33 +469,26 @@ ls.register(OneOfTwo, image=_one_of_two, dimension=2)
 ls.register(Compared, image=_compared, branches=("left", "right"))
 
 
-@pytest.mark.parametrize(
-    ("params", "said"),
-    [
-        (
-            Entries(3.5),
-            r"takes entries of \(test_kernels_refused.py, line \d+\) is 'a number'.*write x, not x\[0\]",
-        ),
+def test_a_kernel_of_another_dimension_is_told_so():
+    for params, said in (
+        (Entries(3.5), r"takes entries of \(test_\w+.py, line \d+\) is 'a number'.*write x, not x\[0\]"),
         (Unpacked(3.5), r"takes entries of .* is 'a number'.*pass dimension="),
         (TwoOfOne(3.5), "new x .* image of TwoOfOne gives is 'a tuple of 2 numbers'.*pass dimension="),
         (OneOfTwo(3.5), "new x .* image of OneOfTwo gives is 'a number'.*two or three as a tuple"),
-    ],
-)
-def test_a_kernel_of_another_dimension_is_told_so(params, said):
-    plane = type(params) is OneOfTwo
-    with pytest.raises(MapError, match=said):
-        ls.transitions(params, ls.grid(PLANE if plane else LINE, cells=8))
-    with pytest.raises(MapError, match=said):
-        ls.orbit(params, (0.1, 0.1) if plane else 0.1, 0, 3)
+    ):
+        plane = type(params) is OneOfTwo
+        with pytest.raises(MapError, match=said):
+            ls.transitions(params, ls.grid(PLANE if plane else LINE, cells=8))
+        with pytest.raises(MapError, match=said):
+            ls.orbit(params, (0.1, 0.1) if plane else 0.1, 0, 3)
 
 
 def test_a_forgotten_dimension_is_named_with_the_call_that_takes_it():
     said = "dimension of the grid is 2; allowed: 1, that of Unpacked;.*pass dimension=2 to limitsets.register"
     with pytest.raises(AnswerError, match=said):
         ls.transitions(Unpacked(0.5), ls.grid(PLANE, cells=8))
-    with pytest.raises(
-        MapError, match=r"start x is 'a list of 2'; .*pass dimension=2 to limitsets\.register"
-    ):
+    said = r"start x is 'a list of 2'; .*pass dimension=2 to limitsets\.register"
+    with pytest.raises(MapError, match=said):
         ls.orbit(Unpacked(0.5), (0.1, 0.1), 0, 3)
     with pytest.raises(AnswerError) as caught:  # of a map of the package nobody can change it
         ls.transitions(ls.maps.Logistic(3.5), ls.grid(PLANE, cells=8))
@@ -547,9 +496,8 @@ def test_a_forgotten_dimension_is_named_with_the_call_that_takes_it():
 
 
 def test_boxes_of_an_image_with_branches_name_what_is_missing():
-    with pytest.raises(
-        AnswerError, match=r"'Compared, of the branches left, right'.*register image_on and margin"
-    ):
+    said = r"'Compared, of the branches left, right'.*register image_on and margin"
+    with pytest.raises(AnswerError, match=said):
         ls.transitions(Compared(1.8), ls.grid(LINE, cells=8), "boxes")
 
 

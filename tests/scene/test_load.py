@@ -68,23 +68,15 @@ def test_every_section(whole: dict[str, Any]) -> None:
     rate = math.radians(158.02)
     assert scene.gravity == pytest.approx(386.0885826771653 / 2, rel=1e-15)
     assert scene.kappa == pytest.approx(386.0885826771653 / 2 / rate**2, rel=1e-15)
-    assert scene.world == World(
-        0.9,
-        0.4,
-        0.01,
-        math.radians(5),
-        Scatter(Deviation(0.01, relative=True), Deviation(0.05, relative=False)),
-        {"throw_rate": 2.0},
-    )
+    scatter = Scatter(Deviation(0.01, relative=True), Deviation(0.05, relative=False))
+    assert scene.world == World(0.9, 0.4, 0.01, math.radians(5), scatter, {"throw_rate": 2.0})
     assert scene.effects == Effects(auto=True)
     assert scene.tolerance == {
         "throw.speed": Deviation(0.01, relative=True),
         "part.sides[1]": Deviation(0.01, relative=False),
     }
-    assert scene.feedback == Feedback(
-        (ChosenThrow("own", "throw.speed", "158.02 deg/s"), ChosenThrow("slow", "throw.kappa", "30 in")),
-        BeyondSensor(20.0, 0.1),
-    )
+    own, slow = ("own", "throw.speed", "158.02 deg/s"), ("slow", "throw.kappa", "30 in")
+    assert scene.feedback == Feedback((ChosenThrow(*own), ChosenThrow(*slow)), BeyondSensor(20.0, 0.1))
 
 
 def test_plate_with_a_point_mass(plate: dict[str, Any]) -> None:
@@ -103,11 +95,8 @@ def test_plate_with_a_point_mass(plate: dict[str, Any]) -> None:
 def test_a_density_of_volume_and_a_thickness_are_one_of_area(plate: dict[str, Any]) -> None:
     """1 g/cm^3 times 2 mm is 2 kg/m^2."""
     wanted = load(plate)
-    for density, thickness in (
-        ("1000 kg/m^3", "2 mm"),
-        ("1 g/cm^3", "2000 \u00b5m"),
-        ("0.5 g/cm^3", "0.4 cm"),
-    ):
+    volumes = (("1000 kg/m^3", "2 mm"), ("1 g/cm^3", "2000 \u00b5m"), ("0.5 g/cm^3", "0.4 cm"))
+    for density, thickness in volumes:
         plate["part"]["mass"] |= {"plate_density": density, "plate_thickness": thickness}
         scene = load(plate)
         assert scene.centre == pytest.approx(wanted.centre, rel=1e-15)
@@ -140,9 +129,8 @@ def test_units_of_other_workshops(plate: dict[str, Any]) -> None:
     assert scene.tolerance["arm.surface_height"].value == 2.0
     assert dump(load(dump(scene))) == dump(scene)
     assert load(dump(scene)).as_dict() == plate
-    assert scene.with_values({"throw.speed": "30 rpm"}).value("throw.speed") == pytest.approx(
-        math.pi, rel=1e-15
-    )
+    half_turn = scene.with_values({"throw.speed": "30 rpm"}).value("throw.speed")
+    assert half_turn == pytest.approx(math.pi, rel=1e-15)
     assert scene.with_values({"arm.length": "0.8 m"}).unit == "um"
 
 
@@ -182,16 +170,8 @@ def test_load_dump_load_is_the_identity(source: str, request: pytest.FixtureRequ
 
 
 def assert_same_numbers(one: Scene, other: Scene) -> None:
-    for name in (
-        "kappa",
-        "centre",
-        "radius_of_gyration",
-        "surface_height",
-        "arm_length",
-        "gravity",
-        "tolerance",
-        "feedback",
-    ):
+    numbers = "kappa centre radius_of_gyration surface_height arm_length gravity tolerance feedback"
+    for name in numbers.split():
         assert getattr(one, name) == getattr(other, name)
     for name in ("a", "d", "length", "right", "corner"):
         np.testing.assert_array_equal(getattr(one.sides, name), getattr(other.sides, name))
@@ -249,16 +229,12 @@ def test_equality_is_that_of_the_words(whole: dict[str, Any]) -> None:
     assert load(whole).as_dict() != copied
 
 
-def test_map_is_the_throw_of_the_scene() -> None:
+def test_map_is_the_throw_of_the_scene_and_its_domain_begins_just_beyond_the_feet() -> None:
     scene = load("paper-designed")
     assert scene.map is scene.map
     assert scene.map.kappa == 25.3778518
     assert scene.map.arm_length == 28.0
     np.testing.assert_array_equal(scene.map.corner, scene.sides.corner)
-
-
-def test_domain_begins_just_beyond_the_feet() -> None:
-    scene = load("paper-designed")
     domain, a = scene.domain, scene.sides.a
     assert scene.domain is domain
     np.testing.assert_allclose(np.ravel(domain.lo) - a, 1e-6 * (28.0 - a), rtol=1e-6)
@@ -286,20 +262,11 @@ def test_reading_a_scene_loads_little() -> None:
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
 
 
-TABLES = (
+TABLES = {
     "part",
     "part.mass",
-    "arm",
-    "throw",
-    "gravity",
-    "model",
-    "goal",
-    "cavity",
-    "tray",
-    "world",
-    "effects",
-    "feedback",
-)
+    *["arm", "throw", "gravity", "model", "goal", "cavity", "tray", "world", "effects", "feedback"],
+}
 
 
 def keys(table, path=""):
@@ -429,15 +396,10 @@ LENGTHS = st.builds("{:.6f} {}".format, st.floats(4.0, 4.6), st.just("in")) | st
 def test_round_trip(
     sides: list[str], along: float, height: float, flight: str, world: dict[str, float], name: str
 ) -> None:
+    centre = {"side": 0, "along": f"{along * 4!r} in", "above": "0.9 in"}
     table = {
         "name": name,
-        "part": {
-            "sides": sides,
-            "mass": {
-                "center": {"side": 0, "along": f"{along * 4!r} in", "above": "0.9 in"},
-                "radius_of_gyration": "3 cm",
-            },
-        },
+        "part": {"sides": sides, "mass": {"center": centre, "radius_of_gyration": "3 cm"}},
         "arm": {"surface_height": f"{height:.8f} in", "length": "2.5 ft"},
         "throw": {"kappa": "30 in"},
         "model": {"flight": flight},
@@ -462,12 +424,10 @@ CHAMFER = 3
 def chamfered(**tables: Any) -> dict[str, Any]:
     """A square plate of 4 cm with a corner cut off, on which it tips over the right end."""
     corners = ((0, 0), (4, 0), (4, 3.6), (3.0, 4), (0, 4))
+    vertices = [[f"{x} cm", f"{y} cm"] for x, y in corners]
     return {
         "name": "chamfered",
-        "part": {
-            "vertices": [[f"{x} cm", f"{y} cm"] for x, y in corners],
-            "mass": {"plate_density": "23.55 kg/m^2"},
-        },
+        "part": {"vertices": vertices, "mass": {"plate_density": "23.55 kg/m^2"}},
         "arm": {"surface_height": "-3 mm", "length": "40 cm"},
         "throw": {"kappa": "20 cm"},
     } | tables
@@ -479,12 +439,9 @@ def test_the_error_names_the_lines_to_add() -> None:
     assert "the part cannot rest on side 3: it tips over the right end by 0.197 cm" in str(caught.value)
     assert "add landing = true and roll = true to [effects]" in str(caught.value)
     assert caught.value.key == "part.mass"
-
-
-@pytest.mark.parametrize("effects", [{"roll": True}, {"landing": True}, {"landing": True, "roll": False}])
-def test_one_of_the_lines_is_not_enough(effects: dict[str, bool]) -> None:
-    with pytest.raises(TipsError):
-        ls.load(chamfered(effects=effects))
+    for effects in ({"roll": True}, {"landing": True}, {"landing": True, "roll": False}):
+        with pytest.raises(TipsError):
+            ls.load(chamfered(effects=effects))
 
 
 def test_with_the_lines_it_loads_and_has_no_states_on_the_chamfer() -> None:
@@ -500,33 +457,26 @@ def test_with_the_lines_it_loads_and_has_no_states_on_the_chamfer() -> None:
     assert ls.load(scene.as_dict()) == scene
 
 
-@pytest.mark.parametrize(
-    ("tables", "key", "words"),
-    [
+SMALL_CAVITY = {"position": "39 cm", "width": "9 cm", "depth": "2 cm", "angle": "45 deg"}
+ONE_THROW = {"sensor": {"side": 0}, "throws": [{"name": "one", "kappa": "20 cm"}]}
+
+
+def test_what_knows_nothing_of_a_chamfer_is_refused() -> None:
+    for tables, key, words in (
         ({"model": {"flip": "energy"}}, "model.flip", "signed"),
         (
             {"effects": BOTH | {"drive": True}, "world": {"stroke": "5 deg"}},
             "effects.drive",
-            "cannot rest on side 3",
+            "rest on side 3",
         ),
         ({"goal": {"oriented_beyond": {"x": "10 cm", "side": 3}}}, "goal.oriented_beyond.side", "0, 1, 2, 4"),
         ({"goal": {"flip_order": [0, 3]}}, "goal.flip_order[1]", "cannot rest on it"),
-        (
-            {"cavity": {"position": "39 cm", "width": "9 cm", "depth": "2 cm", "angle": "45 deg"}},
-            "cavity",
-            "rests on each of its sides",
-        ),
-        (
-            {"feedback": {"sensor": {"side": 0}, "throws": [{"name": "one", "kappa": "20 cm"}]}},
-            "feedback",
-            "rests on each of its sides",
-        ),
-    ],
-)
-def test_what_knows_nothing_of_a_chamfer_is_refused(tables: dict[str, Any], key: str, words: str) -> None:
-    with pytest.raises(SceneError, match=words) as caught:
-        ls.load(chamfered(**{"effects": BOTH, **tables}))
-    assert caught.value.key == key
+        ({"cavity": SMALL_CAVITY}, "cavity", "rests on each of its sides"),
+        ({"feedback": ONE_THROW}, "feedback", "rests on each of its sides"),
+    ):
+        with pytest.raises(SceneError, match=words) as caught:
+            ls.load(chamfered(**{"effects": BOTH, **tables}))
+        assert caught.value.key == key
 
 
 def test_only_what_analyse_reads_switches_the_effects_on() -> None:

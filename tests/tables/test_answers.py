@@ -60,17 +60,12 @@ def test_scene_graph_and_sets(graph, found):
     assert "proved" in captions(ls.transitions(graph.map, graph.grid, "boxes"))[0]
     (attractor,) = found
     bands = [
-        (str(side), repr(lo), repr(hi))
-        for side, parts in sorted(attractor.extents.items())
-        for lo, hi in parts
+        [str(side), *map(repr, part)] for side, parts in sorted(attractor.extents.items()) for part in parts
     ]
-    assert [tuple(row[:3]) for row in saved(attractor)[1:]] == bands
+    assert [row[:3] for row in saved(attractor)[1:]] == bands
     basins = ls.basins(graph, found)
-    assert [float(row[1]) for row in saved(basins)[1:]] == [
-        *basins.attractors,
-        *basins.exits.values(),
-        basins.undecided_between,
-    ]
+    shares = [*basins.attractors, *basins.exits.values(), basins.undecided_between]
+    assert [float(row[1]) for row in saved(basins)[1:]] == shares
     assert len(shown(basins)[0]) == 1 + len(basins.attractors) + len(basins.exits) + 1
     limit = ls.limit_set(graph, attractor)
     assert [float(row[2]) for row in saved(limit)[1:]] == [end.x for end in limit.ends]
@@ -98,16 +93,12 @@ def test_analysis_and_audit():
 
 
 def test_resilience(graph, found):
-    answers = (
-        ls.resilience.basin_entropy(graph, found),
-        ls.resilience.basin_stability(graph, found),
-        ls.resilience.convergence_times(graph, found, starts=200),
-        ls.resilience.uncertainty_exponent(graph, found),
-    )
-    for answer in answers:
+    r = ls.resilience
+    stability, times = r.basin_stability(graph, found), r.convergence_times(graph, found, starts=200)
+    for answer in (r.basin_entropy(graph, found), stability, times, r.uncertainty_exponent(graph, found)):
         assert shown(answer)
         assert "not proved" in captions(answer)[0]
-    assert float(saved(answers[1])[1][1]) == answers[1].attractors[0].share
+    assert float(saved(stability)[1][1]) == stability.attractors[0].share
 
 
 @pytest.mark.sweep
@@ -127,69 +118,44 @@ def test_margins_designs_and_noise():
     (margin,) = ls.margin("paper-designed", "throw.speed", width=0.2)
     row = saved(margin)[1]
     assert [float(row[2]), float(row[3])] == [margin.proved, margin.refuted]
-    assert captions(margin)[0].endswith(
-        "(brackets: proved below, refuted above; of the minimal model: no fact of [world] is left out)"
-    )
+    how = "brackets: proved below, refuted above; of the minimal model: no fact of [world] is left out"
+    assert captions(margin)[0].endswith(f"({how})")
     assert shown(margin)
     design = ls.design("paper-initial", critical_points=[10, 10, 20], vary=["throw.kappa"])
     assert shown(design)
     assert [float(each[2]) for each in saved(design)[1:2]] == [design.scene.kappa]
     scene = ls.load("paper-designed")
-    noise = ls.noise_statistics(
-        scene, ls.robust.Scattering(speed=ls.robust.Gaussian(0.005)), cells=64, strata=4, sensitivity=False
-    )
-    assert {row[0]: float(row[1]) for row in saved(noise)[1:] if row[1]} == {
-        name: value for name, value in noise.numbers.items() if value == value
-    }
+    law = ls.robust.Scattering(speed=ls.robust.Gaussian(0.005))
+    noise = ls.noise_statistics(scene, law, cells=64, strata=4, sensitivity=False)
+    numbers = {name: value for name, value in noise.numbers.items() if value == value}
+    assert {row[0]: float(row[1]) for row in saved(noise)[1:] if row[1]} == numbers
 
 
 def test_continuation_and_atlas(tmp_path):
     pytest.importorskip("xarray", reason="the extra atlas")
-    found = ls.atlas(
-        "paper-designed", "throw.kappa=25:26:2", task="limitsets.parameters.atlas.examples:critical_points"
-    )
+    task = "limitsets.parameters.atlas.examples:critical_points"
+    found = ls.atlas("paper-designed", "throw.kappa=25:26:2", task=task)
     assert shown(found)
     assert len(saved(found)) == 3
     assert saved(found)[0][0] == "throw.kappa [in]"
 
 
 def test_every_answer_of_a_public_function_is_tabled():
-    from limitsets import (
-        analysis,
-        assembly,
-        auditing,
-        feeding,
-        fitting,
-        graph,
-        inverse,
-        policies,
-        robust,
-        trays,
-    )
     from limitsets.parameters.atlas import Atlas
     from limitsets.parameters.continuation.snapshot import Continuation
     from limitsets.parameters.sheet.summary import Robustness
     from limitsets.proofs.prover import Proof
 
     answers = [
-        analysis.Analysis,
-        assembly.Assembly,
-        auditing.Audit,
-        feeding.Feeding,
-        fitting.Fit,
-        graph.TransitionGraph,
-        inverse.Design,
-        inverse.RobustDesign,
-        policies.Synthesis,
-        robust.AbsorptionBrackets,
-        robust.Margin,
-        trays.TrayFill,
-        Atlas,
-        Continuation,
-        Proof,
-        Robustness,
+        ls.analysis.Analysis,
+        ls.assembly.Assembly,
+        ls.auditing.Audit,
+        ls.feeding.Feeding,
+        ls.fitting.Fit,
     ]
-    for each in answers:
+    answers += [ls.graph.TransitionGraph, ls.inverse.Design, ls.inverse.RobustDesign, ls.policies.Synthesis]
+    answers += [ls.robust.AbsorptionBrackets, ls.robust.Margin, ls.trays.TrayFill]
+    for each in [*answers, Atlas, Continuation, Proof, Robustness]:
         assert issubclass(each, Tabled), each
         assert each.tables is not Tabled.tables, each
 
@@ -270,9 +236,8 @@ class Answer(Tabled):
         self.x = x
 
     def tables(self):
-        return Table([Column("x", "mm", ".1f")], [[self.x]], "An answer", "sampled, not proved"), facts(
-            "f", {"a": 1}
-        )
+        table = Table([Column("x", "mm", ".1f")], [[self.x]], "An answer", "sampled, not proved")
+        return table, facts("f", {"a": 1})
 
 
 def test_an_answer_is_shown_saved_and_given_to_pandas(tmp_path):
@@ -319,15 +284,9 @@ def lines(monkeypatch, *told):
 
 
 def test_the_last_of_a_hundred_is_the_hundredth(impatient, monkeypatch):
-    told = lines(
-        monkeypatch, ("designs", 0, 100), ("designs", 99, 100), ("designs", 100, 100), ("done", 0, 0)
-    )
-    assert told == [
-        "limitsets: designs (1 of 100)",
-        "limitsets: designs (100 of 100)",
-        "limitsets: designs (100 of 100)",
-        "limitsets: done (1 of 1)",
-    ]
+    told = lines(monkeypatch, *(("designs", k, 100) for k in (0, 99, 100)), ("done", 0, 0))
+    steps = ["designs (1 of 100)", "designs (100 of 100)", "designs (100 of 100)", "done (1 of 1)"]
+    assert told == [f"limitsets: {step}" for step in steps]
 
 
 def test_what_is_quick_says_nothing(monkeypatch):
@@ -366,9 +325,8 @@ def test_a_step_that_counts_anew_has_a_bar_of_its_own(monkeypatch):
             pass
 
         def add_task(self, description, total, number):
-            self.tasks.append(
-                SimpleNamespace(description=description, total=total, completed=0, number=number)
-            )
+            task = SimpleNamespace(description=description, total=total, completed=0, number=number)
+            self.tasks.append(task)
             return len(self.tasks) - 1
 
         def update(self, task, **now):
@@ -381,10 +339,8 @@ def test_a_step_that_counts_anew_has_a_bar_of_its_own(monkeypatch):
     with progress._on_terminal() as tell:
         for step, done, of in (("a", 0, 2), ("b", 1, 2), ("cells", 0, 9), ("cells", 5, 9)):
             tell(step, done, of)
-    assert [(each.description, each.completed, each.total) for each in shown[0].tasks] == [
-        ("b", 2, 2),
-        ("cells", 5, 9),
-    ]
+    tasks = [(each.description, each.completed, each.total) for each in shown[0].tasks]
+    assert tasks == [("b", 2, 2), ("cells", 5, 9)]
 
 
 def test_outside_of_a_notebook_a_function_is_as_silent_as_it_was(impatient, capfd):
@@ -441,9 +397,7 @@ def test_a_notebook_shows_a_bar_and_tables():
     outputs = [cell.outputs for cell in book.cells]
     assert "<table>" in outputs[1][0]["data"]["text/html"]
     assert "centre of mass" in outputs[1][0]["data"]["text/plain"]
-    assert [each["data"].get("text/html", "7") for each in outputs[2]] == [
-        "",
-        "7",
-    ]  # the bar is gone at the end
+    texts = [each["data"].get("text/html", "7") for each in outputs[2]]
+    assert texts == ["", "7"]  # the bar is gone at the end
     assert outputs[3][0]["text"] == "('<steps>', 0, 4) True\n"
     assert "<td>3</td>" in outputs[4][0]["data"]["text/html"]

@@ -207,8 +207,6 @@ def _text_of_sheet(given: SceneOf, sheet: Robustness) -> Iterator[str | Table]:
         reason = sheet.left_out.get(part)
         if reason and reason != "it was not asked for":
             yield f"no {part}: {reason}"
-    if sheet.again:
-        yield f"found by an earlier run: {sheet.again} of {len(sheet.entries)} margins"
 
 
 # ----------------------------------------------------------------
