@@ -15,11 +15,11 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from flint import arb
+from tests.proofs.random_scenes import case
 
 import limitsets as ls
 from limitsets.proofs.prover.certifying import certify
 from tests.proofs import forge
-from tests.proofs.random_scenes import case
 from tests.proofs.test_end_points import CONTRACTING
 from tests.proofs.test_recheck import COARSE, checker, parts, verdict, whole
 from tests.sets.part import Part

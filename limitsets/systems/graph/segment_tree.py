@@ -40,7 +40,7 @@ def leaves_of(n: int) -> int:
 
 
 @kernel
-def _child_of_inner(node: Any, end: Any, at: Any, rank: Any) -> tuple[int, int]:
+def _child_of_inner(node: Any, end: Any, at: Any, rank: Any) -> tuple[Any, Any]:
     """Return the next child of an inner node without a rank, or -1; and the least rank of those before it."""
     child, least, step = np.int64(-1), rank[node], np.int64(at[0])
     while step < 2 and child < 0:
@@ -56,7 +56,7 @@ def _child_of_inner(node: Any, end: Any, at: Any, rank: Any) -> tuple[int, int]:
 
 
 @kernel
-def _child_of_cell(r: Ranges, leaf: int, node: Any, at: Any, rank: Any, loops: Any) -> tuple[int, int]:
+def _child_of_cell(r: Ranges, leaf: int, node: Any, at: Any, rank: Any, loops: Any) -> tuple[Any, Any]:
     """Return the next node without a rank in the cover of a cell's image, or -1; and the least rank before it."""
     cell, child, least = node - leaf, np.int64(-1), rank[node]
     box, left, right = np.int64(at[0]), np.int64(at[1]), np.int64(at[2])

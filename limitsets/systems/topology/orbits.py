@@ -252,7 +252,7 @@ def _joins(params: Any, x: float, side: int, known: int, scale: float, u: Unions
 
 
 @kernel
-def _goes_on(p: Pieces, q: int, x: float, to: int, close: float) -> bool:
+def _goes_on(p: Pieces, q: int, x: float, to: int, close: float) -> Any:
     """Whether the image of piece q begins where that of the piece before ends: a turning point, whose orbit is one."""
     return p.to[q - 1] == to and abs(p.y_hi[q - 1] - x) <= close
 
