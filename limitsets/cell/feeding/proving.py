@@ -211,8 +211,7 @@ def proved_feeding(
         if never.states:
             cycle, reason = never.recurs.get("cycle", {}), "a periodic orbit is never fed"
             fed = replace(fed, verdict="refuted", never_fed=never.states, cycle=cycle, reason=reason)
-        refuted = fed.verdict == "refuted" and fed.almost_every == "proved"
-        if safe.verdict in ("proved", "refuted") and (fed.verdict == "proved" or refuted):
+        if _is_answered(safe, fed):
             break
         proved = f"; so far {100 * safe.share:.4g} % safe, {100 * max(fed.share, fed.almost_share):.4g} % fed"
         now = time.perf_counter()
@@ -224,6 +223,12 @@ def proved_feeding(
         open_ = f"the noise was cut into {pieces} pieces, not {PIECES[0]}, which would take longer"
         fed = replace(fed, reason="; ".join(filter(None, (fed.reason, open_))))
     return FeedingProof(safe, fed, region)
+
+
+def _is_answered(safe: Safe, fed: Fed) -> bool:
+    """Whether no finer cells can say more: of the starts that are not fed, whether these are almost none too."""
+    refuted = fed.verdict == "refuted" and fed.almost_every == "proved"
+    return safe.verdict in ("proved", "refuted") and (fed.verdict == "proved" or refuted)
 
 
 def _pieces(box: ParameterBox, cuts: Mapping[int, Sequence[float]], seconds: float) -> int:

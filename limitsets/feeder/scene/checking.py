@@ -90,7 +90,7 @@ def _rows(scene: Scene) -> Iterator[Row]:
     text, unit, metre = scene.text, scene.unit, float(exact_factor(scene.unit, "m"))
     part, (word,) = text["part"], text["throw"]
     arm, size, over = scene.arm_length, float(scene.sides.length.max()), "{} times the part's longest side"
-    shape, small = "part.sides" if "sides" in part else "part.vertices", "below 0.05 times"
+    shape = "part.sides" if "sides" in part else "part.vertices"
     yield shape, size * metre, 1e-4, 1.0, "the longest side is {} m", "1 mm to 0.5 m"
     yield "arm.length", arm * metre, 1e-3, 3.0, "the arm is {} m long", "1 cm to 2 m"
     yield "arm.length", arm / size, 0.0, 40.0, over, "2 to 10 times"
@@ -110,6 +110,12 @@ def _rows(scene: Scene) -> Iterator[Row]:
     usual = f"{usual} {'deg/s' if word == 'speed' else unit}"
     said, turned = "a part thrown from the arm's end turns {} times before it lands", turns(arm, scene.kappa)
     yield f"throw.{word}", turned, LEAST_TURNS, MOST_TURNS, said, usual
+    yield from _rows_of_what_varies(scene, size, over)
+
+
+def _rows_of_what_varies(scene: Scene, size: float, over: str) -> Iterator[Row]:
+    """Give what is measured of tolerances, of scatter and of the world; `size` is the part's longest side."""
+    text, small = scene.text, "below 0.05 times"
     for name, deviation in scene.tolerance.items():
         key = f'tolerance."{name}"'
         if find(name).dimension == "length" and not deviation.relative and name != "throw.kappa":

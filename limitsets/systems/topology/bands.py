@@ -230,6 +230,19 @@ def cover_more(u: Unions, scale: float) -> bool:
     return True
 
 
+@kernel
+def _fill_order(u: Unions, sides: int, first: int, regular: Any, order: Any) -> None:
+    """Write in which order `u.seen` leads from side to side; `IRREGULAR` if not one cycle holds all that are left."""
+    side, n, left = first, 0, 0
+    for other in range(sides):
+        left += u.seen[other] >= 0
+    while side >= 0 and n < left and (n == 0 or side != first):
+        order[n] = side
+        side, n = u.seen[side], n + 1
+    if not (regular and n == left and side == first):
+        order[:] = IRREGULAR
+
+
 @kernel(entry=True, counting=False)
 def push_through(
     params: Any, sides: int, scale: float, p: Pieces, u: Unions, jogs_min: Any, jogs_max: Any, order: Any
@@ -268,15 +281,8 @@ def push_through(
             least = side
     if least < 0:
         order[0] = u.side[SET, 0]
-        return NOTHING
-    side, n, left = least, 0, 0
-    for each in range(sides):
-        left += u.seen[each] >= 0
-    while side >= 0 and n < left and (n == 0 or side != least):
-        order[n] = side
-        side, n = u.seen[side], n + 1
-    if not (regular and n == left and side == least):  # no one cycle through all sides that are left
-        order[:] = IRREGULAR
+    else:
+        _fill_order(u, sides, least, regular, order)
     return NOTHING
 
 
