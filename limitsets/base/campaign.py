@@ -357,6 +357,33 @@ def _in_words(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
 
 
+def _require_another_worker(work: Work, pool: Executor, number: int, deaths: int) -> None:
+    """Refuse to go on where a chunk kills each worker, or where nobody starts another one."""
+    if deaths == _MOST_DEATHS:
+        raise LimitsetsError(
+            "a worker", f"killed {_MOST_DEATHS} times by one chunk", "a chunk that a worker survives",
+            f"it is the one at {work.place(number)}; look at its memory and at the task there",
+        )  # fmt: skip
+    if not isinstance(pool, Processes):
+        raise LimitsetsError(
+            "the executor", "broken: one of its workers died", "one whose workers live",
+            "start a new one; the same call goes on with what is left",
+        )  # fmt: skip
+
+
+def _answer_of(future: Future[Any], work: Work, number: int) -> Any:
+    """Return the answer of a chunk; an error of the task names the task and the chunk."""
+    try:
+        return future.result()
+    except (BrokenExecutor, LimitsetsError):
+        raise
+    except Exception as error:
+        raise LimitsetsError(
+            work.task, f"{type(error).__name__}: {error}", "a task that answers",
+            f"it failed in the chunk at {work.place(number)}",
+        ) from error  # fmt: skip
+
+
 def drive(
     work: Work, store: Kept, pool: Executor, window: int = _GIVEN, progress: Progress | None = None
 ) -> None:
@@ -378,16 +405,7 @@ def drive(
 
     def lost(number: int) -> None:
         deaths[number] += 1
-        if deaths[number] == _MOST_DEATHS:
-            raise LimitsetsError(
-                "a worker", f"killed {_MOST_DEATHS} times by one chunk", "a chunk that a worker survives",
-                f"it is the one at {work.place(number)}; look at its memory and at the task there",
-            )  # fmt: skip
-        if not isinstance(pool, Processes):
-            raise LimitsetsError(
-                "the executor", "broken: one of its workers died", "one whose workers live",
-                "start a new one; the same call goes on with what is left",
-            )  # fmt: skip
+        _require_another_worker(work, pool, number, deaths[number])
         again.append(number)
 
     try:
@@ -403,17 +421,10 @@ def drive(
             for future in wait(flight, timeout=_SECONDS, return_when=FIRST_COMPLETED).done:
                 number = flight.pop(future)
                 try:
-                    answer = future.result()
+                    answer = _answer_of(future, work, number)
                 except BrokenExecutor:
                     lost(number)
                     continue
-                except LimitsetsError:
-                    raise
-                except Exception as error:
-                    raise LimitsetsError(
-                        work.task, f"{type(error).__name__}: {error}", "a task that answers",
-                        f"it failed in the chunk at {work.place(number)}",
-                    ) from error  # fmt: skip
                 store.write(answer)
                 pace.points += work.size(number)
     except BaseException as error:
