@@ -121,10 +121,6 @@ GOALS: dict[str, type[Goal]] = {}
 
 
 @functools.cache  # a scene is read many times in a search
-def _hints_of(goal: Any) -> dict[str, Any]:
-    return get_type_hints(goal, include_extras=True)
-
-
 def words_of(goal: type[Goal]) -> dict[str, str]:
     """Name what a scene writes of a goal: "place", "side", "sides" or "flag", by field.
 
@@ -136,7 +132,7 @@ def words_of(goal: type[Goal]) -> dict[str, str]:
     >>> words_of(Reaches)
     {'x': 'place', 'side': 'side', 'every_orbit': 'flag'}
     """
-    hints = _hints_of(goal)
+    hints = get_type_hints(goal, include_extras=True)
     names = [each.name for each in fields(goal) if each.name not in ("from_anywhere", "laid")]
     return {name: getattr(hints[name], "__metadata__", ("flag",))[0] for name in names}
 

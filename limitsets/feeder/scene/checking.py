@@ -16,7 +16,7 @@ from limitsets.base.errors import SceneError, TipsError
 from limitsets.feeder.geometry.polygon import mass_of
 from limitsets.feeder.scene.facts import TIPPING, Scatter
 from limitsets.feeder.scene.numbers import hull_of
-from limitsets.feeder.scene.quantities import Words, at, find, words_of
+from limitsets.feeder.scene.quantities import Words, at, find, key_words
 from limitsets.feeder.scene.reading import can_name, load, replace_file, structure_of
 from limitsets.feeder.scene.scene import Scene, turns
 from limitsets.feeder.scene.schema import ByName, Key, Section, Several, schema
@@ -79,7 +79,7 @@ def doubts(scene: Scene) -> tuple[Doubt, ...]:
     for key, measured, least, most, thing, usual in _rows(scene):
         if not least <= measured <= most and not (key.startswith("throw.") and "arm.length" in by_key):
             thing = thing.format(f"{measured:.3g}" if measured < 1000 else f"{measured:.0f}")
-            text = at(scene.text, words_of(key))
+            text = at(scene.text, key_words(key))
             value = size if isinstance(text, list) else str(text)
             by_key.setdefault(key, Doubt(key, thing, value, usual, "has it the right unit?", scene.file))
     return tuple(by_key.values())
@@ -385,7 +385,7 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
     while (wrong := _first(looked_at, file)) is not None:
         path = _path_of(wrong)
         # a tolerance of what is blamed already is not given only because something stands in for that
-        about = {path, words_of(str(path[1]))} if path[0] == "tolerance" and len(path) == 2 else {path}
+        about = {path, key_words(str(path[1]))} if path[0] == "tolerance" and len(path) == 2 else {path}
         if not any(each[: len(one)] == one for each in about for one in (*blamed, *instead)):
             errors.append(wrong)
             blamed.add(path)
@@ -402,7 +402,7 @@ def examined(source: str | Path | Mapping[str, Any]) -> tuple[tuple[SceneError, 
 
 
 def _path_of(error: SceneError) -> Words:
-    return words_of(error.key or "")
+    return key_words(error.key or "")
 
 
 def _hanging_on(error: SceneError) -> set[Words]:

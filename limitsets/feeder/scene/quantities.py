@@ -91,7 +91,7 @@ def _place_of(text: str) -> Place | None:
     pattern = _pattern_of(text)
     if pattern not in NAMES or "[i]" in text:
         return None
-    path = list(words_of(text))
+    path = list(key_words(text))
     if path[1] == "vertices":
         path[-1] = "xy".index(str(path[-1]))
     return Place(text, tuple(path), NAMES[pattern])
@@ -307,12 +307,12 @@ Words: TypeAlias = tuple[str | int, ...]
 
 
 @functools.lru_cache(maxsize=1024)
-def words_of(key: str) -> Words:
+def key_words(key: str) -> Words:
     """Take a key apart.
 
     Examples
     --------
-    >>> words_of('tolerance."part.sides[1]"'), words_of("goal.flip_order[1]")
+    >>> key_words('tolerance."part.sides[1]"'), key_words("goal.flip_order[1]")
     (('tolerance', 'part.sides[1]'), ('goal', 'flip_order', 1))
     """
     return tuple(part[0] or part[2] or int(part[1]) for part in _WORDS.findall(key))
@@ -348,7 +348,7 @@ class Resolver:
 
     def text(self, key: str) -> Any:
         """Give what stands at a key."""
-        return at(self.tree, words_of(key))
+        return at(self.tree, key_words(key))
 
     def value(self, key: str, dimension: str, text: str | None = None) -> float:
         """Give the quantity at a key, or one that stands for it, in the scene's units."""

@@ -343,8 +343,6 @@ def _unit_of(tree: Mapping[str, Any]) -> str:
     """Give the unit of the arm's length, or of the first vertex or side where that cannot be read."""
     names = ("arm.length", "part.sides[0]", "part.vertices[0].x")
     for text in (text_at(tree, name) for name in names):
-        try:
+        with contextlib.suppress(SceneError):
             return parse(text, "length").unit
-        except SceneError:
-            continue
     return UNITS["length"][0]
