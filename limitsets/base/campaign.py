@@ -505,8 +505,8 @@ class TrialFile:
         return (self.rows[number] for number in range(self.trials))
 
 
-class Trial(Protocol):
-    """What is asked of trials, as workers are sent it."""
+class TrialMaker(Protocol):
+    """What makes trials, as workers are sent it."""
 
     def question(self) -> dict[str, Any]:
         """Give what is asked, for the file of the trials: everything but how many they are."""
@@ -518,7 +518,7 @@ class Trial(Protocol):
 
 
 def finished_trials(
-    trial: Trial,
+    maker: TrialMaker,
     trials: int,
     chunk: int,
     name: str,
@@ -534,8 +534,8 @@ def finished_trials(
 
     Parameters
     ----------
-    trial : Trial
-        What is asked; workers are sent it.
+    maker : TrialMaker
+        What makes them; workers are sent it.
     trials, chunk : int
         How many trials, and how many of them a worker makes at once.
     name, points : str
@@ -543,13 +543,13 @@ def finished_trials(
     file, executor, cluster, workers, progress
         As in `limitsets.assemble`.
     """
-    kept = TrialFile(None if file is None else Path(file), trial.question(), trials, chunk)
+    kept = TrialFile(None if file is None else Path(file), maker.question(), trials, chunk)
     if len(kept.done) == kept.chunks:
         return tuple(kept)
     work = Work(
         kept.chunks,
         _made,
-        (trial, trials, chunk),
+        (maker, trials, chunk),
         size=lambda chunk: len(kept.numbers(chunk)),
         place=lambda chunk: f"{points} {kept.numbers(chunk).start} to {kept.numbers(chunk).stop - 1}",
         task=f"the {points}",
@@ -563,9 +563,9 @@ def finished_trials(
     return tuple(kept)
 
 
-def _made(trial: Trial, trials: int, chunk: int, number: int) -> list[tuple[int, Row]]:
+def _made(maker: TrialMaker, trials: int, chunk: int, number: int) -> list[tuple[int, Row]]:
     """Make the trials of a chunk: what a worker does."""
-    return [(k, trial.row(k)) for k in range(number * chunk, min((number + 1) * chunk, trials))]
+    return [(k, maker.row(k)) for k in range(number * chunk, min((number + 1) * chunk, trials))]
 
 
 def _read(path: Path, question: dict[str, Any]) -> dict[int, Row]:

@@ -332,13 +332,20 @@ class TrayFill(Tabled):
 
     def _at_once(self) -> Table:
         columns: list[str | Column] = ["parts"]
-        rows: list[list[Any]] = [[crowd.words] for crowd in self.crowds]
         for name in ("right", "covered", "wrong"):
             columns += [Column(name, show=".4f"), Column(f"{name}: 95 % interval", show=".4f", ends=True)]
-            for row, crowd in zip(rows, self.crowds, strict=True):
-                row += [values[-1].tolist() for values in crowd.share(getattr(crowd, name))]
-        for row, crowd in zip(rows, self.crowds, strict=True):
-            row.append(1e3 * crowd.seconds / max(crowd.moved, 1))
+        rows = [
+            (
+                crowd.words,
+                *(
+                    share[-1].tolist()
+                    for counts in (crowd.right, crowd.covered, crowd.wrong)
+                    for share in crowd.share(counts)
+                ),
+                1e3 * crowd.seconds / max(crowd.moved, 1),
+            )
+            for crowd in self.crowds
+        ]
         crowd = self.crowds[0]
         passes = crowd.right.shape[1] - 1
         title = f"{crowd.parts} parts at once over {crowd.depressions} depressions, after {passes} passes"
