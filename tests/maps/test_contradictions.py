@@ -518,7 +518,7 @@ ls.register(Compared, image=_compared, branches=("left", "right"))
     [
         (
             Entries(3.5),
-            r"takes entries of \(test_kernels_refused.py, line \d+\) is 'a number'.*write x, not x\[0\]",
+            r"takes entries of \(test_contradictions.py, line \d+\) is 'a number'.*write x, not x\[0\]",
         ),
         (Unpacked(3.5), r"takes entries of .* is 'a number'.*pass dimension="),
         (TwoOfOne(3.5), "new x .* image of TwoOfOne gives is 'a tuple of 2 numbers'.*pass dimension="),

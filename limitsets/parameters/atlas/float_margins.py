@@ -22,10 +22,8 @@ from limitsets.feeder.scene.arrays import ThrowStack, throw_stack
 from limitsets.feeder.scene.facts import Deviation
 from limitsets.parameters.margins.deviations import deviation_scale
 from limitsets.systems.topology import Topologies, reaches, region_of
-from limitsets.systems.topology.work import DECIDED
+from limitsets.systems.topology.work import DECIDED, Floats, Ints
 
-Floats: TypeAlias = NDArray[np.float64]
-Ints: TypeAlias = NDArray[np.int64]
 Values: TypeAlias = Mapping[str, Floats]
 
 # The first step, as a share of what is known to be too much; each is so much longer than the one before.

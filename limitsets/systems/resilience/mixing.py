@@ -40,6 +40,7 @@ from limitsets.systems.resilience.orbits import (
     ROUNDING,
     STEPS,
     Colours,
+    Floats,
     best,
     colours,
     full_caption,
@@ -53,8 +54,6 @@ from limitsets.systems.sets import Attractor
 #
 # What is undecided in a box is allotted in every way to the basins in which it may lie.
 
-
-Floats = NDArray[np.float64]
 
 # Fewest starts along each axis of a box: every second of them gives two.
 ALONG = 4

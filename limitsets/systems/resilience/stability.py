@@ -27,6 +27,7 @@ from limitsets.systems.resilience.orbits import (
     ROUNDING,
     STEPS,
     Colours,
+    Floats,
     best,
     colours,
     follow,
@@ -407,8 +408,6 @@ CELLS = 2
 
 # Starts are drawn in so many balls one within the other; then so many places on the line to the nearest fatal one.
 BALLS, PLACES = 4, 1024
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

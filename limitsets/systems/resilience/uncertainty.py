@@ -36,6 +36,7 @@ from limitsets.systems.resilience.orbits import (
     MOST_UNDECIDED,
     STEPS,
     Colours,
+    Floats,
     best,
     colours,
     follow,
@@ -56,7 +57,6 @@ NEAREST, IN_A_DECADE, FEWEST_UNCERTAIN = 1e-4, 4, 20
 # The fit takes shares up to this part of that of independent starts, at so many distances at least.
 UNSATURATED, FEWEST_FITTED = 0.5, 4
 
-Floats = NDArray[np.float64]
 
 # Fewer cells along an axis than this do not give one decade.
 FEWEST = 40
