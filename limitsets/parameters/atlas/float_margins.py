@@ -39,8 +39,7 @@ SMALL = 0.05
 def threshold_of(goal: OrientedBeyond | Reaches, reach: Floats) -> Floats:
     """Return the reach that the goal bounds, from `reach` of shape (n, S): the largest on other sides, or its own."""
     if isinstance(goal, OrientedBeyond):
-        threshold: Floats = np.fmax.reduce(np.delete(reach, goal.side, axis=1), axis=1)
-        return threshold
+        return np.asarray(np.fmax.reduce(np.delete(reach, goal.side, axis=1), axis=1))
     return reach[:, goal.side]
 
 

@@ -173,13 +173,9 @@ def recorded(place: Place, x: Array, side: Ints, steps: int) -> Recorded:
         sides.append(side)
         codes.append(code)
     orbits = Recorded(np.stack(xs, axis=1), np.stack(sides, axis=1), np.stack(codes, axis=1))
-    return orbits.rows((orbits.code >= 0).all(axis=1) & _on_domain(place, orbits))
-
-
-def _on_domain(place: Place, orbits: Recorded) -> Flags:
     lo, hi = place.domain.lo[orbits.side, 0], place.domain.hi[orbits.side, 0]
-    inside: Flags = ((orbits.x >= lo) & (orbits.x <= hi)).all(axis=1)
-    return inside
+    inside = ((orbits.x >= lo) & (orbits.x <= hi)).all(axis=1)
+    return orbits.rows((orbits.code >= 0).all(axis=1) & inside)
 
 
 def on_itinerary(place: Place, x: Array, side: Ints, words: Ints) -> tuple[Array, Array, Flags]:

@@ -162,8 +162,7 @@ def entropy_of(mass: Floats) -> Floats:
     """Entropy of each column."""
     with np.errstate(divide="ignore", invalid="ignore"):
         p = mass / mass.sum(axis=0)
-        entropy: Floats = np.where(p > 0.0, -p * np.log(p), 0.0).sum(axis=0)
-    return entropy
+        return np.asarray(np.where(p > 0.0, -p * np.log(p), 0.0).sum(axis=0))
 
 
 def least_entropy(mass: Floats, open_to: NDArray[np.bool_], rest: Floats) -> Floats:

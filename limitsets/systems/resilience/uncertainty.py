@@ -484,8 +484,7 @@ def _numbers(parted: Colours, label: NDArray[np.int64]) -> NDArray[np.int64]:
     """Index of each label among the basins, -1 for undecided."""
     order = np.argsort(parted.codes)
     at = np.searchsorted(parted.codes[order], label).clip(max=order.size - 1)
-    numbers: NDArray[np.int64] = np.where(parted.codes[order][at] == label, order[at], -1)
-    return numbers
+    return np.where(parted.codes[order][at] == label, order[at], -1)
 
 
 def _around(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
