@@ -65,6 +65,10 @@ for _stub, _choose in ((entry_of, _choose_entry), (with_entry, _choose_with)):
     extending.overload(_stub, jit_options={"forceinline": True}, strict=False)(_choose)
 
 
+def _handed_on(entry: Any, value: Any, *rest: Any) -> Any:
+    return value
+
+
 @overload
 def generic(stub: Callable[P, R]) -> Generic[P, R]: ...
 @overload
@@ -112,16 +116,7 @@ def generic(
     in a closure: numba does not cache such code (numba issues 2065, 2952, 6264).
     """
     if stub is None:
-        return lambda f: _generic(f, proof, inlined, default, chained)
-    return _generic(stub, proof, inlined, default, chained)
-
-
-def _handed_on(entry: Any, value: Any, *rest: Any) -> Any:
-    return value
-
-
-def _generic(stub: Any, proof: bool, inlined: bool, default: Callable[..., Any] | None, chained: bool) -> Any:
-    """Make the table of methods and the overload that reads it."""
+        return functools.partial(generic, proof=proof, inlined=inlined, default=default, chained=chained)
     default = _handed_on if chained else default
     methods: dict[Any, Callable[..., Any]] = {}
     given = PROOF if proof else ESTIMATE

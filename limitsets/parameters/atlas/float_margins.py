@@ -22,10 +22,8 @@ from limitsets.feeder.scene.arrays import ThrowStack, throw_stack
 from limitsets.feeder.scene.facts import Deviation
 from limitsets.parameters.margins.deviations import deviation_scale
 from limitsets.systems.topology import Topologies, reaches, region_of
-from limitsets.systems.topology.work import DECIDED
+from limitsets.systems.topology.work import DECIDED, Floats, Ints
 
-Floats: TypeAlias = NDArray[np.float64]
-Ints: TypeAlias = NDArray[np.int64]
 Values: TypeAlias = Mapping[str, Floats]
 
 # The first step, as a share of what is known to be too much; each is so much longer than the one before.
@@ -41,8 +39,7 @@ SMALL = 0.05
 def threshold_of(goal: OrientedBeyond | Reaches, reach: Floats) -> Floats:
     """Return the reach that the goal bounds, from `reach` of shape (n, S): the largest on other sides, or its own."""
     if isinstance(goal, OrientedBeyond):
-        threshold: Floats = np.fmax.reduce(np.delete(reach, goal.side, axis=1), axis=1)
-        return threshold
+        return np.asarray(np.fmax.reduce(np.delete(reach, goal.side, axis=1), axis=1))
     return reach[:, goal.side]
 
 

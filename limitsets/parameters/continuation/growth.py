@@ -6,7 +6,8 @@ Images of a short interval around a point of the attractor never leave the attra
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import TypeAlias
 
 import numpy as np
 
@@ -23,12 +24,8 @@ MOST_STEPS, MOST_INTERVALS = 3000, 4000
 EARLY, TENFOLD = 500, 10.0
 
 
-class _Intervals(NamedTuple):
-    """Disjoint closed intervals, ascending by side."""
-
-    side: Ints
-    lo: Array
-    hi: Array
+# Disjoint closed intervals, ascending: side, lower and upper end.
+Intervals: TypeAlias = list[tuple[int, float, float]]
 
 
 class _Pieces:
@@ -46,49 +43,42 @@ class _Pieces:
         self.bottom, self.top = table[:, 2], table[:, 3]
         self.lo, self.hi = (np.array(ends) for ends in zip(*forward.bounds, strict=True))
 
-    def image(self, given: _Intervals) -> _Intervals:
+    def image(self, given: Intervals) -> Intervals:
         """F of some intervals; what leaves the domain is dropped."""
-        lo = np.maximum(given.lo[:, None], self.bottom)
-        hi = np.minimum(given.hi[:, None], self.top)
+        side, lo, hi = (np.array(column)[:, None] for column in zip(*given, strict=True))
+        lo, hi = np.maximum(lo, self.bottom), np.minimum(hi, self.top)
         # Rounding may leave a sliver, whose image would lie far from all others.
-        row, k = np.nonzero((given.side[:, None] == self.side) & (hi - lo > NONE * self.extent))
-        count = row.size
-        if count == 0:
-            return _Intervals(row, lo[row, k], hi[row, k])
+        row, k = np.nonzero((side == self.side) & (hi - lo > NONE * self.extent))
         x = np.concatenate([lo[row, k], hi[row, k]])
-        y, to, _ = along(self.params, x, np.tile(self.side[k], 2), np.tile(self.branch[k], 2)[:, None])
-        to = to[:count]
+        y, sides, _ = along(self.params, x, np.tile(self.side[k], 2), np.tile(self.branch[k], 2)[:, None])
+        one, other, to = y[: row.size], y[row.size :], sides[: row.size]
         inside = (to >= 0) & (to < self.lo.size)
         at = np.where(inside, to, 0)
-        low = np.maximum(np.minimum(y[:count], y[count:]), self.lo[at])
-        high = np.minimum(np.maximum(y[:count], y[count:]), self.hi[at])
+        low = np.maximum(np.minimum(one, other), self.lo[at])
+        high = np.minimum(np.maximum(one, other), self.hi[at])
         kept = inside & (low <= high)
-        return self.joined(_Intervals(to[kept], low[kept], high[kept]))
+        return self.joined(zip(to[kept].tolist(), low[kept].tolist(), high[kept].tolist(), strict=True))
 
-    def joined(self, *given: _Intervals) -> _Intervals:
+    def joined(self, given: Iterable[tuple[int, float, float]]) -> Intervals:
         """Union; intervals that touch up to rounding are one."""
-        side, lo, hi = (
-            np.concatenate([getattr(each, name) for each in given]) for name in _Intervals._fields
-        )
-        order = np.lexsort((lo, side))
-        side, lo, hi = side[order], lo[order], hi[order]
-        parts = []
-        for s in np.unique(side):
-            here = side == s
-            low, top = lo[here], np.maximum.accumulate(hi[here])
-            begins = np.concatenate([[True], low[1:] > top[:-1] + NONE * self.extent])
-            ends = np.concatenate([np.flatnonzero(begins)[1:] - 1, [low.size - 1]])
-            parts.append((np.full(ends.size, s), low[begins], top[ends]))
-        if not parts:
-            return _Intervals(side, lo, hi)
-        return _Intervals(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+        union: Intervals = []
+        for side, lo, hi in sorted(given):
+            if union and union[-1][0] == side and lo <= union[-1][2] + NONE * self.extent:
+                union[-1] = (side, union[-1][1], max(union[-1][2], hi))
+            else:
+                union.append((side, lo, hi))
+        return union
 
 
-def _same(one: _Intervals, other: _Intervals, extent: float) -> bool:
-    if one.lo.size != other.lo.size:
-        return False
-    moved = max(np.abs(one.lo - other.lo).max(initial=0.0), np.abs(one.hi - other.hi).max(initial=0.0))
-    return bool((one.side == other.side).all() and moved <= 1e-13 * extent)
+def _same(before: Intervals, after: Intervals, slack: float) -> bool:
+    return len(before) == len(after) and all(
+        one[0] == other[0] and max(abs(one[1] - other[1]), abs(one[2] - other[2])) <= slack
+        for one, other in zip(before, after, strict=True)
+    )
+
+
+def _length(union: Intervals) -> float:
+    return sum(hi - lo for _, lo, hi in union)
 
 
 def grown(
@@ -97,25 +87,25 @@ def grown(
     """Union of all images of short intervals around some points; None where they do not grow, or do not settle."""
     pieces = _Pieces(forward, extent)
     lo, hi = np.maximum(x - SHORT * extent, pieces.lo[side]), np.minimum(x + SHORT * extent, pieces.hi[side])
-    union = pieces.joined(_Intervals(side, lo, hi))
-    first = float((union.hi - union.lo).sum())
+    union = pieces.joined(zip(side.tolist(), lo.tolist(), hi.tolist(), strict=True))
+    first = _length(union)
     for count in range(MOST_STEPS):
-        length = float((union.hi - union.lo).sum())
+        length = _length(union)
         if length >= LONG * extent:
             break
         union = pieces.image(union)
-        if not 0 < union.lo.size <= MOST_INTERVALS or (count == EARLY and length < TENFOLD * first):
+        if not 0 < len(union) <= MOST_INTERVALS or (count == EARLY and length < TENFOLD * first):
             return None
-    if float((union.hi - union.lo).sum()) < SHORT * extent:
+    if _length(union) < SHORT * extent:
         return None
     for _ in range(MOST_STEPS):
-        after = pieces.joined(union, pieces.image(union))
-        if _same(union, after, extent):
+        after = pieces.joined([*union, *pieces.image(union)])
+        if _same(union, after, 1e-13 * extent):
             extents: dict[int, list[tuple[float, float]]] = {}
-            for s, low, high in zip(after.side.tolist(), after.lo.tolist(), after.hi.tolist(), strict=True):
+            for s, low, high in after:
                 extents.setdefault(s, []).append((low, high))
             return extents
-        if after.lo.size > MOST_INTERVALS:
+        if len(after) > MOST_INTERVALS:
             return None
         union = after
     return None
@@ -183,13 +173,9 @@ def recorded(place: Place, x: Array, side: Ints, steps: int) -> Recorded:
         sides.append(side)
         codes.append(code)
     orbits = Recorded(np.stack(xs, axis=1), np.stack(sides, axis=1), np.stack(codes, axis=1))
-    return orbits.rows((orbits.code >= 0).all(axis=1) & _on_domain(place, orbits))
-
-
-def _on_domain(place: Place, orbits: Recorded) -> Flags:
     lo, hi = place.domain.lo[orbits.side, 0], place.domain.hi[orbits.side, 0]
-    inside: Flags = ((orbits.x >= lo) & (orbits.x <= hi)).all(axis=1)
-    return inside
+    inside = ((orbits.x >= lo) & (orbits.x <= hi)).all(axis=1)
+    return orbits.rows((orbits.code >= 0).all(axis=1) & inside)
 
 
 def on_itinerary(place: Place, x: Array, side: Ints, words: Ints) -> tuple[Array, Array, Flags]:

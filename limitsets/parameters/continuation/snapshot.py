@@ -117,8 +117,7 @@ class Snapshot:
 
 def _cell_sets(graph: TransitionGraph) -> list[CellSet]:
     """Attracting components of the cells."""
-    sets, ends = graph.recurrent_components(), graph.condensation().attracting
-    return [CellSet.of(graph.grid, cells) for cells, end in zip(sets, ends, strict=True) if end]
+    return [CellSet.of(graph.grid, cells) for cells in graph.attracting_sets()]
 
 
 def _starts(place: Place, sets: Iterable[CellSet]) -> tuple[Array, Ints]:

@@ -87,8 +87,7 @@ class Domain:
     @property
     def inhabited(self) -> NDArray[np.bool_]:
         """Which sides have states, shape (n_sides,)."""
-        some: NDArray[np.bool_] = np.logical_and.reduce(self.lo < self.hi, axis=1)
-        return some
+        return np.asarray(np.logical_and.reduce(self.lo < self.hi, axis=1))
 
     @property
     def dimension(self) -> int:

@@ -50,13 +50,11 @@ def _starts(domain: Domain, side: int) -> Floats:
     shares = shares if domain.dimension > 1 else np.sort(shares, axis=0)
     nearest = _nearest(domain, side)
     shares[0], shares[-1] = nearest, 1.0 - nearest  # beside two corners: on them an image may end
-    starts: Floats = domain.lo[side] + shares * _extent(domain, side)
-    return starts
+    return np.asarray(domain.lo[side] + shares * _extent(domain, side))
 
 
 def _extent(domain: Domain, side: int) -> Floats:
-    extent: Floats = domain.hi[side] - domain.lo[side]
-    return extent
+    return np.asarray(domain.hi[side] - domain.lo[side])
 
 
 def _nearest(domain: Domain, side: int) -> float:

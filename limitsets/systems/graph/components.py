@@ -421,8 +421,7 @@ def _destinations(
     both = np.where(
         now == nothing, so_far, np.where((so_far == nothing) | (so_far == now), now, codes.UNDECIDED)
     )
-    merged: NDArray[np.int32] = both.astype(np.int32)
-    return merged
+    return np.asarray(both, dtype=np.int32)
 
 
 @kernel(entry=True, counting=False)

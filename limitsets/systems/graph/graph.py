@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from limitsets.base.errors import AnswerError
 from limitsets.base.tables import Table, Tabled, facts
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph.components import Components, Condensation, strong_components
-from limitsets.systems.graph.ranges import Ranges, count_edges, expand
+from limitsets.systems.graph.ranges import Ranges, cells_of, count_edges, expand
 from limitsets.systems.maps import kind_of
 
 if TYPE_CHECKING:
@@ -134,13 +135,9 @@ class TransitionGraph(Tabled):
         if node >= self.n_cells:
             return np.array([node])
         r = self.ranges
-        parts = []
-        for start, run, rows, planes, side in r.box[r.first[node] : r.first[node + 1]].tolist():
-            in_plane = np.arange(rows) * r.row_stride[side]
-            corner = start + np.add.outer(np.arange(planes) * r.plane_stride[side], in_plane)
-            parts.append(np.add.outer(corner, np.arange(run)).ravel())
         sinks = [self.n_cells + e for e in range(len(self.exits)) if r.exits[node] >> e & 1]
-        return np.unique(np.concatenate([*parts, np.array(sinks, dtype=np.int64)]))
+        cells = cells_of(r, slice(r.first[node], r.first[node + 1]))
+        return np.concatenate([cells, np.array(sinks, dtype=np.int64)])
 
     @cached_property
     def _components(self) -> Components:
@@ -163,6 +160,10 @@ class TransitionGraph(Tabled):
     def recurrent_components(self) -> list[NDArray[np.int32]]:
         """Cells of each recurrent component, ascending in topological number: attracting ones come early."""
         return list(self._recurrent_components)
+
+    def attracting_sets(self) -> list[NDArray[np.int32]]:
+        """Cells of the recurrent components from which no path leads elsewhere."""
+        return list(compress(self._recurrent_components, self._condensation.attracting))
 
     @cached_property
     def _condensation(self) -> Condensation:

@@ -180,16 +180,15 @@ def count_edges(r: Ranges) -> int:
     total = int(sizes.sum())
     for cell in several.tolist():
         boxes = slice(int(r.first[cell]), int(r.first[cell + 1]))
-        total += len(_cells_of(r, boxes)) - int(sizes[boxes].sum())
+        total += cells_of(r, boxes).size - int(sizes[boxes].sum())
     return total
 
 
-def _cells_of(r: Ranges, boxes: slice) -> set[int]:
-    cells: set[int] = set()
+def cells_of(r: Ranges, boxes: slice) -> NDArray[np.int64]:
+    """Cells of some boxes, ascending, each once."""
+    parts = [np.empty(0, np.int64)]
     for start, run, rows, planes, side in r.box[boxes].tolist():
-        stride, plane = int(r.row_stride[side]), int(r.plane_stride[side])
-        for p in range(planes):
-            for row in range(rows):
-                begin = start + row * stride + p * plane
-                cells.update(range(begin, begin + run))
-    return cells
+        in_plane = np.arange(rows) * r.row_stride[side]
+        corner = start + np.add.outer(np.arange(planes) * r.plane_stride[side], in_plane)
+        parts.append(np.add.outer(corner, np.arange(run)).ravel())
+    return np.unique(np.concatenate(parts))

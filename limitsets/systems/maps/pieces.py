@@ -302,8 +302,7 @@ def _jumps(branch: _Branch, x: Array) -> Array:
 
     def larger_above(lo: Array, middle: Array, hi: Array) -> Flags:
         y_lo, y_mid, y_hi = (branch.image(at) for at in (lo, middle, hi))
-        flags: Flags = np.abs(y_mid - y_lo) <= np.abs(y_hi - y_mid)
-        return flags
+        return np.asarray(np.abs(y_mid - y_lo) <= np.abs(y_hi - y_mid))
 
     lo, hi = bisected(x[k], x[k + 1], larger_above)
     y_lo, y_hi = branch.image(lo), branch.image(hi)

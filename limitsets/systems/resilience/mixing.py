@@ -40,6 +40,7 @@ from limitsets.systems.resilience.orbits import (
     ROUNDING,
     STEPS,
     Colours,
+    Floats,
     best,
     colours,
     full_caption,
@@ -53,8 +54,6 @@ from limitsets.systems.sets import Attractor
 #
 # What is undecided in a box is allotted in every way to the basins in which it may lie.
 
-
-Floats = NDArray[np.float64]
 
 # Fewest starts along each axis of a box: every second of them gives two.
 ALONG = 4
@@ -163,8 +162,7 @@ def entropy_of(mass: Floats) -> Floats:
     """Entropy of each column."""
     with np.errstate(divide="ignore", invalid="ignore"):
         p = mass / mass.sum(axis=0)
-        entropy: Floats = np.where(p > 0.0, -p * np.log(p), 0.0).sum(axis=0)
-    return entropy
+        return np.asarray(np.where(p > 0.0, -p * np.log(p), 0.0).sum(axis=0))
 
 
 def least_entropy(mass: Floats, open_to: NDArray[np.bool_], rest: Floats) -> Floats:

@@ -6,7 +6,6 @@ Source: Menck, Heitzig, Marwan, Kurths, "How basin stability complements the lin
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +26,7 @@ from limitsets.systems.resilience.orbits import (
     ROUNDING,
     STEPS,
     Colours,
+    Floats,
     best,
     colours,
     follow,
@@ -195,13 +195,9 @@ def _bounds(parted: Colours) -> list[tuple[int | None, float | None]]:
     if parted.how != "proved":
         return [(None, None)] * parted.codes.size
     graph, parts = parted.graph, parted.graph.components()
-    sets, attracting, stays = (
-        graph.recurrent_components(),
-        graph.condensation().attracting,
-        longest_stays(graph),
-    )
+    sets, stays = graph.recurrent_components(), longest_stays(graph)
     settled = np.zeros(parts.count, dtype=bool)
-    settled[[parts.label[cells[0]] for cells in itertools.compress(sets, attracting)]] = True
+    settled[[parts.label[cells[0]] for cells in graph.attracting_sets()]] = True
     # a rank falls with every step, but for those within a recurrent component, through which orbits pass
     rank = ranks(graph.ranges, parts, settled)
     within = np.array([parted.labels[cells[0]] for cells in sets], dtype=np.int64)
@@ -407,8 +403,6 @@ CELLS = 2
 
 # Starts are drawn in so many balls one within the other; then so many places on the line to the nearest fatal one.
 BALLS, PLACES = 4, 1024
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

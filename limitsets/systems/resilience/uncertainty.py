@@ -36,6 +36,7 @@ from limitsets.systems.resilience.orbits import (
     MOST_UNDECIDED,
     STEPS,
     Colours,
+    Floats,
     best,
     colours,
     follow,
@@ -56,7 +57,6 @@ NEAREST, IN_A_DECADE, FEWEST_UNCERTAIN = 1e-4, 4, 20
 # The fit takes shares up to this part of that of independent starts, at so many distances at least.
 UNSATURATED, FEWEST_FITTED = 0.5, 4
 
-Floats = NDArray[np.float64]
 
 # Fewer cells along an axis than this do not give one decade.
 FEWEST = 40
@@ -484,8 +484,7 @@ def _numbers(parted: Colours, label: NDArray[np.int64]) -> NDArray[np.int64]:
     """Index of each label among the basins, -1 for undecided."""
     order = np.argsort(parted.codes)
     at = np.searchsorted(parted.codes[order], label).clip(max=order.size - 1)
-    numbers: NDArray[np.int64] = np.where(parted.codes[order][at] == label, order[at], -1)
-    return numbers
+    return np.where(parted.codes[order][at] == label, order[at], -1)
 
 
 def _around(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

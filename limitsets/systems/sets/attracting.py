@@ -232,6 +232,5 @@ def attractors(graph: TransitionGraph, throws: int = 200_000) -> tuple[Attractor
     """
     if throws < 1:
         raise AnswerError("the number of throws", throws, "an integer from 1", "pass throws=200_000")
-    sets = graph.recurrent_components()
-    chosen = [cells for cells, ends in zip(sets, graph.condensation().attracting, strict=True) if ends]
-    return tuple(_attractor(graph, CellSet.of(graph.grid, cells), throws) for cells in chosen)
+    sets = graph.attracting_sets()
+    return tuple(_attractor(graph, CellSet.of(graph.grid, cells), throws) for cells in sets)

@@ -261,9 +261,7 @@ def invariant_measures(
     >>> invariant_measures(graph)[0].density.round(12)  # uniform
     array([1., 1., 1., 1., 1., 1., 1., 1.])
     """
-    sets = graph.recurrent_components()
-    attracting = [part for part, ends in zip(sets, graph.condensation().attracting, strict=True) if ends]
-    cells = np.sort(np.concatenate([*attracting, np.empty(0, np.int64)]).astype(np.int64))
+    cells = np.sort(np.concatenate([*graph.attracting_sets(), np.empty(0, np.int64)]).astype(np.int64))
     if not cells.size:
         return ()
     chain, lost = _chain(graph, cells)

@@ -206,8 +206,7 @@ def _tops(alphabet: Alphabet, letters: Ints, x: Array, f: Array, rate: Array) ->
     before = rate[row, k] > 0
 
     def not_yet(_lo: Array, middle: Array, _hi: Array) -> Flags:
-        flags: Flags = (alphabet.follow(letters[row], middle)[2] > 1.0) == before
-        return flags
+        return np.asarray((alphabet.follow(letters[row], middle)[2] > 1.0) == before)
 
     return row, k, bisected(x[row, k], x[row, k + 1], not_yet)[0]
 

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Small = NDArray[np.int32]
+Bits = NDArray[np.uint8]
+Flags = NDArray[np.bool_]
+# The numbers in the arrays that the classes below name.
+KINDS = {Floats: np.float64, Ints: np.int64, Small: np.int32, Bits: np.uint8, Flags: np.bool_}
 
 # Orbits from cells that recur though they are left.
 STARTS = 20
@@ -72,23 +77,23 @@ class Cells(NamedTuple):
     image_hi: Floats
     first: Ints
     last: Ints
-    out: NDArray[np.uint8]
-    expands: NDArray[np.bool_]
+    out: Bits
+    expands: Flags
 
 
 class Components(NamedTuple):
     """Scratch of the search for components; of each cell where its starts may end; the label of each closed one."""
 
-    rank: NDArray[np.int32]
-    label: NDArray[np.int32]
-    order: NDArray[np.int32]
-    path: NDArray[np.int32]
-    boxes: NDArray[np.int32]
-    rows: NDArray[np.int32]
-    waiting: NDArray[np.int32]
-    loops: NDArray[np.bool_]
-    ends: NDArray[np.uint8]
-    held: NDArray[np.bool_]
+    rank: Small
+    label: Small
+    order: Small
+    path: Small
+    boxes: Small
+    rows: Small
+    waiting: Small
+    loops: Flags
+    ends: Bits
+    held: Flags
     closed: Ints
     share: Floats
 
@@ -130,6 +135,12 @@ class Work(NamedTuple):
     split: Floats
 
 
+def _made(cls: Any, common: Any, /, **others: Any) -> Any:
+    """Make the arrays of a class, each of the kind that it names, all of one shape but for those of `others`."""
+    kinds = get_type_hints(cls).items()
+    return cls(*(np.zeros(others.get(name, common), KINDS[kind]) for name, kind in kinds))
+
+
 def _places(cells: int, nearest: float) -> Floats:
     """Edges of cells between 0 and 1: equal ones, and towards an anchor at 0 cells that double from `nearest` on."""
     equal = np.arange(cells + 1) / cells
@@ -151,73 +162,17 @@ def work_for(region: Region, cells: int, samples: int) -> Work:
     shape, scan = _places(cells, nearest), _places(samples, nearest)
     edges, pieces = shape.size + 2 * MOST_PIECES, sides * MOST_PIECES
     n = sides * edges
-
-    def ints(*size: int) -> Any:
-        return np.zeros(size, np.int64)
-
-    def floats(*size: int) -> Any:
-        return np.zeros(size)
-
-    def small(*size: int) -> Any:
-        return np.zeros(size, np.int32)
-
-    m = scan.size
+    of_edges = dict.fromkeys(("x", "y", "to", "code"), (sides, edges))
     return Work(
         shape,
         scan,
-        Samples(floats(m), floats(m), ints(m), floats(m), floats(4 * MOST_PIECES)),
-        pieces=Pieces(
-            ints(sides + 1), *(floats(pieces) for _ in range(4)), *(ints(pieces) for _ in range(3))
-        ),
-        cells=Cells(
-            ints(sides + 1),
-            floats(sides, edges),
-            floats(sides, edges),
-            to=ints(sides, edges),
-            code=ints(sides, edges),
-            edge=ints(sides),
-            lo=floats(n + 1),
-            hi=floats(n + 1),
-            piece=ints(n),
-            image_lo=floats(n),
-            image_hi=floats(n),
-            first=ints(n),
-            last=ints(n),
-            out=np.zeros(n, np.uint8),
-            expands=np.zeros(n, np.bool_),
-        ),
-        components=Components(
-            small(n),
-            small(n),
-            small(n),
-            path=small(n),
-            boxes=small(n),
-            rows=small(n),
-            waiting=small(n),
-            loops=np.zeros(n, np.bool_),
-            ends=np.zeros(n, np.uint8),
-            held=np.zeros(n, np.bool_),
-            closed=ints(MOST_ATTRACTORS),
-            share=floats(n, MOST_ATTRACTORS + 2),
-        ),
-        unions=Unions(
-            ints(4, MOST_INTERVALS),
-            floats(4, MOST_INTERVALS),
-            floats(4, MOST_INTERVALS),
-            ints(4),
-            ints(MOST_INTERVALS),
-        ),
-        starts=Starts(
-            floats(STARTS),
-            ints(STARTS),
-            ints(STARTS),
-            which=ints(STARTS),
-            before=floats(STARTS),
-            after=floats(STARTS),
-            to=ints(STARTS),
-            codes=ints(STARTS),
-        ),
-        split=floats(MOST_ATTRACTORS + 2),
+        samples=_made(Samples, scan.size, cuts=4 * MOST_PIECES),
+        pieces=_made(Pieces, pieces, begin=sides + 1),
+        cells=_made(Cells, n, begin=sides + 1, edge=sides, lo=n + 1, hi=n + 1, **of_edges),
+        components=_made(Components, n, closed=MOST_ATTRACTORS, share=(n, MOST_ATTRACTORS + 2)),
+        unions=_made(Unions, (4, MOST_INTERVALS), size=4, seen=MOST_INTERVALS),
+        starts=_made(Starts, STARTS),
+        split=np.zeros(MOST_ATTRACTORS + 2),
     )
 
 

@@ -7,6 +7,8 @@ A cell all of whose points take one branch gets one box, in a compiled pass; the
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -43,8 +45,7 @@ def corners(grid: Grid, side: int, **_: Any) -> SamplePoints:
 
 def corners_padded(grid: Grid, side: int, **_: Any) -> SamplePoints:
     """Corners, and one cell more on every side of the box."""
-    bare = corners(grid, side)
-    return SamplePoints(bare.axes, bare.strides, bare.offsets, pad=1)
+    return replace(corners(grid, side), pad=1)
 
 
 def end_points(grid: Grid, side: int, **_: Any) -> SamplePoints:
@@ -53,8 +54,7 @@ def end_points(grid: Grid, side: int, **_: Any) -> SamplePoints:
         raise AnswerError(
             "the image method", "end-points", "another in more than one dimension", "use corners-padded"
         )
-    bare = corners(grid, side)
-    return SamplePoints(bare.axes, bare.strides, bare.offsets, split=True)
+    return replace(corners(grid, side), split=True)
 
 
 # ----------------------------------------------------------------
@@ -156,11 +156,7 @@ def _hulls(
 
 def sampled(method: Callable[..., SamplePoints]) -> Callable[..., TargetBoxes]:
     """Make an image method of a function that chooses the points of each cell."""
-
-    def images_of(params: Any, grid: Grid, side: int, target: Target, **options: Any) -> TargetBoxes:
-        return _boxes_of_side(params, grid, side, target, method(grid, side, **options))
-
-    return images_of
+    return partial(_boxes_of_side, method)
 
 
 def _require_sides(grid: Grid, to: Any, code: Any) -> None:
@@ -176,8 +172,11 @@ def _require_sides(grid: Grid, to: Any, code: Any) -> None:
             )
 
 
-def _boxes_of_side(params: Any, grid: Grid, side: int, target: Target, samples: SamplePoints) -> TargetBoxes:
+def _boxes_of_side(
+    method: Callable[..., SamplePoints], params: Any, grid: Grid, side: int, target: Target, **options: Any
+) -> TargetBoxes:
     """Boxes of all cells of one side."""
+    samples = method(grid, side, **options)
     dimension, shape = grid.dimension, grid.shape[side]
     n = int(shape.prod())
     count = int(np.prod([axis.size for axis in samples.axes]))

@@ -9,7 +9,7 @@ from limitsets.numbers.interval import Interval
 from limitsets.numbers.jit import kernel, proof_kernel
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.contract import register
-from limitsets.systems.maps.textbook.shared import DOMAINS, Line, line_of_two
+from limitsets.systems.maps.textbook.shared import DOMAINS, Line, on_circle
 
 
 class Circle(NamedTuple):
@@ -72,7 +72,7 @@ def _lifted_box(omega: Interval, coupling: Interval, x: Any) -> Interval:
 
 
 def _image_box(params_lo: Circle, params_hi: Circle, lo: float, hi: float, side: int) -> Line:
-    """Both branches at equality; up to a coupling of 1 the map rises from omega to omega + 1."""
+    """Up to a coupling of 1 the map rises from omega to omega + 1."""
     omega, coupling = (
         Interval(params_lo.omega, params_hi.omega),
         Interval(params_lo.coupling, params_hi.coupling),
@@ -83,13 +83,9 @@ def _image_box(params_lo: Circle, params_hi: Circle, lo: float, hi: float, side:
         _lifted_box(omega, coupling, Interval(hi, hi)),
     )
     turned = Interval(first.lo, last.hi) if rises else _lifted_box(omega, coupling, Interval(lo, hi))
-    less = turned - 1.0
-    circle = (lo >= 0.0) & (hi <= 1.0)
     bottom = 0.0 if rises & (omega.lo >= 0.0) else -math.inf
     top = 1.0 if rises & (omega.hi <= 1.0) else math.inf
-    stay = Interval(max(turned.lo, bottom), min(turned.hi, 1.0))
-    wrap = Interval(max(less.lo, 0.0), min(less.hi, top))
-    return line_of_two(circle & (turned.lo <= 1.0), stay, circle & (turned.hi >= 1.0), wrap, side)
+    return on_circle(turned, bottom, top, lo, hi, side)
 
 
 register(

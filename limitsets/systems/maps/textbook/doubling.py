@@ -8,7 +8,7 @@ from typing import NamedTuple
 from limitsets.numbers.interval import Interval
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.contract import register
-from limitsets.systems.maps.textbook.shared import DOMAINS, Line, line_of_two
+from limitsets.systems.maps.textbook.shared import DOMAINS, Line, on_circle
 
 
 class Doubling(NamedTuple):
@@ -47,16 +47,12 @@ def _image_on(params: Doubling, x: float, side: int, branch: int) -> tuple[float
 
 
 def _image_box(params_lo: Doubling, params_hi: Doubling, lo: float, hi: float, side: int) -> Line:
-    """Both branches at equality; clipped to what x on the circle and a factor in [0, 2] allow."""
+    """Clipped to what x on the circle and a factor in [0, 2] allow."""
     factor = Interval(params_lo.factor, params_hi.factor)
     times = factor * Interval(lo, hi)
-    less = times - 1.0
-    circle = (lo >= 0.0) & (hi <= 1.0)
     bottom = 0.0 if factor.lo >= 0.0 else -math.inf
     top = 1.0 if factor.hi <= 2.0 else math.inf
-    low = Interval(max(times.lo, bottom), min(times.hi, 1.0))
-    high = Interval(max(less.lo, 0.0), min(less.hi, top))
-    return line_of_two(circle & (times.lo <= 1.0), low, circle & (times.hi >= 1.0), high, side)
+    return on_circle(times, bottom, top, lo, hi, side)
 
 
 register(Doubling, image=_image, image_on=_image_on, image_box=_image_box, branches=("low", "high"))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from limitsets.numbers.interval import Interval
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.contract import register
-from limitsets.systems.maps.textbook.shared import DOMAINS, Line, line_of_two
+from limitsets.systems.maps.textbook.shared import DOMAINS, Line, on_circle
 
 
 class Rotation(NamedTuple):
@@ -39,16 +39,12 @@ def _image_on(params: Rotation, x: float, side: int, branch: int) -> tuple[float
 
 
 def _image_box(params_lo: Rotation, params_hi: Rotation, lo: float, hi: float, side: int) -> Line:
-    """Both branches at equality; clipped to what x on the circle and an angle in [0, 1] allow."""
+    """Clipped to what x on the circle and an angle in [0, 1] allow."""
     angle = Interval(params_lo.angle, params_hi.angle)
     turned = Interval(lo, hi) + angle
-    less = turned - 1.0
-    circle = (lo >= 0.0) & (hi <= 1.0)
     bottom = 0.0 if angle.lo >= 0.0 else -math.inf
     top = 1.0 if angle.hi <= 1.0 else math.inf
-    stay = Interval(max(turned.lo, bottom), min(turned.hi, 1.0))
-    wrap = Interval(max(less.lo, 0.0), min(less.hi, top))
-    return line_of_two(circle & (turned.lo <= 1.0), stay, circle & (turned.hi >= 1.0), wrap, side)
+    return on_circle(turned, bottom, top, lo, hi, side)
 
 
 register(Rotation, image=_image, image_on=_image_on, image_box=_image_box, branches=("stay", "wrap"))

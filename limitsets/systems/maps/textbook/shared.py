@@ -109,6 +109,19 @@ def line_of_two(first: bool, a: Interval, second: bool, b: Interval, side: int) 
 
 
 @proof_kernel
+def on_circle(moved: Interval, bottom: float, top: float, lo: float, hi: float, side: int) -> Line:
+    """Images of [lo, hi] on the circle [0, 1]: what stays, from `bottom` on, and what wraps, up to `top`.
+
+    Both branches at equality; `moved` is the image before a whole turn is taken off.
+    """
+    less = moved - 1.0
+    circle = (lo >= 0.0) & (hi <= 1.0)
+    stay = Interval(max(moved.lo, bottom), min(moved.hi, 1.0))
+    wrap = Interval(max(less.lo, 0.0), min(less.hi, top))
+    return line_of_two(circle & (moved.lo <= 1.0), stay, circle & (moved.hi >= 1.0), wrap, side)
+
+
+@proof_kernel
 def plane(a: Pair, side: int, branch: int) -> Plane:
     """One image in the plane."""
     slot = ((a[0].lo, a[1].lo), (a[0].hi, a[1].hi), side, branch)
