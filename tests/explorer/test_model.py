@@ -65,6 +65,40 @@ def test_of_a_goal_it_says_for_which_starts():
     assert "&#10003; <b>proved</b>, for every start</td>" in proof_words(lines, (), "")
 
 
+def test_a_goal_that_is_proved_of_nothing_says_so():
+    """The limit set of paper-designed ends at 23.383 in."""
+    goal = {"oriented_beyond": {"x": "25 in", "side": 2}}
+    scene = ls.load({**ls.load("paper-designed").as_dict(), "goal": goal})
+    lines = list(answers({"what": "proof", "scene": ls.dump(scene), "margins": []}))
+    said = proof_words(lines, (), "")
+    assert "<b>proved</b>" in said
+    assert "before x = 25: the goal asks nothing of them" in said
+
+
+def test_a_cycle_within_joined_cells_is_its_points():
+    """At r = 3.843 cells of 1/2048 join the six points of the logistic map's cycle to three intervals."""
+    x = 0.5
+    for _ in range(100_000):
+        x = 3.843 * x * (1.0 - x)
+    cycle = []
+    for _ in range(6):
+        x = 3.843 * x * (1.0 - x)
+        cycle.append(x)
+    found = estimate_of_map(ls.maps.Logistic(3.843), ls.grid([(0.0, 1.0)]).domain)
+    lo, hi = zip(*found.sets[0][0], strict=True)
+    assert lo == hi
+    assert lo == pytest.approx(sorted(cycle), abs=1e-9)
+    assert "a cycle of period 6" in estimate_words(found, None, "")
+
+
+def test_bands_that_cells_join_are_told():
+    """The logistic map has two bands up to r = 3.6785735: between them a gap narrower than a cell is left at 3.6785."""
+    found = estimate_of_map(ls.maps.Logistic(3.678), ls.grid([(0.0, 1.0)]).domain)
+    assert found.bands == (2,)
+    assert len(found.sets[0][0]) == 1
+    assert "2 intervals, which these cells join" in estimate_words(found, None, "")
+
+
 def test_shares_of_the_starts_are_all_of_them():
     found = estimate(ls.load("paper-initial"))
     assert sum(share for _, share in found.shares) == pytest.approx(1.0)

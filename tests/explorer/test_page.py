@@ -255,19 +255,6 @@ def test_a_proof_that_has_said_nothing_yet_ends_when_a_slider_moves(page):
     assert page._proofs.wait() == []
 
 
-def test_a_goal_that_is_proved_of_nothing_says_so():
-    """The limit set of paper-designed ends at 23.383 in."""
-    from limitsets.face.explorer.answers import proof_words
-    from limitsets.face.explorer.work import answers
-
-    goal = {"oriented_beyond": {"x": "25 in", "side": 2}}
-    scene = ls.load({**ls.load("paper-designed").as_dict(), "goal": goal})
-    lines = list(answers({"what": "proof", "scene": ls.dump(scene), "margins": []}))
-    said = proof_words(lines, (), "")
-    assert "<b>proved</b>" in said
-    assert "before x = 25: the goal asks nothing of them" in said
-
-
 def test_a_picture_is_sent_when_anything_of_it_has_changed_and_not_otherwise(page):
     page.beat()
     canvas = page.lanes.canvas
@@ -284,36 +271,6 @@ def test_a_picture_is_sent_when_anything_of_it_has_changed_and_not_otherwise(pag
         canvas.drawn = "seen"
         canvas.send()
         assert canvas.drawn != "seen"
-
-
-def test_a_cycle_within_joined_cells_is_its_points():
-    """At r = 3.843 cells of 1/2048 join the six points of the logistic map's cycle to three intervals."""
-    from limitsets.face.explorer.answers import estimate_words
-    from limitsets.face.explorer.estimates import estimate_of_map
-
-    x = 0.5
-    for _ in range(100_000):
-        x = 3.843 * x * (1.0 - x)
-    cycle = []
-    for _ in range(6):
-        x = 3.843 * x * (1.0 - x)
-        cycle.append(x)
-    found = estimate_of_map(ls.maps.Logistic(3.843), ls.grid([(0.0, 1.0)]).domain)
-    lo, hi = zip(*found.sets[0][0], strict=True)
-    assert lo == hi
-    assert lo == pytest.approx(sorted(cycle), abs=1e-9)
-    assert "a cycle of period 6" in estimate_words(found, None, "")
-
-
-def test_bands_that_cells_join_are_told():
-    """The logistic map has two bands up to r = 3.6785735: between them a gap narrower than a cell is left at 3.6785."""
-    from limitsets.face.explorer.answers import estimate_words
-    from limitsets.face.explorer.estimates import estimate_of_map
-
-    found = estimate_of_map(ls.maps.Logistic(3.678), ls.grid([(0.0, 1.0)]).domain)
-    assert found.bands == (2,)
-    assert len(found.sets[0][0]) == 1
-    assert "2 intervals, which these cells join" in estimate_words(found, None, "")
 
 
 def test_a_map_of_two_dimensions_is_its_points_and_a_bad_parameter_a_line():

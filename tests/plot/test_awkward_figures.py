@@ -6,21 +6,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.face.report.writing import figure
 from tests.maps_of_tests import TwoState
-
-
-def named(axes, gid):
-    return [artist for artist in axes.get_children() if artist.get_gid() == gid]
-
-
-def drawn(made):
-    FigureCanvasAgg(made).draw()
-    return made
+from tests.plot.artists import drawn, named
 
 
 def many_sides(count=12):

@@ -11,7 +11,6 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -27,6 +26,7 @@ from limitsets.feeder.thrower import fly
 from tests.cli.command import run
 from tests.maps_of_tests import TwoState, with_middles
 from tests.plates import LEAD_QUAD
+from tests.plot.artists import drawn, named
 
 # ----------------------------------------------------------------
 # Figures by their content: what the artists hold against the answers, and whether texts stay apart.
@@ -46,15 +46,6 @@ by_name = pytest.mark.parametrize("source", SOURCES, ids=lambda source: Path(sou
 @lru_cache(maxsize=8)
 def analysed(source):
     return ls.analyse(source)
-
-
-def named(axes, gid):
-    return [artist for artist in axes.get_children() if artist.get_gid() == gid]
-
-
-def drawn(figure):
-    FigureCanvasAgg(figure).draw()
-    return figure
 
 
 def luminance(colour):
@@ -409,8 +400,7 @@ def test_outline_sides_in_flip_order_centre_masses_arm_and_units():
 
 @pytest.mark.parametrize("source", ["paper-designed", "paper-quadrilateral", LEAD])
 def test_names_of_the_sides_keep_off_the_part_and_each_other(source):
-    figure = ls.plot.part(ls.load(source))
-    FigureCanvasAgg(figure).draw()
+    figure = drawn(ls.plot.part(ls.load(source)))
     (axes,) = figure.axes
     (outline,) = named(axes, "part")
     boxes = [

@@ -4,7 +4,6 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError, LimitsetsError
@@ -12,13 +11,10 @@ from limitsets.face.report.writing import FIGURES, figure
 from limitsets.feeder.goals import FlipOrder, OrientedBeyond, Reaches
 from limitsets.parameters.margins.joint import joint_margin
 from limitsets.parameters.margins.single import margins_beyond
+from tests.plot.artists import drawn, named
 
 # ----------------------------------------------------------------
 # Figures of margins, by their content; margins against X, by plain orbits.
-
-
-def named(axes, gid):
-    return [artist for artist in axes.get_children() if artist.get_gid() == gid]
 
 
 @pytest.mark.sweep
@@ -44,8 +40,7 @@ def test_the_best_place_lies_between():
 @pytest.mark.sweep
 def test_the_curve_is_drawn():
     curve = margins_beyond("paper-designed", 2, x=[20.0, 20.1], width=0.5)
-    figure = ls.plot.margin_curve(curve)
-    FigureCanvasAgg(figure).draw()
+    figure = drawn(ls.plot.margin_curve(curve))
     (axes,) = figure.axes
     proved = next(line for line in axes.lines if line.get_label() == "proved safe")
     assert proved.get_ydata() == pytest.approx(curve.proved[:, 0])
@@ -60,8 +55,7 @@ def test_a_side_that_is_never_farthest_is_refused():
 @pytest.mark.sweep
 def test_bars_are_the_brackets():
     margins = ls.margin("paper-designed", "arm.surface_height", "throw.speed", "landing.x", width=0.1)
-    figure = ls.plot.tornado(margins)
-    FigureCanvasAgg(figure).draw()
+    figure = drawn(ls.plot.tornado(margins))
     (axes,) = figure.axes
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels[0] == "throw.speed"
@@ -86,8 +80,7 @@ def test_bars_are_the_brackets():
 def test_the_joint_box_is_drawn():
     tolerance = {"throw.speed": "1 %", "landing.x": "0.01 in"}
     found = joint_margin(ls.load("paper-designed"), (OrientedBeyond(20.0, 2),), tolerance, width=0.2)
-    figure = ls.plot.tolerance_box(found)
-    FigureCanvasAgg(figure).draw()
+    figure = drawn(ls.plot.tolerance_box(found))
     (axes,) = figure.axes
     assert [bar.get_width() for bar in named(axes, "proved")] == pytest.approx([2 * found.proved] * 2)
     (larger,) = named(axes, "refuted")
@@ -118,9 +111,8 @@ def rolling():
 def test_strips_are_the_ranges(name):
     found = audited(name)
     rows = found.on("domain")
-    drawn = ls.plot.audit(found)
-    FigureCanvasAgg(drawn).draw()
-    for side, axes in enumerate(drawn.axes):
+    figure = drawn(ls.plot.audit(found))
+    for side, axes in enumerate(figure.axes):
         broken = sorted(
             (round(bar.get_y() + bar.get_height() / 2), bar.get_x(), bar.get_x() + bar.get_width())
             for bar in named(axes, "broken")
@@ -134,13 +126,13 @@ def test_strips_are_the_ranges(name):
         sets = sorted((bar.get_x(), bar.get_x() + bar.get_width()) for bar in named(axes, "limit set"))
         assert sets == [pytest.approx(each) for each in found.extents[side]]
         assert found.scene.unit in axes.get_xlabel()
-    labels = [label.get_text() for label in drawn.axes[0].get_yticklabels()]
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert labels == [each.about.name for each in rows]
 
 
 def test_every_figure_of_a_scene_that_rolls_can_be_drawn():
     for kind in FIGURES:
-        FigureCanvasAgg(figure(rolling(), kind)).draw()
+        drawn(figure(rolling(), kind))
 
 
 def test_rolls_are_drawn_as_rolls():
@@ -156,12 +148,12 @@ def test_rolls_are_drawn_as_rolls():
 
 
 def test_a_throw_that_rolls():
-    drawn = ls.plot.flight(rolling().scene, 18.0, 1)
-    titles = [axes.get_title(loc="left") for axes in drawn.axes]
+    figure = ls.plot.flight(rolling().scene, 18.0, 1)
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert "a roll" in titles[1]
     assert "onto side 0" in titles[1]
     # it turns about one vertex and rolls on over others: at any time its lowest vertex is on the arm
-    outlines = [patch.get_xy() for patch in named(drawn.axes[1], "turning")]
+    outlines = [patch.get_xy() for patch in named(figure.axes[1], "turning")]
     assert len(outlines) == 2
     surface = rolling().scene.surface_height
     assert [outline[:, 1].min() for outline in outlines] == pytest.approx([surface] * 2, abs=1e-6)
@@ -174,7 +166,7 @@ def test_a_throw_that_rolls():
 ORBIT = [{"x": 15.0, "side": 2}, {"x": 18.0, "side": 2}, {"x": 23.5, "side": 2}, {"x": 20.25, "side": 0}]
 
 
-def drawn(goal, orbit=ORBIT):
+def orbit_drawn(goal, orbit=ORBIT):
     return ls.plot.counterexample(ls.load("paper-designed"), orbit, goal).axes[0]
 
 
@@ -188,7 +180,7 @@ def marks(axes):
 
 
 def test_states_and_the_forbidden_place():
-    axes = drawn(OrientedBeyond(20.0, 2))
+    axes = orbit_drawn(OrientedBeyond(20.0, 2))
     found = marks(axes)
     assert set(found) == {(0, 15.0), (1, 18.0), (2, 23.5), (3, 20.25)}
     assert len({found[(k, x)] for k, x in ((0, 15.0), (1, 18.0), (2, 23.5))}) == 1
@@ -201,38 +193,38 @@ def test_states_and_the_forbidden_place():
 
 
 def test_what_is_to_be_reached_is_shown_even_far_off():
-    axes = drawn(Reaches(30.0, 1))
+    axes = orbit_drawn(Reaches(30.0, 1))
     assert [patch.get_gid() for patch in axes.patches] == ["wanted"]
     assert axes.get_ylim()[1] > 30.0
 
 
 def test_goals_without_a_place_shade_nothing():
-    assert not drawn(FlipOrder((0, 1, 2))).patches
-    assert not drawn(None).patches
+    assert not orbit_drawn(FlipOrder((0, 1, 2))).patches
+    assert not orbit_drawn(None).patches
 
 
 def test_of_a_long_orbit_the_end_is_drawn():
     orbit = [{"x": 10.0 + 0.01 * k, "side": k % 3} for k in range(100)]
-    found = marks(drawn(OrientedBeyond(20.0, 2), orbit))
+    found = marks(orbit_drawn(OrientedBeyond(20.0, 2), orbit))
     assert min(found)[0] == 60
     assert max(found)[0] == 99
 
 
 def test_nothing_to_draw_is_refused():
     with pytest.raises(AnswerError, match="empty"):
-        drawn(None, [])
+        orbit_drawn(None, [])
 
 
 def test_a_goal_that_fails_at_once_is_more_than_a_dot():
     """The next rests are those of the map: the picture shows whether the part comes back."""
-    axes = drawn(OrientedBeyond(20.0, 2), [{"x": 21.0, "side": 0}])
+    axes = orbit_drawn(OrientedBeyond(20.0, 2), [{"x": 21.0, "side": 0}])
     path = ls.orbit(ls.load("paper-designed").map, 21.0, 0, 12)
     onward = [line.get_xydata()[0] for line in axes.lines if line.get_gid() == "thrown on"]
     assert onward == [pytest.approx((k, x)) for k, x in enumerate(path.x[1:], start=1)]
     low, high = axes.get_ylim()
     assert low < path.x.min() < path.x.max() < high
     assert "at once" in axes.figure.get_suptitle()
-    assert not [line for line in drawn(OrientedBeyond(20.0, 2)).lines if line.get_gid() == "thrown on"]
+    assert not [line for line in orbit_drawn(OrientedBeyond(20.0, 2)).lines if line.get_gid() == "thrown on"]
 
 
 # ----------------------------------------------------------------
@@ -244,9 +236,8 @@ VARY = ("part.mass.center.along", "part.mass.center.above", "throw.speed")
 
 def test_bars_are_the_limit_sets_of_each_scene_on_the_way():
     found = ls.design("paper-initial", critical_points=[10, 10, 20], vary=VARY, stages=2)
-    drawn = ls.plot.design(found)
-    FigureCanvasAgg(drawn).draw()
-    (axes,) = drawn.axes
+    figure = drawn(ls.plot.design(found))
+    (axes,) = figure.axes
     bars = sorted(
         (-bar.get_y(), bar.get_x(), bar.get_x() + bar.get_width()) for bar in named(axes, "limit set")
     )
@@ -267,12 +258,12 @@ def test_bars_are_the_limit_sets_of_each_scene_on_the_way():
 def test_a_long_way_is_drawn_in_twelve_scenes():
     found = ls.design("paper-initial", critical_points=[10, 10, 20], vary=VARY, stages=26)
     assert len(found.path) == 27
-    drawn = ls.plot.design(found, [({0: [(5.0, 10.0)]},)] * 27)
-    (axes,) = drawn.axes
+    figure = ls.plot.design(found, [({0: [(5.0, 10.0)]},)] * 27)
+    (axes,) = figure.axes
     words = [text.get_text().splitlines()[0] for text in named(axes, "words")]
     assert len(words) == len(named(axes, "limit set")) == 12
     assert (words[0], words[-1]) == ("start", "design")
     numbers = [int(word.removeprefix("step ")) for word in words[1:-1]]
     assert numbers == sorted(set(numbers))
-    assert "(12 of 27 scenes are drawn)" in drawn.get_suptitle()
-    assert drawn.get_figheight() < 16
+    assert "(12 of 27 scenes are drawn)" in figure.get_suptitle()
+    assert figure.get_figheight() < 16

@@ -3,7 +3,6 @@
 import matplotlib.colors
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Polygon, Rectangle
 
 import limitsets as ls
@@ -12,6 +11,7 @@ from limitsets.feeder.scattering import Gaussian, Scattering, starts_from
 from limitsets.parameters.noise.sampling import throw_many
 from limitsets.parameters.noise.statistics import Levels, noise_statistics
 from tests.fitting.machines import film, machine
+from tests.plot.artists import drawn
 from tests.policies.test_feedback import with_throws
 from tests.proofs.forge import scene
 from tests.trays.scenes import with_tray
@@ -36,22 +36,22 @@ def thrown():
 
 
 def test_density_has_the_shares_in_its_titles(found, thrown):
-    figure = ls.plot.noise_density(found, thrown)
-    FigureCanvasAgg(figure).draw()
+    figure = drawn(ls.plot.noise_density(found, thrown))
     assert len(figure.axes) == 3
     for side, axes in enumerate(figure.axes):
         share = found.numbers[f"time on side {side}"]
         assert f"{100 * share:.2f} %" in axes.get_title(loc="left")
-        drawn = [patch for patch in axes.patches if patch.get_facecolor()[3] == 0.0 or not patch.get_fill()]
-        values, edges, _ = drawn[0].get_data()
+        densities = [
+            patch for patch in axes.patches if patch.get_facecolor()[3] == 0.0 or not patch.get_fill()
+        ]
+        values, edges, _ = densities[0].get_data()
         assert float(values @ np.diff(edges)) == pytest.approx(share, rel=1e-9)
     words = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     assert words == ["2e4 throws", "transfer operator", "X = 20.5 in"]
 
 
 def test_arrivals_mark_mean_and_quantile(found, thrown):
-    figure = ls.plot.noise_arrivals(found, thrown)
-    FigureCanvasAgg(figure).draw()
+    figure = drawn(ls.plot.noise_arrivals(found, thrown))
     left, right = figure.axes
     lines = sorted(line.get_xdata()[0] for line in left.lines if len(set(line.get_xdata())) == 1)
     assert lines == pytest.approx([found.feeding.mean, found.feeding.quantile(0.95)])
@@ -67,8 +67,7 @@ def test_levels_leave_out_what_is_nothing():
         "escape": np.zeros(2),
         "lost": np.zeros(2),
     }
-    figure = ls.plot.noise_levels(Levels(np.array([0.0, 2.0]), numbers), {"noise [%]": 0.5})
-    FigureCanvasAgg(figure).draw()
+    figure = drawn(ls.plot.noise_levels(Levels(np.array([0.0, 2.0]), numbers), {"noise [%]": 0.5}))
     assert [len(axes.lines) for axes in figure.axes] == [1, 2, 0]
     assert figure.axes[0].lines[0].get_xdata().tolist() == [1.0]
     assert figure.axes[2].texts[0].get_text() == "none"

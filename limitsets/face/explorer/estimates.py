@@ -166,14 +166,6 @@ def _of_gravity(scene: Scene) -> list[Knob]:
     return [Knob("gravity.tilt", "tilt", "deg", math.degrees(math.asin(min(sine, 1.0))), 5.0, 90.0)]
 
 
-def texts_of(knobs: tuple[Knob, ...], values: Mapping[str, float]) -> dict[str, str]:
-    """Write the values of the knobs that were moved, with their units."""
-    units = {knob.name: knob for knob in knobs}
-    return {
-        name: written(value, units[name].unit) for name, value in values.items() if value != units[name].value
-    }
-
-
 def scene_with(scene: Scene, knobs: tuple[Knob, ...], values: Mapping[str, float]) -> Scene:
     """Give the scene with its knobs at other values; quantities that were not moved stay as they are written.
 
@@ -191,11 +183,11 @@ def scene_with(scene: Scene, knobs: tuple[Knob, ...], values: Mapping[str, float
     >>> scene_with(scene, knobs_of(scene), {"gravity.tilt": 90.0}).kappa  # twice the gravity of 30 deg
     50.75...
     """
-    texts = texts_of(knobs, values)
+    moved = [knob for knob in knobs if values.get(knob.name, knob.value) != knob.value]
+    texts = {knob.name: written(values[knob.name], knob.unit) for knob in moved}
     if "gravity.tilt" in texts and "throw.speed" not in texts:
-        texts["throw.speed"] = written(
-            next(each.value for each in knobs if each.name == "throw.speed"), "deg/s"
-        )
+        speed = next(knob.value for knob in knobs if knob.name == "throw.speed")
+        texts["throw.speed"] = written(speed, "deg/s")
     return scene.with_values(texts) if texts else scene
 
 

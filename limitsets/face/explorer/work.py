@@ -84,8 +84,10 @@ def with_outline(scene: Scene, corners: npt.ArrayLike) -> Scene:
     (3.0, 1.5)
     """
     points = np.asarray(corners, dtype=np.float64)
-    if len(points) >= 3 and _area(points) < 0:
-        points = points[::-1]
+    if len(points) >= 3:
+        x, y = points.T
+        area = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+        points = points if area >= 0.0 else points[::-1]
     vertices = convex_polygon(points)
     plate = plate_with_points(vertices, 1.0)
     along, above, _ = above_side(vertices[0], vertices[1], plate.centre)
@@ -103,11 +105,6 @@ def with_outline(scene: Scene, corners: npt.ArrayLike) -> Scene:
     if any(side >= len(vertices) for side in _sides_in(tree.get("goal"))):
         tree.pop("goal")
     return within_reach(load(tree))
-
-
-def _area(points: npt.NDArray[np.float64]) -> float:
-    x, y = points[:, 0], points[:, 1]
-    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def _sides_in(goal: Any) -> list[int]:

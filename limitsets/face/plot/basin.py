@@ -194,6 +194,14 @@ def _percent(share: float) -> str:
 # Nodes that are drawn at most: the attracting and the largest ones; the title says how many are left out.
 MOST = 12
 Place = tuple[float, float]
+ARROW: dict[str, Any] = {
+    "arrowstyle": "-|>",
+    "mutation_scale": 11,
+    "shrinkA": 13,
+    "shrinkB": 16,
+    "color": "#555555",
+    "lw": 1.0,
+}
 
 
 @arguments_checked
@@ -228,8 +236,9 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = 
     few = len(place) <= 6
     wide, tall = 3.0 if few else 1.4, max(0.7, min(1.45, 9.0 / (depth + 1)))
     figure, (axes,) = style.canvas(min(16.0, max(7.0, wide * widest + 1.0)), tall * (depth + 1) + 1.2)
-    for one, other in drawn.edges:
-        _arrow(axes, place[one], place[other], dotted=isinstance(other, str))
+    for node, other in drawn.edges:
+        line = ":" if isinstance(other, str) else "-"
+        axes.add_patch(FancyArrowPatch(place[node], place[other], ls=line, **ARROW))
     for node, (x, y) in place.items():
         _node(axes, node, drawn.nodes[node], x, y, few=few, unit=unit)
     half = 0.5 * max(widest, 2) + 0.1
@@ -272,17 +281,13 @@ def _places(drawn: nx.DiGraph[Any]) -> dict[Any, Place]:
     return place
 
 
-def _radius(cells: int) -> float:
-    """Radius in points: the area grows with the root of the number of cells, so that small sets stay visible."""
-    return 7.0 + 17.0 * math.sqrt(math.sqrt(min(cells / 200_000, 1.0)))
-
-
 def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, few: bool, unit: str) -> None:
     if isinstance(node, str):
         axes.plot([x], [y], "s", ms=16, mfc="white", mec=style.FAINT, ls="none", gid="exit")
         style.note(axes, f"leaves:\n{node}", (x, y), (0, -13), ha="center", va="top")
         return
-    size = 2 * _radius(data["cells"])
+    # the area grows with the root of the number of cells, so that small sets stay visible [points]
+    size = 2 * (7.0 + 17.0 * math.sqrt(math.sqrt(min(data["cells"] / 200_000, 1.0))))
     circle: dict[str, Any] = {"marker": "o", "mec": style.INK, "mew": 1.2, "ls": "none"}
     face, gid = (style.SETS[0][0], "attracting") if data["attracting"] else ("white", "recurrent")
     axes.plot([x], [y], ms=size, mfc=face, gid=gid, **circle)
@@ -305,11 +310,6 @@ def _node(axes: Axes, node: Any, data: dict[str, Any], x: float, y: float, *, fe
     # An arrow to a way out may run behind the words.
     shift = (size / 2 + 7, 0)
     style.note(axes, "\n".join(lines), (x, y), shift, va="center", bbox=style.PLATE, gid="words")
-
-
-def _arrow(axes: Axes, start: Place, end: Place, *, dotted: bool) -> None:
-    head: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 11, "shrinkA": 13, "shrinkB": 16}
-    axes.add_patch(FancyArrowPatch(start, end, **head, color="#555555", lw=1.0, ls=":" if dotted else "-"))
 
 
 def _title(whole: nx.DiGraph[int], drawn: nx.DiGraph[Any], name: str) -> str:

@@ -83,7 +83,13 @@ def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Fi
     several = max((len(attractors) for attractors in drawn), default=1) > 1
     some = f"\n({rows} of {len(found.path)} scenes are drawn)" if rows < len(found.path) else ""
     words = f"{found.start.name}: limit sets while the critical points move{some}"
-    return style.finished(figure, words, _legend(found, count, several), 5)
+    handles = [
+        *(Patch(label=f"limit set on side {k}", lw=0.8, **style.of_set(k)) for k in range(count)),
+        Patch(label="another limit set", **ANOTHER) if several else None,
+        style.key("first critical point", color=style.FLIP, marker="|", ms=10, mew=2.2, ls=""),
+        style.key_of_goal(found.start),
+    ]
+    return style.finished(figure, words, handles, 5)
 
 
 def _marks(axes: Axes, scene: Scene, top: float) -> None:
@@ -122,15 +128,6 @@ def _frame(axes: Axes, solution: Design, sets: Sequence[Sequence[Extents]], dept
     axes.set(xlim=(max(lo, 0.0), hi), ylim=(-depth + GAP + 0.1, 0.8))
     axes.set_xlabel(f"x of the centre of mass from the joint [{solution.start.unit}]")
     style.goal(axes, solution.start, zorder=3)
-
-
-def _legend(solution: Design, count: int, several: bool) -> list[Any]:
-    return [
-        *(Patch(label=f"limit set on side {k}", lw=0.8, **style.of_set(k)) for k in range(count)),
-        Patch(label="another limit set", **ANOTHER) if several else None,
-        style.key("first critical point", color=style.FLIP, marker="|", ms=10, mew=2.2, ls=""),
-        style.key_of_goal(solution.start),
-    ]
 
 
 # ----------------------------------------------------------------

@@ -12,12 +12,11 @@ from limitsets.base.arguments import arguments_checked
 from limitsets.cell.assembly.assembly_run import OUTCOMES, rate_of
 from limitsets.cell.feeding.falling import FATES, tipping_times
 from limitsets.face.plot import style
-from limitsets.feeder.geometry.polygon import above_side, side_ends
+from limitsets.face.plot.throwing import outline, turned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from limitsets.cell.assembly import Assembly
     from limitsets.cell.feeding import Feeding
@@ -70,37 +69,23 @@ def feeding(found: Feeding) -> Figure:
     return style.finished(figure, f"{scene.name}: {words}")
 
 
-def _corners(answer: Feeding, beyond: float, tipped: float) -> NDArray[np.float64]:
-    """Vertices of a part on the wanted side, tipped over the end of the arm, relative to this end [length]."""
-    scene, side = answer.end.scene, answer.end.side
-    corners = [(float(x), float(y)) for x, y in scene.vertices]
-    left, right = side_ends(len(corners), side)
-    placed = []
-    for corner in corners:
-        along, above, _ = above_side(corners[left], corners[right], corner)
-        p = along - float(scene.sides.a[side]) + beyond
-        placed.append(
-            (p * math.cos(tipped) + above * math.sin(tipped), above * math.cos(tipped) - p * math.sin(tipped))
-        )
-    return np.array(placed)
-
-
 def _cavity(axes: Axes, answer: Feeding) -> None:
     scene = answer.end.scene
     cavity = scene.cavity
     assert cavity is not None  # `feed` refuses a scene without a cavity
     ramp = cavity.depth / math.tan(cavity.angle)
-    outline = [
+    ground = [
         (-8.0, 0.0),
         (0.0, 0.0),
         (ramp, -cavity.depth),
         (cavity.width, -cavity.depth),
         (cavity.width, 0.0),
     ]
-    axes.plot(*zip(*outline, strict=True), color=style.INK, lw=1.6)
-    beyond = 0.25 * float(scene.sides.a[answer.end.side])
+    axes.plot(*zip(*ground, strict=True), color=style.INK, lw=1.6)
+    a, d = (float(of_sides[answer.end.side]) for of_sides in (scene.sides.a, scene.sides.d))
+    about_end = outline(scene, answer.end.side) + np.array([0.25 * a, d])
     for share, alpha in ((0.0, 1.0), (0.5, 0.6), (1.0, 1.0)):
-        corners = _corners(answer, beyond, share * cavity.angle)
+        corners = turned(about_end, -share * cavity.angle)
         axes.add_patch(Polygon(corners, closed=True, fill=False, ec=style.JOG, lw=1.1, alpha=alpha))
     axes.set_aspect("equal")
     axes.autoscale_view()

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from limitsets.parameters.fitting import Fit
-    from limitsets.parameters.noise.absorbing import NoisyClass
     from limitsets.parameters.noise.sampling import SampledStatistics
     from limitsets.parameters.noise.statistics import Levels, NoiseStatistics
 
@@ -39,14 +38,6 @@ WORDS = {
 }
 
 
-def _main(statistics: NoiseStatistics) -> NoisyClass:
-    if not statistics.classes:
-        raise AnswerError(
-            "the classes of the noisy scene", "none", "one at least", "nothing stays: nothing to draw"
-        )
-    return max(statistics.classes, key=lambda part: len(part.cells))
-
-
 @arguments_checked
 def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = None) -> Figure:
     """Draw the density of the places of rest, one panel per side, and for comparison the shares of many throws.
@@ -63,7 +54,10 @@ def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = Non
     matplotlib.figure.Figure
         One panel per side.
     """
-    part = _main(found)
+    if not found.classes:
+        remedy = "nothing stays: nothing to draw"
+        raise AnswerError("the classes of the noisy scene", "none", "one at least", remedy)
+    part = max(found.classes, key=lambda noisy: len(noisy.cells))
     sides = sorted(part.sides)
     figure, panels = style.canvas(3.5 * min(len(sides), 4) + 0.6, 3.4, 1, len(sides), sharey=True)
     for side, axes in zip(sides, panels, strict=True):
