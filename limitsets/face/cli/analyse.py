@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from limitsets.parameters.analysis import Analysis, Plan
 
 
-MOST_CELLS = 10_000_000
-
 # Share of the starts that leave the model, above which the speed is likely to have a wrong unit.
 MOST = 0.99
 

@@ -70,7 +70,8 @@ def named(
         name, sign, text = (part.strip() for part in word.partition("="))
         again = once and name in dict(pairs)
         no_side = form.startswith("SIDE") and not (name.isascii() and name.isdigit())
-        if not sign or again or no_side or text.count(":") < form.count(":"):
+        no_span = ":" in form and text.count(":") != 1
+        if not sign or again or no_side or no_span:
             remedy = f"name each {form.partition('=')[0].lower()} once" if again else remedy
             raise LimitsetsError(thing, word, form, remedy, key=option)
         pairs.append((name, text))

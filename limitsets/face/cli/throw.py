@@ -22,9 +22,6 @@ if TYPE_CHECKING:
     from limitsets.feeder.thrower import Trace
 
 
-MOST_THROWS = 1_000_000
-
-
 @command()
 def throw(
     run: Run,
