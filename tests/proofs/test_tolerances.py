@@ -242,7 +242,7 @@ def test_a_mass_known_to_a_tolerance_widens_the_part_by_what_it_moves(tmp_path):
 # tilt follows from the one of the speed: either multiplies kappa.
 
 
-GOAL_AT, SHARP_LANDING = 20.0, 0.1055  # beyond 20 in only side 2
+GOAL_AT, SHARP_LANDING = 20.0, 0.10595  # beyond 20 in only side 2
 
 EVERYWHERE_INSIDE = ["goal", "invariant", "trapping", "expanding"]
 
