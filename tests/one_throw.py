@@ -1,7 +1,8 @@
-"""The mean of any function after one throw with noise, by midpoints: what proved bounds of it have to hold."""
+"""What proved bounds have to hold: means after one throw with noise, by midpoints, and the places of long orbits."""
 
 import numpy as np
 
+import limitsets as ls
 from limitsets.feeder.scattering import thrown
 from limitsets.systems.maps import advance
 
@@ -24,3 +25,23 @@ def mean_after(scene, scatter, rows, x, side, count):
             for off in landing:
                 total[here] += np.interp(after[here] + off, place, value)
     return total / (len(speed) * len(landing))
+
+
+def highest_off(throw, throws=200_000, side=2):
+    """Highest place off a side that a long orbit reaches; its first throws lead to the limit set."""
+    path = ls.orbit(throw, 0.5 * throw.arm_length, 2, throws)
+    x, on = np.asarray(path.x)[1000:], np.asarray(path.side)[1000:]
+    assert x.size > throws - 1000  # it does not leave
+    return float(x[on != side].max())
+
+
+def highest_scattered(throw, landing, random, throws=1500, side=2):
+    """The same of many orbits, each landing moved to either end of the noise as a random number has it."""
+    x, on, highest = np.full(4000, 0.5 * throw.arm_length), np.full(4000, 2), -np.inf
+    for count in range(throws):
+        x, on, code, _ = advance(throw, x, on, 1)
+        assert (code >= 0).all()
+        x = x + landing * random.choice((-1.0, 1.0), x.size)
+        if count > 300:
+            highest = max(highest, x[on != side].max(initial=-np.inf))
+    return float(highest)

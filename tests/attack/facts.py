@@ -19,25 +19,10 @@ mp.dps = 50
 
 G0 = mpf("9.80665")
 INCH = mpf("0.0254")
-UNITS = {
-    "m": mpf(1),
-    "cm": mpf("0.01"),
-    "mm": mpf("0.001"),
-    "in": INCH,
-    "ft": 12 * INCH,
-    "deg": mp.pi / 180,
-    "rad": mpf(1),
-    "deg/s": mp.pi / 180,
-    "rad/s": mpf(1),
-    "m/s^2": mpf(1),
-    "cm/s^2": mpf("0.01"),
-    "in/s^2": INCH,
-    "kg": mpf(1),
-    "g": mpf("0.001"),
-    "lb": mpf("0.45359237"),
-    "kg/m^2": mpf(1),
-    "%": mpf("0.01"),
-}
+LENGTHS = {"m": mpf(1), "cm": mpf("0.01"), "mm": mpf("0.001"), "in": INCH, "ft": 12 * INCH}
+UNITS = LENGTHS | {f"{unit}/s^2": size for unit, size in LENGTHS.items()}
+UNITS |= {"deg": mp.pi / 180, "rad": mpf(1), "deg/s": mp.pi / 180, "rad/s": mpf(1), "kg/m^2": mpf(1)}
+UNITS |= {"kg": mpf(1), "g": mpf("0.001"), "lb": mpf("0.45359237"), "%": mpf("0.01")}
 FLIGHTS = ("exact", "small-angle", "small-angle-2")
 FLIPS = ("signed", "energy")
 

@@ -67,15 +67,10 @@ def part(rng: Any, size: float, unit: str) -> dict[str, Any]:
         q, r = p[-side % corners], p[(-side + 1) % corners]
         along = (r - q) / np.hypot(*(r - q))
         away = np.array((-along[1], along[0]))
-        center = {
-            "side": side,
-            "along": text(float(along @ (inside - q)), unit, of),
-            "above": text(float(away @ (inside - q)), unit, of),
-        }
-        found["mass"] = {
-            "center": center,
-            "radius_of_gyration": text(size * rng.uniform(0.25, 0.6), unit, of),
-        }
+        places = (text(float(way @ (inside - q)), unit, of) for way in (along, away))
+        center = dict(zip(("side", "along", "above"), (side, *places), strict=True))
+        radius = text(size * rng.uniform(0.25, 0.6), unit, of)
+        found["mass"] = {"center": center, "radius_of_gyration": radius}
         return found
     found["mass"] = {"plate_density": f"{rng.integers(1, 9)} kg/m^2"}
     if rng.random() < 0.75:
@@ -129,11 +124,8 @@ def draft(rng: Any) -> tuple[dict[str, Any], model.Facts, str]:
         scene["throw"] = {"speed": text(speed, "deg/s" if rng.random() < 0.7 else "rad/s", "rad/s", 5)}
     scene["model"] = {"flight": flight, "flip": "energy" if rng.random() < 0.5 else "signed"}
     facts = model.read(scene)
-    ok = (
-        rests(facts)
-        and facts.arm > 1.2 * max(facts.a)
-        and (flight != "small-angle-2" or facts.kappa > max(facts.d))
-    )
+    lands = flight != "small-angle-2" or facts.kappa > max(facts.d)
+    ok = rests(facts) and facts.arm > 1.2 * max(facts.a) and lands
     return (scene, facts, unit) if ok else draft(rng)
 
 
@@ -155,25 +147,19 @@ def goal(rng: Any, facts: model.Facts, seen: Orbits, unit: str) -> dict[str, Any
     most = seen.most.max(axis=0)
     lively = np.flatnonzero(np.isfinite(most))
     width = float(facts.arm) - float(min(facts.a))
-    if lively.size:
-        best = int(lively[np.argmax(most[lively])])
-    else:
-        best = int(rng.integers(n))
+    best = int(lively[np.argmax(most[lively])] if lively.size else rng.integers(n))
     if kind == "oriented_beyond":
         others = np.delete(most, best)
         x = max(others.max(), float(min(facts.a))) + width * rng.choice((-0.03, -0.002, 0.002, 0.01, 0.05))
-        found: dict[str, Any] = {
-            "x": text(min(max(x, 0.001 * width), 0.999 * float(facts.arm)), unit, facts.unit),
-            "side": best,
-        }
+        x = min(max(x, 0.001 * width), 0.999 * float(facts.arm))
+        found: dict[str, Any] = {"x": text(x, unit, facts.unit), "side": best}
     elif kind.startswith("reaches"):
         side = best if rng.random() < 0.6 else int(rng.integers(n))
         low = np.where(np.isfinite(seen.most[:, side]), seen.most[:, side], np.nan)
         x = float(facts.a[side]) + 0.3 * width
         if np.isfinite(low).any():
-            x = float(np.nanquantile(low, rng.choice((0.0, 0.5, 1.0)))) - width * rng.choice(
-                (-0.01, 0.002, 0.02, 0.1)
-            )
+            x = float(np.nanquantile(low, rng.choice((0.0, 0.5, 1.0))))
+            x -= width * rng.choice((-0.01, 0.002, 0.02, 0.1))
         x = min(max(x, float(facts.a[side]) * 1.02), 0.999 * float(facts.arm))
         found = {"x": text(x, unit, facts.unit), "side": side, "every_orbit": kind == "reaches"}
     elif kind == "flip_order":
@@ -197,12 +183,8 @@ def deviations(rng: Any, scene: dict[str, Any], facts: model.Facts) -> tuple[dic
     if what < 0.62:
         return {}, {}
     if what < 0.82:
-        names = [
-            "throw.speed",
-            "landing.x",
-            "both",
-            *(["gravity.tilt"] if "tilt" in scene.get("gravity", {}) else []),
-        ]
+        names = ["throw.speed", "landing.x", "both"]
+        names += ["gravity.tilt"] if "tilt" in scene.get("gravity", {}) else []
         name = str(rng.choice(names))
         noise = {}
         if name in ("throw.speed", "gravity.tilt", "both"):

@@ -30,9 +30,8 @@ def starts(facts: model.Facts, rng: Any, count: int) -> tuple[Any, Any, int]:
         places = np.append(changes(numbers, side), arm)
         mine = near & ~joint & (i == side)
         off = rng.choice((-1, 1), count) * 10 ** rng.uniform(-11, -1.5, count) * (arm - a[side])
-        least = a[side] + 1e-9 * (
-            arm - a[side]
-        )  # nearer to the joint a throw may move by less than floats can tell
+        # nearer to the joint a throw may move by less than floats can tell
+        least = a[side] + 1e-9 * (arm - a[side])
         x[mine] = np.clip(rng.choice(places, count) + off, least, arm)[mine]
     return x, i, even
 
@@ -78,9 +77,8 @@ def move(orbits: Orbits, within: Range, throws: int, rng: Any, style: int) -> No
         orbits.fly(throws)
     elif style == 4:
         sides = orbits.numbers[0].size
-        weights = rng.normal(0, 1, (orbits.x.size, sides + 3)) * rng.choice(
-            (0, 1, 5), (orbits.x.size, sides + 3)
-        )
+        shape = orbits.x.size, sides + 3
+        weights = rng.normal(0, 1, shape) * rng.choice((0, 1, 5), shape)
         orbits.chase(throws, within.lo, within.hi, within.e, weights, int(rng.integers(1 << 31)))
     else:
         orbits.fly(throws, *sequence(rng, within, throws, style))
@@ -132,10 +130,8 @@ def cells_of(file: Path) -> list[tuple[Any, list[Any]]]:
         found = []
         for box in header["boxes"]:
             prefix = box["prefix"]
-            sides = [
-                arrays[f"{prefix}edges.{k}"]
-                for k in range(sum(key.startswith(f"{prefix}edges.") for key in arrays))
-            ]
+            count = sum(key.startswith(f"{prefix}edges.") for key in arrays)
+            sides = [arrays[f"{prefix}edges.{k}"] for k in range(count)]
             found.append((arrays[f"{prefix}rank"], sides))
     return found
 
@@ -214,10 +210,8 @@ def proved_goal(
         for at, on, period in cycles(each.facts):
             once = Orbits(each.facts.floats(), [at], [on])
             once.fly(2 * period)
-            if (
-                claimed(claim, file, np.array([at]), np.array([on]))[0]
-                and wrong(goal, each.facts, once, 2 * period)[0]
-            ):
+            spoken = claimed(claim, file, np.array([at]), np.array([on]))
+            if spoken[0] and wrong(goal, each.facts, once, 2 * period)[0]:
                 found.fault(
                     f"goal {claim['verdict']} of {claim.get('starts')}: a cycle of {period} throws violates it,"
                     f" from {at!r} on side {on}"
@@ -245,7 +239,7 @@ def proved_goal(
                 )
             if now == 4:
                 continue
-            shares(found, claim, each, x, i, bad, code, at, side, even)
+            shares(found, claim, each, (x, i), (bad, code, at, side), even)
 
 
 def _lost(within: Range, kappa: float, x: Any, i: Any) -> float:
@@ -254,19 +248,9 @@ def _lost(within: Range, kappa: float, x: Any, i: Any) -> float:
     return float((orbits.code < 0).mean())
 
 
-def shares(
-    found: Verdict,
-    claim: dict[str, Any],
-    within: Range,
-    x: Any,
-    i: Any,
-    bad: Any,
-    code: Any,
-    at: Any,
-    side: Any,
-    even: int,
-) -> None:
+def shares(found: Verdict, claim: dict[str, Any], within: Range, starts: Any, ends: Any, even: int) -> None:
     """The shares that are claimed against those of evenly spread starts."""
+    (x, i), (bad, code, at, side) = starts, ends
     room = 4 * np.sqrt(0.25 / even) + 1e-3
     good = 1 - (bad < even).sum() / even
     left = (code[:even] < 0).mean()
@@ -286,11 +270,8 @@ def shares(
         total = said["share"] + said["leaves"] + (said["creeps"] or 0) + said["open"]
         if not 1 - 1e-9 <= total <= 1 + 0.02:
             found.doubts.append(f"shares add up to {total}")
-        if (
-            claim["verdict"] == "proved"
-            and claim["starts"] in ("every", "almost-every")
-            and said["share"] < 1 - 1e-9
-        ):
+        whole = claim["verdict"] == "proved" and claim["starts"] in ("every", "almost-every")
+        if whole and said["share"] < 1 - 1e-9:
             found.fault(f"proved of {claim['starts']} start with a share of {said['share']}")
 
 
@@ -329,10 +310,8 @@ def attraction(found: Verdict, claim: dict[str, Any], within: list[Range], rng: 
         for at, on, period in cycles(each.facts) if of in (None, "every") or isinstance(of, dict) else []:
             first = points[str(on)][1] if points else of["from"][str(on)] if isinstance(of, dict) else 0.0
             once = Orbits(numbers, [at], [on])
-            if (
-                at > first + 1e-6 * numbers[6]
-                and not _inside(once, ends + 1e-6 * numbers[6] * np.array((-1, 1)))[0]
-            ):
+            wider = ends + 1e-6 * numbers[6] * np.array((-1, 1))
+            if at > first + 1e-6 * numbers[6] and not _inside(once, wider)[0]:
                 found.fault(
                     f"attracts-all proved: a cycle of {period} throws is outside the extents,"
                     f" from {at!r} on side {on}"
@@ -361,11 +340,8 @@ def attraction(found: Verdict, claim: dict[str, Any], within: list[Range], rng: 
                 if not every.size:
                     break
             if every.size:
-                where = (
-                    shown(each.facts, x, i, every)
-                    + " -> "
-                    + shown(each.facts, orbits.x, orbits.i, range(every.size))
-                )
+                where = f"{shown(each.facts, x, i, every)} -> "
+                where += shown(each.facts, orbits.x, orbits.i, range(every.size))
                 found.fault(
                     f"attracts-all proved: {every.size} starts leave or stay outside"
                     f" (variant {which}, noise {style}): {where}"

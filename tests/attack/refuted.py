@@ -28,9 +28,8 @@ def thrown(case: Case, state: dict[str, Any]) -> tuple[model.Facts, mpf]:
             continue
         pair = [value, value] if isinstance(value, str) else value
         number = [mpf(each.split()[0]) for each in pair]
-        scene = model.moved(
-            scene, name, to=f"{mp.nstr((number[0] + number[1]) / 2, 45)} {pair[0].split()[1]}"
-        )
+        middle = mp.nstr((number[0] + number[1]) / 2, 45)
+        scene = model.moved(scene, name, to=f"{middle} {pair[0].split()[1]}")
     facts = model.read(scene)
     if "throw.kappa" in said:
         stated = model.si(said["throw.kappa"]) / model.UNITS[facts.unit]
@@ -40,9 +39,7 @@ def thrown(case: Case, state: dict[str, Any]) -> tuple[model.Facts, mpf]:
     return facts, shift
 
 
-def replayed(
-    states: list[dict[str, Any]], case: Case, within: list[Range]
-) -> tuple[str, str, list[Any], mpf]:
+def replayed(states: list[Any], case: Case, within: list[Range]) -> tuple[str, str, list[Any], mpf]:
     """Throw a counterexample's orbit again at 50 digits from its first state: what is false, doubtful, the last.
 
     Where it comes round to its first state again, the throws begin at a state that is told exactly, if there is one.
@@ -75,12 +72,8 @@ def replayed(
                 text = f"throw {k} lands at {mp.nstr(alone[0], 20)} on side {alone[1]}"
                 return f"{text}, not {then['x']} on {then['side']}", doubt, last, mpf(0)
         last = list(digits.throw(facts, last[0], last[1], shift)) if not doubt else list(alone)
-    return (
-        "",
-        doubt,
-        last,
-        abs(last[0] - mpf(states[0]["x"])) if round_again and last[1] == states[0]["side"] else mp.inf,
-    )
+    closes = round_again and last[1] == states[0]["side"]
+    return "", doubt, last, abs(last[0] - mpf(states[0]["x"])) if closes else mp.inf
 
 
 def refuted(found: Verdict, claim: dict[str, Any], within: list[Range]) -> None:
@@ -97,11 +90,8 @@ def refuted(found: Verdict, claim: dict[str, Any], within: list[Range]) -> None:
     if doubt:
         found.doubts.append(f"{word}: {doubt}")
     goal = tomllib.loads(case.text).get("goal", {})
-    kind = (
-        "attracts_all"
-        if claim["claim"] == "attracts-all"
-        else next(key for key in goal if key != "from_anywhere")
-    )
+    kind = next((key for key in goal if key != "from_anywhere"), "")
+    kind = "attracts_all" if claim["claim"] == "attracts-all" else kind
     if last[2] < 0:
         return
     if kind == "attracts_all" and claim.get("starts") == "almost-every":
@@ -133,11 +123,9 @@ def refuted(found: Verdict, claim: dict[str, Any], within: list[Range]) -> None:
                 for end in ends
             ]
             parted = (both[0][0] - mpf(to["x"])) * (both[1][0] - mpf(to["x"])) < 0
-            if (
-                not parted
-                or {both[0][1], both[1][1]} != {to["side"]}
-                or not within[0].lo * (1 - 1e-13) <= min(ends) <= max(ends) <= within[0].hi * (1 + 1e-13)
-            ):
+            lo, hi = within[0].lo * (1 - 1e-13), within[0].hi * (1 + 1e-13)
+            there = parted and {both[0][1], both[1][1]} == {to["side"]}
+            if not (there and lo <= min(ends) <= max(ends) <= hi):
                 found.fault(f"{word}: it does not close between the two kappas {ends}")
         elif not gap <= within[0].e * (1 + 1e-9):
             found.fault(
@@ -189,11 +177,8 @@ def two_basins(found: Verdict, x: mpf, side: int, within: list[Range], word: str
     creeping = Orbits(numbers, [float(x)], [side])
     creeping.fly(20_000)
     a, arm = numbers[0], numbers[6]
-    if (
-        creeping.code[0] < 0
-        or creeping.i[0] != side
-        or not creeping.x[0] - a[side] < 0.5 * (float(x) - a[side])
-    ):
+    nearer = creeping.x[0] - a[side] < 0.5 * (float(x) - a[side])
+    if creeping.code[0] < 0 or creeping.i[0] != side or not nearer:
         found.fault(f"{word}: the start at {mp.nstr(x, 17)} on side {side} does not creep to the joint")
     i = np.repeat(np.arange(a.size), 200)
     others = Orbits(numbers, a[i] + (arm - a[i]) * np.tile((np.arange(200) + 0.5) / 200, a.size), i)

@@ -112,6 +112,17 @@ def throw(x, i, a, d, side, rho, kappa, h, arm, flight, flip, shift):
 
 
 @njit(cache=True)
+def note(k, n, side, x, ends, most, least, last_out):
+    """Note where throw n of orbit k ends."""
+    most[k, side] = max(most[k, side], x)
+    least[k, side] = min(least[k, side], x)
+    for piece in range(ends.shape[1]):
+        if ends[side, piece, 0] <= x <= ends[side, piece, 1]:
+            return
+    last_out[k] = n
+
+
+@njit(cache=True)
 def fly(numbers, x, i, code, throws, kappa, shift, ends, most, least, run, longest, last_out):
     """Move all orbits on by some throws, all with the same kappa and shift at the same throw.
 
@@ -135,15 +146,7 @@ def fly(numbers, x, i, code, throws, kappa, shift, ends, most, least, run, longe
             else:
                 jogs += 1
                 longest[k] = max(longest[k], jogs)
-            most[k, on] = max(most[k, on], at)
-            least[k, on] = min(least[k, on], at)
-            inside = False
-            for piece in range(ends.shape[1]):
-                if ends[on, piece, 0] <= at <= ends[on, piece, 1]:
-                    inside = True
-                    break
-            if not inside:
-                last_out[k] = n
+            note(k, n, on, at, ends, most, least, last_out)
         x[k], i[k], code[k], run[k] = at, on, how, jogs
 
 
@@ -176,15 +179,7 @@ def chase(numbers, x, i, code, throws, lo, hi, e, weights, ends, most, least, ru
                 if seen < 0:
                     best, to, there, what = math.inf, y, j, seen
                     break
-                most[k, j] = max(most[k, j], y)
-                least[k, j] = min(least[k, j], y)
-                inside = False
-                for piece in range(ends.shape[1]):
-                    if ends[j, piece, 0] <= y <= ends[j, piece, 1]:
-                        inside = True
-                        break
-                if not inside:
-                    last_out[k] = n
+                note(k, n, j, y, ends, most, least, last_out)
                 score = weights[k, 0] * y / arm + weights[k, 1] * seen + weights[k, 2 + j]
                 score += weights[k, 2 + a.size] * luck()
                 if score > best:

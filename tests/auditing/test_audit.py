@@ -92,18 +92,16 @@ def test_on_the_limit_set_these_are_proved_to_hold(name):
 
 
 def test_how_often_the_hinge_pulls():
-    jogs, flips = (
-        getattr(finding(audited("paper-designed"), "pivot", "press", "limit-set"), kind)
-        for kind in ("jogs", "flips")
+    designed, initial = (
+        finding(audited(name), "pivot", "press", "limit-set") for name in ("paper-designed", "paper-initial")
     )
-    assert jogs[0] == jogs[1] > 10_000
-    assert flips[0] / flips[1] == pytest.approx(6097 / 6327, abs=0.01)
-    jogs, flips = (
-        getattr(finding(audited("paper-initial"), "pivot", "press", "limit-set"), kind)
-        for kind in ("jogs", "flips")
-    )
-    assert jogs[0] / jogs[1] == pytest.approx(4842 / 15832, abs=0.01)
-    assert flips[0] / flips[1] == pytest.approx(2645 / 3967, abs=0.01)
+    assert designed.jogs[0] == designed.jogs[1] > 10_000
+    for (pulls, throws), share in (
+        (designed.flips, 6097 / 6327),
+        (initial.jogs, 4842 / 15832),
+        (initial.flips, 2645 / 3967),
+    ):
+        assert pulls / throws == pytest.approx(share, abs=0.01)
 
 
 @pytest.mark.parametrize(("name", "share"), [("paper-initial", 0.083), ("paper-initial-small-angle", 0.112)])
@@ -134,25 +132,16 @@ def test_no_throw_of_the_designed_scenes_rolls_anywhere(name):
 
 def mechanics(facts, side, x):
     """One exact throw by vectors and small steps of the pivot's angle, at 30 digits."""
-    a, d, kappa, h = (
-        mp.mpf(facts["a"][side]),
-        mp.mpf(facts["d"][side]),
-        mp.mpf(facts["kappa"]),
-        mp.mpf(facts["surface_height"]),
-    )
+    a, d = (mp.mpf(facts[name][side]) for name in ("a", "d"))
+    kappa, h = (mp.mpf(facts[name]) for name in ("kappa", "surface_height"))
     rho2 = mp.mpf(facts["radius_of_gyration"]) ** 2
 
     def rise(phi):  # of the left corner over the arm, in complex numbers
-        return (
-            (mp.mpc(x, h + d) * 1 + mp.mpc(0, 1) * mp.mpc(x, h + d) * phi).imag
-            - kappa * phi**2 / 2
-            + (mp.mpc(-a, -d) * mp.expj(phi)).imag
-            - h
-        )
+        flown = (mp.mpc(x, h + d) * mp.mpc(1, phi)).imag - kappa * phi**2 / 2
+        return flown + (mp.mpc(-a, -d) * mp.expj(phi)).imag - h
 
-    phi = mp.findroot(
-        rise, (2 * (x - a) / (kappa - d), 2 * (x - a) / (kappa - d) * mp.mpf("1.01") + mp.mpf("1e-6"))
-    )
+    near = 2 * (x - a) / (kappa - d)
+    phi = mp.findroot(rise, (near, near * mp.mpf("1.01") + mp.mpf("1e-6")))
     lever = mp.mpc(a, d) * mp.expj(phi)  # from the corner to the centre
     speed = mp.mpc(-(h + d), x - kappa * phi)
     m = rho2 + abs(lever) ** 2
@@ -206,9 +195,8 @@ def test_against_mechanics_written_apart(name):
             for column in (Assumed.ANGLE, Assumed.PRESS, Assumed.STICK_FRICTION, Assumed.DROP):
                 assert got[column].mean() == pytest.approx(float(wanted[column]), rel=1e-9), (side, x, column)
             # the steps of the reference miss a least force between two of them by 1e-4 of it or so
-            assert got[Assumed.FORCE].mean() == pytest.approx(
-                float(wanted[Assumed.FORCE]), rel=1e-3, abs=1e-4
-            )
+            force = float(wanted[Assumed.FORCE])
+            assert got[Assumed.FORCE].mean() == pytest.approx(force, rel=1e-3, abs=1e-4)
             friction = float(wanted[Assumed.HOLD_FRICTION])
             if friction < 20.0:
                 assert got[Assumed.HOLD_FRICTION, 0] == pytest.approx(friction, rel=0.02)
@@ -219,10 +207,8 @@ def test_against_mechanics_written_apart(name):
 
 @pytest.mark.sweep
 def test_the_friction_a_landing_needs_is_that_from_which_on_it_does_not_slip():
-    scene, random = (
-        told("paper-designed", {"friction": 1.0}, landing=True, slip=True),
-        np.random.default_rng(6),
-    )
+    scene = told("paper-designed", {"friction": 1.0}, landing=True, slip=True)
+    random = np.random.default_rng(6)
     box, held = parameter_box(ls.load("paper-designed")), 0
     for side in range(3):
         for x in random.uniform(6.0, 20.0, 12):
@@ -244,9 +230,8 @@ def test_a_change_of_the_speed_shifts_the_landing_as_the_map_says():
     box = parameter_box(scene)
     for x, side in ((14.0, 0), (9.0, 1), (12.0, 2), (22.0, 2)):
         moved = (ls.orbit(fast, x, side, 1).x[1] - ls.orbit(slow, x, side, 1).x[1]) / (2 * step)
-        assert assumed(box.lo, box.hi, side, [x], [x])[0, Assumed.SPEED].mean() == pytest.approx(
-            abs(moved), rel=1e-5
-        )
+        speed = assumed(box.lo, box.hi, side, [x], [x])[0, Assumed.SPEED]
+        assert speed.mean() == pytest.approx(abs(moved), rel=1e-5)
 
 
 @by_scene
@@ -283,9 +268,8 @@ def test_missing_facts_are_named_with_the_value_that_matters():
     need = finding(found, "slip", "friction", "limit-set")
     assert (need.called_for, need.missing) == (None, "friction")
     for friction, holds in ((need.threshold * 1.001, True), (need.threshold * 0.999, False)):
-        again = finding(
-            ls.audit(told("paper-designed", {"friction": friction})), "slip", "friction", "limit-set"
-        )
+        known = ls.audit(told("paper-designed", {"friction": friction}))
+        again = finding(known, "slip", "friction", "limit-set")
         assert again.called_for is not holds
         assert again.how == ("proved" if holds else "sampled") or holds
     assert finding(found, "bounce", "height", "domain").missing == "restitution"
@@ -297,9 +281,8 @@ def test_where_no_friction_is_enough_it_is_called_for_without_the_fact():
 
 
 def test_bounce_begins_to_matter_at_the_restitution_that_is_named():
-    need = finding(
-        ls.audit(told("paper-initial", {"bounce_threshold": "0.1 in"})), "bounce", "height", "domain"
-    )
+    unknown = ls.audit(told("paper-initial", {"bounce_threshold": "0.1 in"}))
+    need = finding(unknown, "bounce", "height", "domain")
     assert need.missing == "restitution"
     for e, called in ((need.threshold * 0.999, False), (need.threshold * 1.001, True)):
         world = {"bounce_threshold": "0.1 in", "restitution": e}

@@ -18,23 +18,9 @@ __all__ = ["compiler", "throws_in_c"]
 
 SOURCE = Path(__file__).with_name("throw.c")
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC")
-NUMBERS = (
-    "kappa",
-    "h",
-    "arm_length",
-    "a",
-    "d",
-    "ell",
-    "rho2",
-    "inertia",
-    "per_inertia",
-    "per_b",
-    "over",
-    "under",
-    "under2",
-    "a_next",
-    "shift",
-)
+# As the structure in throw.c has them.
+NUMBERS = ("kappa", "h", "arm_length", "a", "d", "ell", "rho2", "inertia", "per_inertia", "per_b")
+NUMBERS += ("over", "under", "under2", "a_next", "shift")
 INTEGERS = ("single_root", "side", "next")
 
 Answer = tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]

@@ -42,9 +42,8 @@ def one_machine(seed: tuple[int, int]) -> dict[str, Any]:
         except LimitsetsError as error:
             return {"seed": seed, "error": str(error)}
         # the half of a 95 % interval is about two standard errors
-        values[share] = {
-            name: (found[name].value, 0.5 * found[name].half) for name in PLACES if name not in found.held
-        }
+        fitted = [name for name in PLACES if name not in found.held]
+        values[share] = {name: (found[name].value, 0.5 * found[name].half) for name in fitted}
         answer[f"{share:g}"] = {
             "held": held_by(found, truth),
             "open": [each.name for each in found.quantities if not each.bounded],
@@ -54,9 +53,8 @@ def one_machine(seed: tuple[int, int]) -> dict[str, Any]:
             "seconds": found.seconds,
         }
     both = set(values[0.0]) & set(values[FLIPPED])
-    answer["moved"] = {
-        name: (values[FLIPPED][name][0] - values[0.0][name][0]) / values[0.0][name][1] for name in both
-    }
+    clean, flipped = values[0.0], values[FLIPPED]
+    answer["moved"] = {name: (flipped[name][0] - clean[name][0]) / clean[name][1] for name in both}
     return answer
 
 
@@ -81,10 +79,10 @@ def counted(fits: list[dict[str, Any]]) -> dict[str, Any]:
         kept.update(each["kept"])
         for name, size in each["off"].items():
             off.setdefault(name, []).append(size)
+    words, counts = ("told", "held", "open", "kept"), (told, held, ends, kept)
     return {
         "intervals": {
-            name: {"told": told[name], "held": held[name], "open": ends[name], "kept": kept[name]}
-            for name in told
+            name: {word: count[name] for word, count in zip(words, counts, strict=True)} for name in told
         },
         "median off, standard errors": {name: float(np.median(sizes)) for name, sizes in off.items()},
     }
@@ -107,19 +105,14 @@ def measured(machines: int, films: int, workers: int, seed: int = 0) -> dict[str
     clean, flipped = ([each[share] for each in fits] for share in ("0", f"{FLIPPED:g}"))
     moved = {name: [each["moved"][name] for each in fits if name in each["moved"]] for name in PLACES}
     power = {name: sum(each["misfit"] for each in strange if each["effect"] == name) for name in EFFECTS}
+    far = {name: float(np.median(np.abs(each))) for name, each in moved.items()}
+    shares = {"0": clean, "0.05": flipped}
     return {
         "machines": machines,
         "films with an effect, each": films,
         "clean": counted(clean),
-        "flipped": counted(flipped)
-        | {
-            "median moved, standard errors": {
-                name: float(np.median(np.abs(each))) for name, each in moved.items()
-            }
-        },
-        "level": {
-            share: sum(each["misfit"] for each in some) for share, some in (("0", clean), ("0.05", flipped))
-        },
+        "flipped": counted(flipped) | {"median moved, standard errors": far},
+        "level": {share: sum(each["misfit"] for each in some) for share, some in shares.items()},
         "power": power,
         "errors": errors,
         "seconds": {

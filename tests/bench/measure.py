@@ -114,14 +114,11 @@ def as_text(rows: list[Row]) -> list[str]:
         ratio = "" if row.ratio is None else f"{row.reads} {_number(row.ratio)}"
         spread = f"{_number(row.low)} - {_number(row.high)}"
         holds = "" if row.holds is None else "yes" if row.holds else "NO"
-        lines.append(
-            (row.what, f"{_number(row.ours)} {row.unit}", row.rival, theirs, ratio, spread, row.asked, holds)
-        )
+        ours = f"{_number(row.ours)} {row.unit}"
+        lines.append((row.what, ours, row.rival, theirs, ratio, spread, row.asked, holds))
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
-    text = [
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in lines
-    ]
+    rows_of = ([cell.ljust(width) for cell, width in zip(line, widths, strict=True)] for line in lines)
+    text = ["  ".join(cells).rstrip() for cells in rows_of]
     return [text[0], "-" * max(map(len, text)), *text[1:]]
 
 

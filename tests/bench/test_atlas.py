@@ -44,6 +44,10 @@ def drawn(count, seed=0):
     return throw_stack(ls.load("paper-designed"), {"throw.speed": speed, "arm.surface_height": height})
 
 
+def topology_of(stack):
+    return topologies(stack.params, stack.lo, stack.hi, stack.anchor)
+
+
 def test_points_per_second(benchmark, table):
     scene, stack = ls.load("paper-designed"), drawn(POINTS)
     scenes = [scene.with_values({"arm.surface_height": h}) for h in (-0.7, -0.4, -0.1)]
@@ -51,12 +55,7 @@ def test_points_per_second(benchmark, table):
     def by_analyse():
         return [ls.analyse(each) for each in scenes]
 
-    turns = take_turns(
-        benchmark,
-        lambda: topologies(stack.params, stack.lo, stack.hi, stack.anchor),
-        {ANALYSE: by_analyse},
-        5,
-    )
+    turns = take_turns(benchmark, lambda: topology_of(stack), {ANALYSE: by_analyse}, 5)
     per_point = Turns(turns.ours / POINTS, {ANALYSE: turns.rivals[ANALYSE] / ANALYSED}, None, {})
     table += [
         versus("atlas: one feeder of paper-designed, its topology", per_point, ANALYSE, unit="ms"),
@@ -68,12 +67,8 @@ def test_points_per_second(benchmark, table):
 
 def test_two_processes(benchmark, table):
     axes = f"throw.speed=120:180:{SIDE}", f"arm.surface_height=-1:0.2:{SIDE}"
-    turns = take_turns(
-        benchmark,
-        lambda: ls.atlas("paper-designed", *axes, workers=2),
-        {"one process": lambda: ls.atlas("paper-designed", *axes, workers=1)},
-        3,
-    )
+    rivals = {"one process": lambda: ls.atlas("paper-designed", *axes, workers=1)}
+    turns = take_turns(benchmark, lambda: ls.atlas("paper-designed", *axes, workers=2), rivals, 3)
     rate = SIDE * SIDE / turns.ours
     table += [
         versus(f"atlas: {SIDE} x {SIDE} points with 2 processes", turns, "one process"),
@@ -86,9 +81,8 @@ def test_two_processes(benchmark, table):
 def test_a_million(table):
     """The window of the README, once, as a user runs it."""
     begin = perf_counter()
-    found = ls.atlas(
-        "paper-designed", "throw.speed=120:180:1000", "arm.surface_height=-1:0.2:1000", workers=2
-    )
+    axes = "throw.speed=120:180:1000", "arm.surface_height=-1:0.2:1000"
+    found = ls.atlas("paper-designed", *axes, workers=2)
     table.append(limit("atlas: a million feeders, 2 processes", perf_counter() - begin, "s", 60))
     assert found.dataset["checked"].isin([2, 4]).sum() == 0  # none differs from fine cells or from a proof
     assert (found.dataset["undecided"] > 0).mean() < 0.02
@@ -147,12 +141,8 @@ def by_cmgdb(params, lo, hi):
 def test_components_of_a_hundred(benchmark, table):
     stack = drawn(100, seed=1)
     points = [(point_of(stack.params, i), stack.lo[i], stack.hi[i]) for i in range(100)]
-    turns = take_turns(
-        benchmark,
-        lambda: [by_us(*each) for each in points],
-        {CMGDB: lambda: [by_cmgdb(*each) for each in points]},
-        3,
-    )
+    rivals = {CMGDB: lambda: [by_cmgdb(*each) for each in points]}
+    turns = take_turns(benchmark, lambda: [by_us(*each) for each in points], rivals, 3)
     assert turns.answer == turns.answers[CMGDB]
     what = f"atlas: recurrent components of 100 feeders, {2**DEPTH} cells, hulls of both branches"
     table.append(versus(what, turns, CMGDB))
@@ -160,7 +150,7 @@ def test_components_of_a_hundred(benchmark, table):
     seconds = []
     for _ in turns.rivals[CMGDB]:
         begin = perf_counter()
-        topologies(stack.params, stack.lo, stack.hi, stack.anchor)
+        topology_of(stack)
         seconds.append(perf_counter() - begin)
     whole = Turns(np.array(seconds), turns.rivals, None, {})
     table.append(versus("atlas: the topology of these: bands, jogs, shares, all of it", whole, CMGDB))

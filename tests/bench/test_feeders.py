@@ -64,18 +64,16 @@ def fates(tmp_path_factory):
         speed, landing = (getattr(law, "sigma", getattr(law, "bound", 0.0)) for law in laws)
         scene, sides = end.scene, end.scene.sides
         bounds = np.ravel(end.clear)
-        rows = (
-            (ctypes.c_double * 16)(*values) for values in (sides.a, sides.d, sides.length, end.starts, bounds)
-        )
+        columns = (sides.a, sides.d, sides.length, end.starts, bounds)
+        rows = ((ctypes.c_double * 16)(*values) for values in columns)
         of = Feeder(
             *(scene.kappa, scene.surface_height, scene.radius_of_gyration, scene.arm_length, end.x),
             *(speed, landing, *rows, len(sides), end.side, bounds.size),
             any(isinstance(law, Gaussian) for law in laws),
         )
         met = np.zeros(len(FATES), dtype=np.int64)
-        throws = run(
-            ctypes.byref(of), ctypes.c_int64(parts), ctypes.c_uint64(seed), ctypes.c_void_p(met.ctypes.data)
-        )
+        counts = ctypes.c_int64(parts), ctypes.c_uint64(seed)
+        throws = run(ctypes.byref(of), *counts, ctypes.c_void_p(met.ctypes.data))
         return met / parts, throws / parts
 
     return thrown
@@ -146,11 +144,7 @@ def test_shares_are_within_their_stated_errors(table, fates, request, capsys):
         apart.append([found.shares.shares[name] - share for name, share in zip(FATES, truth, strict=True)])
         with capsys.disabled():
             line = f"{found.shares.shares['right']:.5f} +- {stated[-1][0]:.5f}, C: {truth[0]:.5f}"
-            out = [
-                name
-                for name, far, error in zip(FATES, apart[-1], stated[-1], strict=True)
-                if abs(far) > error
-            ]
+            out = [name for k, name in enumerate(FATES) if abs(apart[-1][k]) > stated[-1][k]]
             print(f"{seed}: {line}; {throws:.1f} throws, {noise.words()}, outside: {out}", flush=True)
     errors, deviations = np.array(stated), np.abs(apart)
     inside = (deviations <= errors).sum(axis=0)

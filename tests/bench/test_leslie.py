@@ -17,6 +17,7 @@ import limitsets as ls
 from limitsets.systems.graph.components import reach
 from tests.bench.leslie_rivals import HI, LO, Answer, by_cmgdb, by_scipy
 from tests.bench.measure import Turns, limit, take_turns, versus
+from tests.test_paper import LIMIT_SETS
 
 # ----------------------------------------------------------------
 # Map, components, order and basins of the Leslie map, against CMGDB and against numpy and scipy.
@@ -63,9 +64,8 @@ def test_leslie(benchmark, depth, table):
         to_order.append(answer.seconds_to_order)
         return answer
 
-    turns = take_turns(
-        benchmark, lambda: by_us(depth), {CMGDB: cmgdb, SCIPY: lambda: by_scipy(depth)}, ROUNDS[depth]
-    )
+    rivals = {CMGDB: cmgdb, SCIPY: lambda: by_scipy(depth)}
+    turns = take_turns(benchmark, lambda: by_us(depth), rivals, ROUNDS[depth])
     graph, ours = turns.answer
     theirs, scipy = turns.answers[CMGDB], turns.answers[SCIPY]
     assert ours.components == scipy.components == theirs.components
@@ -85,14 +85,8 @@ def test_leslie(benchmark, depth, table):
         adaptive = by_cmgdb(depth, adaptive=True)
         assert sorted(adaptive.components) == sorted(ours.components)
         # On cells of mixed sizes the order comes out coarser: another answer, so no rival, but its time is told.
-        table.append(
-            limit(
-                "for information: CMGDB halving only what recurs, no basins",
-                adaptive.seconds_to_order,
-                "s",
-                None,
-            )
-        )
+        what = "for information: CMGDB halving only what recurs, no basins"
+        table.append(limit(what, adaptive.seconds_to_order, "s", None))
 
 
 # ----------------------------------------------------------------
@@ -137,14 +131,6 @@ def test_attracting_components(benchmark, build, table):
 # 1e6 cells of the paper scene: how long, and how much memory above what the process held before.
 
 
-# Ends of the limit set, side by side, from the decimal scene at 40 digits.
-LIMIT_SET = {
-    "0": (15.205338825681, 19.75268801485),
-    "1": (12.637023572659, 17.439819281769),
-    "2": (8.9140259080455, 23.383151921158),
-}
-
-
 @pytest.mark.bench
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="peak memory is read from /proc")
 def test_million_cells(table):
@@ -153,10 +139,8 @@ def test_million_cells(table):
     answer = json.loads(done.stdout)
     assert answer["attractors"] == [pytest.approx(1.0, abs=1e-4)]
     assert answer["undecided"] == pytest.approx(0.0, abs=1e-4)
-    for side, (lo, hi) in LIMIT_SET.items():
-        ((found_lo, found_hi),) = answer["extents"][side]
-        assert found_lo == pytest.approx(lo, abs=2e-3)
-        assert found_hi == pytest.approx(hi, abs=2e-3)
+    for side, (ends,) in LIMIT_SETS["paper-designed"].items():
+        assert answer["extents"][str(side)] == [pytest.approx(ends, abs=2e-3)]
     what = "paper-designed, 1e6 cells"
     table += [
         limit(f"{what}: grid, graph, components, survey", answer["seconds"], "s", None),

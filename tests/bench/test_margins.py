@@ -103,16 +103,12 @@ class Points:
 
     def __init__(self):
         self.scene, self.count = ls.load("paper-initial"), 0
-        self.start = np.array(
-            [self.scene.value(VARY[0]), self.scene.value(VARY[1]), np.log(self.scene.kappa)]
-        )
+        self.start = np.array([*map(self.scene.value, VARY[:2]), np.log(self.scene.kappa)])
 
     def __call__(self, at):
         self.count += 1
         try:
-            scene = self.scene.with_values(
-                dict(zip(VARY, (float(at[0]), float(at[1]), float(np.exp(at[2]))), strict=True))
-            )
+            scene = self.scene.with_values(dict(zip(VARY, map(float, self.values(at)), strict=True)))
         except LimitsetsError:
             return np.full(3, 100.0)
         points = ls.critical_points(scene.map, scene.domain)
@@ -130,23 +126,17 @@ def hybrid():
 
 def simplex():
     points = Points()
+    options = {"xatol": 1e-8, "fatol": 1e-14, "maxfev": 1000}
     found = minimize(
-        lambda at: float((points(at) ** 2).sum()),
-        points.start,
-        method="Nelder-Mead",
-        options={"xatol": 1e-8, "fatol": 1e-14, "maxfev": 1000},
+        lambda at: float((points(at) ** 2).sum()), points.start, method="Nelder-Mead", options=options
     )
     return points.values(found.x), points.count
 
 
 def test_design(benchmark, table):
     rivals = {"scipy hybr, finite differences": hybrid, "scipy Nelder-Mead": simplex}
-    turns = take_turns(
-        benchmark,
-        lambda: ls.design("paper-initial", critical_points=WANTED.tolist(), vary=VARY),
-        rivals,
-        ROUNDS,
-    )
+    asked = {"critical_points": WANTED.tolist(), "vary": VARY}
+    turns = take_turns(benchmark, lambda: ls.design("paper-initial", **asked), rivals, ROUNDS)
     ours = turns.answer
     assert ours.reached
     assert [value for _, value, _ in ours.quantities().values()] == pytest.approx(KNOWN, abs=1e-5)

@@ -42,13 +42,8 @@ THROWS = 100_000_000
 def one_step(cover):
     """Build the operator as sums along the cells, and apply it once to even masses."""
     scene = ls.load("paper-designed")
-    chain = transfer(
-        thrown(still_map(scene)),
-        cover,
-        parameter=kappa_strata(NOISE, scene, STRATA),
-        landing=NOISE.landing,
-        strata=STRATA,
-    )
+    laws = {"parameter": kappa_strata(NOISE, scene, STRATA), "landing": NOISE.landing}
+    chain = transfer(thrown(still_map(scene)), cover, **laws, strata=STRATA)
     even = cover.measure / cover.measure.sum()
     return np.maximum(chain.landing.adjoint(chain.throw.adjoint(even)), 0.0)
 
@@ -62,9 +57,8 @@ def one_step_by_sampling(cover):
         place = (np.arange(POINTS) + 0.5) / POINTS
         x = (edges[:-1, None] + place * np.diff(edges)[:, None]).ravel()
         source = np.repeat(np.arange(cover.offset[side], cover.offset[side + 1]), POINTS)
-        after, to, code, _ = ls.maps.advance(
-            params, x, np.full(x.size, side), 1, first=int(source[0]) * POINTS
-        )
+        first = int(source[0]) * POINTS
+        after, to, code, _ = ls.maps.advance(params, x, np.full(x.size, side), 1, first=first)
         for target in range(cover.sides):
             here = (to == target) & (code >= 0)
             cell = cover.index(after[here], target)
@@ -89,15 +83,10 @@ def same(ours, theirs, cover):
 
 def test_building_and_one_step(benchmark, table):
     cover = cover_of(33_333)
-    turns = take_turns(
-        benchmark,
-        lambda: one_step(cover),
-        {"sampled matrix": lambda: one_step_by_sampling(cover)},
-        rounds=3,
-    )
+    rivals = {"sampled matrix": lambda: one_step_by_sampling(cover)}
+    turns = take_turns(benchmark, lambda: one_step(cover), rivals, rounds=3)
     same(turns.answer, turns.answers["sampled matrix"], cover)
-    row = versus("noisy operator, 1e5 cells, built and applied once", turns, "sampled matrix")
-    table.append(row)
+    table.append(versus("noisy operator, 1e5 cells, built and applied once", turns, "sampled matrix"))
 
 
 def test_a_million_cells(table):
@@ -114,9 +103,8 @@ def test_a_million_cells(table):
 def test_against_1e8_throws(noise, table):
     scene, word = ls.load("paper-designed"), "with noise" if noise.given() else "without noise"
     begin = perf_counter()
-    found = noise_statistics(
-        scene, noise, goal=GOAL, sensitivity=False, cells=2048 if noise.given() else 8192
-    )
+    cells = 2048 if noise.given() else 8192
+    found = noise_statistics(scene, noise, goal=GOAL, sensitivity=False, cells=cells)
     mine = perf_counter() - begin
     begin = perf_counter()
     counted = throw_many(scene, noise, GOAL, starts_from(scene), throws=THROWS, parts=100_000)

@@ -13,6 +13,7 @@ import pytest
 import limitsets as ls
 from tests.bench.measure import limit, take_turns, versus
 from tests.graph.long_chains import check_cycle, check_path
+from tests.test_paper import LIMIT_SETS
 
 pytestmark = pytest.mark.bench
 
@@ -82,11 +83,7 @@ def test_analyse(command, tmp_path, table):
 
 
 # Ends of the limit set, side by side, from the decimal scene at 40 digits.
-LIMIT_SET = {
-    0: (15.205338825681, 19.75268801485),
-    1: (12.637023572659, 17.439819281769),
-    2: (8.9140259080455, 23.383151921158),
-}
+LIMIT_SET = LIMIT_SETS["paper-designed"]
 ROUNDS, THROWS = 1000, 1_000_000
 
 
@@ -99,7 +96,7 @@ def test_a_thousand_million_throws(table):
         path = ls.orbit(params, x, side, THROWS)
         assert path.stopped is None
         assert path.code.size == THROWS
-        for s, (lo, hi) in LIMIT_SET.items():
+        for s, ((lo, hi),) in LIMIT_SET.items():
             here = path.x[path.side == s]
             assert lo - 1e-11 < here.min()
             assert here.max() < hi + 1e-11

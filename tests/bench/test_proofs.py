@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import math
-import os
 import random
 import subprocess
 import sys
@@ -65,13 +64,8 @@ def test_rigorous_images_beside_codac(table):
     if importlib.util.find_spec("codac") is None:
         pytest.skip("codac is not installed here")
     script = Path(__file__).with_name("python_proofs.py")
-    done = subprocess.run(
-        [sys.executable, str(script), "codac", "400"],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=dict(os.environ),
-    )
+    command = [sys.executable, str(script), "codac", "400"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     table.append(limit("rigorous images with codac in Python, a cell", float(done.stdout) * 1e6, "us", None))
 
 
@@ -123,20 +117,17 @@ def test_the_recheck_of_damaged_and_forged_files(table, tmp_path):
         table.append(limit(f"recheck of {what} files, the slowest ({name})", seconds, "s", 1.0))
 
 
+VARIED = ("throw.kappa", "arm.surface_height", "part.mass.center.along", "part.mass.center.above")
+
+
 def test_no_enclosure_is_violated(table):
     """1e8 random points of random cells of random scenes lie in the images of their cells."""
     rng = np.random.default_rng(20)
     base = ls.load("paper-designed")
     points = violated = 0
     while points < 100_000_000:
-        scene = base.with_values(
-            {
-                "throw.kappa": float(rng.uniform(8.0, 80.0)),
-                "arm.surface_height": float(rng.uniform(-1.5, 0.5)),
-                "part.mass.center.along": float(rng.uniform(2.5, 4.8)),
-                "part.mass.center.above": float(rng.uniform(0.4, 1.2)),
-            }
-        )
+        values = rng.uniform((8.0, -1.5, 2.5, 0.4), (80.0, 0.5, 4.8, 1.2)).tolist()
+        scene = base.with_values(dict(zip(VARIED, values, strict=True)))
         for side in range(3):
             edges = ls.grid(scene.domain, cells=int(rng.integers(200, 5000))).edges[side][0]
             found = enclosed.enclosures(scene.map, scene.map, edges, side)

@@ -20,6 +20,7 @@ from limitsets.systems.maps import drivers
 from limitsets.systems.sets import invariant_measures
 from tests.bench.compiled import compiler, throws_in_c
 from tests.bench.measure import Turns, limit, take_turns, versus
+from tests.test_paper import LIMIT_SETS
 from tests.thrower.effects.copies import environment_of_copy
 
 # ----------------------------------------------------------------
@@ -28,14 +29,11 @@ from tests.thrower.effects.copies import environment_of_copy
 
 SIDE, COUNT, ROUNDS = 2, 4096, 400
 REPEATS = 5  # per round: what the others left in the cache matters for the first only
-LO, HI = 8.9140259080455, 23.383151921158  # the limit set of paper-designed on side 2
+((LO, HI),) = LIMIT_SETS["paper-designed"][2]
 
 PER = COUNT * REPEATS
-VECTORISED, UNCONTRACTED, LIBM = (
-    "C, vectorised, contraction",
-    "C, vectorised, no contraction",
-    "C, libm and Newton",
-)
+VECTORISED, LIBM = "C, vectorised, contraction", "C, libm and Newton"
+UNCONTRACTED = "C, vectorised, no contraction"
 
 
 def repeated(run):
@@ -114,15 +112,8 @@ OF_EFFECTS = 4096
 # Facts for every effect, so that each can be switched on alone.
 WORLD = {"friction": 0.9, "restitution": 0.2, "bounce_threshold": "0.01 in", "stroke": "5 deg"}
 WORLD |= {"scatter": {"speed": "0.3 %"}}
-EFFECTS = [
-    {"landing": True},
-    {"roll": True},
-    {"slip": True},
-    {"pivot": True},
-    {"bounce": True},
-    {"drive": True},
-    {"landing": True, "roll": True},
-]
+EFFECTS = [{name: True} for name in ("landing", "roll", "slip", "pivot", "bounce", "drive")]
+EFFECTS.append({"landing": True, "roll": True})
 
 
 @pytest.fixture
@@ -166,11 +157,7 @@ def test_an_effect(benchmark, effects, table):
     x = np.random.default_rng(3).uniform(14.0, 22.0, OF_EFFECTS)
 
     def throws(params):
-        after, side, code = (
-            (np.empty(OF_EFFECTS),),
-            np.empty(OF_EFFECTS, np.int64),
-            np.empty(OF_EFFECTS, np.int64),
-        )
+        after, (side, code) = (np.empty(OF_EFFECTS),), np.empty((2, OF_EFFECTS), np.int64)
         return lambda: drivers.fill_images(params, 2, (x,), after, side, code)
 
     turns = take_turns(benchmark, throws(full.map), {"the bare map": throws(bare.map)}, PAIRS)
@@ -184,11 +171,7 @@ def test_an_effect(benchmark, effects, table):
 # these rows are drawn by studies/03_accuracy.
 
 
-EXACT = {
-    0: [(15.205338825681, 19.75268801485)],
-    1: [(12.637023572659, 17.439819281769)],
-    2: [(8.9140259080455, 23.383151921158)],
-}
+EXACT = LIMIT_SETS["paper-designed"]
 ROUNDS_ACCURACY = 15
 
 
@@ -238,12 +221,8 @@ def test_ends_of_the_limit_set(benchmark, table):
 @pytest.mark.bench
 def test_an_error_asked_for(benchmark, table):
     scene = ls.load("paper-designed")
-    turns = take_turns(
-        benchmark,
-        lambda: ls.analyse(scene, error=1e-6),
-        {"analyse": lambda: ls.analyse(scene)},
-        ROUNDS_ACCURACY,
-    )
+    rivals = {"analyse": lambda: ls.analyse(scene)}
+    turns = take_turns(benchmark, lambda: ls.analyse(scene, error=1e-6), rivals, ROUNDS_ACCURACY)
     assert turns.answer.accuracy.met
     assert error_of(turns.answer.extents[0]) < 1e-6
     found = turns.answer.accuracy
@@ -261,13 +240,9 @@ def test_one_throw(benchmark, table):
     from limitsets.feeder.thrower import Energy, SmallAngle
 
     small = scene.map._replace(flight=SmallAngle(), flip=Energy())
-    turns = take_turns(
-        benchmark,
-        lambda: ls.maps.images(scene.map, x, 2),
-        {"small angle (errors of inches)": lambda: ls.maps.images(small, x, 2)},
-        200,
-    )
     name = "small angle (errors of inches)"
+    rivals = {name: lambda: ls.maps.images(small, x, 2)}
+    turns = take_turns(benchmark, lambda: ls.maps.images(scene.map, x, 2), rivals, 200)
     same = turns.answer.side == turns.answers[name].side
     assert np.abs(turns.answer.x - turns.answers[name].x)[same].max() > 1.0
     table.append(versus("an exact throw, limitsets.maps.images", turns, name, unit="ns", per=4096))

@@ -51,14 +51,8 @@ def shares(end, count, seed, speed=lambda random, n: np.zeros(n), landing=None, 
             clear |= (beyond >= lo) & (beyond <= hi)
         left = ~((x > scene.sides.a[side]) & (x <= scene.arm_length))
         fed, wanted = ~left & (beyond >= 0.0), side == end.side
-        met += [
-            (fed & wanted & clear).sum(),
-            (fed & ~wanted).sum(),
-            (fed & wanted & ~clear).sum(),
-            0,
-            left.sum(),
-            0,
-        ]
+        fates = fed & wanted & clear, fed & ~wanted, fed & wanted & ~clear
+        met[[0, 1, 2, 4]] += [fate.sum() for fate in (*fates, left)]
         x, side = x[~left & ~fed], side[~left & ~fed]
         if not x.size:
             break

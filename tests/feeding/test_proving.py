@@ -1,11 +1,10 @@
 """What is proved of a feeder: safety, progress, shares, and where parts are laid down."""
 
-import io
 import json
 import math
 import re
 import time
-import zipfile
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +26,7 @@ from limitsets.systems.maps import advance
 from tests.cli.command import run
 from tests.feeding.own_throws import shares
 from tests.feeding.scenes import with_cavity
+from tests.proofs.forge import with_section
 
 # ----------------------------------------------------------------
 # Safety and progress: the figures of the theory, and that no orbit contradicts what is proved.
@@ -55,10 +55,23 @@ def random_starts(scene, x_end, count=4000, seed=5):
     return a + (x_end - a) * random.uniform(1e-3, 1.0, count), side
 
 
-def test_at_20_in_every_start_is_fed_on_side_2():
+def certified(scene, tmp_path, noise=None):
+    """Prove it, write it without a look, and recheck it."""
+    end = arm_end_of(scene)
+    proof = proved_feeding(end, noise)
+    file = write_proof(tmp_path / "fed.proof.zip", proof, end, recheck=False)
+    return proof, ls.recheck(file)
+
+
+def test_at_20_in_every_start_is_fed_on_side_2(tmp_path):
     """786 throws from the cells on, as `reaches` has it; the only side beyond 20 in is 2, for r_2 = 20."""
     scene = with_cavity()
-    safe, fed, _ = proved_feeding(arm_end_of(scene))
+    proof, report = certified(scene, tmp_path)
+    assert (report.verdict, verdict_of(proof)) == ("proved", "proved")
+    assert report.fed == {"safety": 1.0, "progress": 1.0}
+    assert "the first rest at x >= 20 in, if there is one, is on side 2" in report.statement[0]
+    assert "within 786 throws" in report.statement[0]
+    safe, fed, _ = proof
     assert safe.verdict == "proved"
     assert set(safe.possible) == {2}
     assert safe.leaving == 0.0
@@ -68,9 +81,14 @@ def test_at_20_in_every_start_is_fed_on_side_2():
     assert throws.max() <= fed.throws
 
 
-def test_at_20_5_in_an_orbit_is_never_fed():
+def test_at_20_5_in_an_orbit_is_never_fed(tmp_path):
     """A periodic orbit never exceeds 20.103 in; almost every start is fed all the same."""
-    safe, fed, _ = proved_feeding(arm_end_of(with_cavity(position="20.5 in")))
+    proof, report = certified(with_cavity(position="20.5 in"), tmp_path)
+    assert (report.verdict, verdict_of(proof)) == ("proved", "proved")
+    assert report.fed == {"safety": 1.0, "almost": 1.0}
+    assert "but for starts of total length zero" in report.statement[0]
+    assert f"a periodic orbit, of {len(proof.fed.never_fed) - 1} throws" in report.statement[0]
+    safe, fed, _ = proof
     assert fed.verdict == "refuted"
     assert fed.almost_every == "proved"
     assert max(state.hi for state in fed.never_fed) < 20.5
@@ -81,11 +99,15 @@ def test_at_20_5_in_an_orbit_is_never_fed():
     assert safe.verdict == "proved"
 
 
-def test_where_two_sides_can_be_fed():
+def test_where_two_sides_can_be_fed(tmp_path):
     """paper-initial: all three r_i are 20 in, so that jogs beyond it are possible on each side."""
     scene = with_cavity("paper-initial")
-    end = arm_end_of(scene)
-    safe, fed, _ = proved_feeding(end)
+    proof, report = certified(scene, tmp_path)
+    assert (report.verdict, verdict_of(proof)) == ("refuted", "refuted")
+    assert report.fed["safety"] == pytest.approx(proof.safe.share, abs=2e-6)
+    assert report.fed["progress"] == 1.0
+    assert "safety is refuted" in report.statement[0]
+    end, (safe, fed, _) = arm_end_of(scene), proof
     assert safe.verdict == "refuted"
     assert safe.counterexample[0].hi < 20.0
     landing = safe.counterexample[-1]
@@ -112,12 +134,8 @@ def test_a_throw_that_scatters_by_10_percent_feeds_side_2_only():
 def test_when_time_is_up_what_is_proved_is_the_answer():
     """The same throw on the first cells only: the side is proved there, and progress names the cells it ended on."""
     told = []
-    found = proved_feeding(
-        arm_end_of(with_cavity()),
-        {"throw.speed": "10 %"},
-        seconds=0.0,
-        progress=lambda *step: told.append(step),
-    )
+    words = {"seconds": 0.0, "progress": lambda *step: told.append(step)}
+    found = proved_feeding(arm_end_of(with_cavity()), {"throw.speed": "10 %"}, **words)
     assert found.safe.verdict == "proved"
     assert found.fed.verdict == "undecided"
     assert "finer cells than 2048 a side were not tried" in found.fed.reason
@@ -129,19 +147,16 @@ def pentagon():
     """A part that 6 % of noise carries anywhere: a quarter of its cells can be thrown from beyond where it stands."""
     corners = [(12.145, 11.491), (8.57, 13.529), (-14.251, 9.684), (-5.53, -14.579), (17.207, -5.453)]
     mass = [{"x": "3.628 mm", "y": "2.934 mm", "mass": "180.155 g"}]
-    return ls.load(
-        {
-            "part": {
-                "vertices": [[f"{x} mm", f"{y} mm"] for x, y in corners],
-                "mass": {"plate_density": "3 kg/m^2", "points": mass},
-            },
-            "arm": {"surface_height": "0.641 mm", "length": "262.438 mm"},
-            "throw": {"kappa": "12.5314 mm"},
-            "cavity": {
-                "position": "177.233 mm", "width": "40.382 mm", "depth": "43.016 mm", "angle": "47.2 deg"
-            },
-        }
-    )  # fmt: skip
+    text = """
+    part.mass.plate_density = "3 kg/m^2"
+    arm = {surface_height = "0.641 mm", length = "262.438 mm"}
+    throw.kappa = "12.5314 mm"
+    cavity = {position = "177.233 mm", width = "40.382 mm", depth = "43.016 mm", angle = "47.2 deg"}
+    """
+    tree = tomllib.loads(text)
+    tree["part"]["vertices"] = [[f"{x} mm", f"{y} mm"] for x, y in corners]
+    tree["part"]["mass"]["points"] = mass
+    return ls.load(tree)
 
 
 def test_a_cell_that_is_not_lost_has_the_image_that_it_has_alone():
@@ -206,15 +221,13 @@ def test_scattered_landings_are_fed_from_some_x_on():
 
 def test_a_part_with_too_many_sides_is_told_so():
     corners = [[f"{10 * np.cos(t):.4f} cm", f"{10 * np.sin(t):.4f} cm"] for t in 2 * np.pi * np.arange(8) / 8]
-    scene = ls.load(
-        {
-            "part": {"vertices": corners, "mass": {"plate_density": "1 kg/m^2"}},
-            "arm": {"surface_height": "-1 cm", "length": "100 cm"},
-            "throw": {"kappa": "90 cm"},
-            "goal": {"reaches": {"x": "60 cm", "side": 0}},
-            "cavity": {"position": "60 cm", "width": "20 cm", "depth": "5 cm", "angle": "30 deg"},
-        }
-    )
+    part = {"vertices": corners, "mass": {"plate_density": "1 kg/m^2"}}
+    tables = {
+        "part": part,
+        "throw": {"kappa": "90 cm"},
+        "arm": {"surface_height": "-1 cm", "length": "100 cm"},
+    }
+    scene = with_cavity(tables=tables | {"goal": {"reaches": {"x": "60 cm", "side": 0}}})
     with pytest.raises(AnswerError, match="up to 7"):
         proved_feeding(arm_end_of(scene))
 
@@ -225,38 +238,6 @@ def test_a_certificate_of_a_scene_with_cavity_and_feedback_is_rechecked(tmp_path
     scene = with_cavity(rate="2 Hz", tables={"feedback": throws})
     file = ls.certify(scene, ["goal"]).save(tmp_path / "fed.proof.zip")
     assert ls.recheck(file).verdict == "proved"
-
-
-def certified(scene, tmp_path, noise=None):
-    """Prove it, write it without a look, and recheck it."""
-    end = arm_end_of(scene)
-    proof = proved_feeding(end, noise)
-    file = write_proof(tmp_path / "fed.proof.zip", proof, end, recheck=False)
-    return proof, ls.recheck(file)
-
-
-def test_the_certificate_at_20_in(tmp_path):
-    proof, report = certified(with_cavity(), tmp_path)
-    assert (report.verdict, verdict_of(proof)) == ("proved", "proved")
-    assert report.fed == {"safety": 1.0, "progress": 1.0}
-    assert "the first rest at x >= 20 in, if there is one, is on side 2" in report.statement[0]
-    assert "within 786 throws" in report.statement[0]
-
-
-def test_the_certificate_at_20_5_in(tmp_path):
-    proof, report = certified(with_cavity(position="20.5 in"), tmp_path)
-    assert (report.verdict, verdict_of(proof)) == ("proved", "proved")
-    assert report.fed == {"safety": 1.0, "almost": 1.0}
-    assert "but for starts of total length zero" in report.statement[0]
-    assert f"a periodic orbit, of {len(proof.fed.never_fed) - 1} throws" in report.statement[0]
-
-
-def test_the_certificate_where_two_sides_can_be_fed(tmp_path):
-    proof, report = certified(with_cavity("paper-initial"), tmp_path)
-    assert (report.verdict, verdict_of(proof)) == ("refuted", "refuted")
-    assert report.fed["safety"] == pytest.approx(proof.safe.share, abs=2e-6)
-    assert report.fed["progress"] == 1.0
-    assert "safety is refuted" in report.statement[0]
 
 
 @pytest.mark.parametrize(
@@ -297,14 +278,6 @@ def test_landings_beyond_the_length_of_the_arm_are_on_a_side(tmp_path):
     assert any(lo < 19.95 < hi for lo, hi in proof.safe.possible[1][1])
 
 
-@pytest.mark.sweep
-def test_a_scene_whose_landings_scatter(tmp_path):
-    tables = {"world": {"scatter": {"speed": "0.3 %"}}, "effects": {"spread": "bounded"}}
-    proof, report = certified(with_cavity(tables=tables), tmp_path)
-    assert (report.verdict, verdict_of(proof)) == ("proved", "proved")
-    assert report.parameters["noise (at every throw)"] == "throw.speed within 0.3 %"
-
-
 def test_what_lands_before_the_first_cells_goes_on_from_there():
     """Where a part near the joint may fall short of the first cell it can be fed as from there, as throws show."""
     end = arm_end_of(with_cavity("paper-initial"))
@@ -333,18 +306,11 @@ def test_a_proof_with_effects_has_no_certificate(tmp_path):
         write_proof(tmp_path / "fed.proof.zip", proved_feeding(end), end)
 
 
-@pytest.mark.parametrize(
-    ("took", "seconds", "pieces"),
-    # a run of 64 cells that takes so long says 32 times this for the first 2048 in 256 pieces
-    [
-        (0.5, 20.0, 256),
-        (2.5, 20.0, 64),
-        (20.0, 20.0, 4),
-        (20.0, 40.0, 16),
-        (1e4, 20.0, 4),
-        (1e4, math.inf, 256),
-    ],
-)
+# a run of 64 cells that takes so long says 32 times this for the first 2048 in 256 pieces
+CUT = [(0.5, 20.0, 256), (2.5, 20.0, 64), (20.0, 20.0, 4), (20.0, 40.0, 16), (1e4, 20.0, 4)]
+
+
+@pytest.mark.parametrize(("took", "seconds", "pieces"), [*CUT, (1e4, math.inf, 256)])
 def test_noise_is_cut_as_finely_as_time_allows(monkeypatch, took, seconds, pieces):
     clock = [0.0]
 
@@ -437,16 +403,6 @@ def fed(tmp_path_factory):
     return end, proof, write_proof(file, proof, end)
 
 
-def forged(path, target, change):
-    with zipfile.ZipFile(path) as file:
-        header, arrays = json.loads(file.read("header.json")), file.read("arrays.npz")
-    change(header["claims"][0]["section"])
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as file:
-        file.writestr("header.json", json.dumps(header))
-        file.writestr("arrays.npz", io.BytesIO(arrays).getvalue())
-    return ls.recheck(target)
-
-
 def test_safety_and_progress_are_of_the_starts_laid_down(fed):
     end, (safe, progress, _), file = fed
     assert (safe.verdict, safe.share) == ("proved", 1.0)
@@ -474,7 +430,7 @@ def test_an_orbit_elsewhere_refutes_nothing():
 )
 def test_forged_ranges_are_denied(fed, tmp_path, ranges):
     said = json.loads(json.dumps(ranges), parse_float=lambda x: float(x).hex())
-    report = forged(fed[2], tmp_path / "f.zip", lambda section: section.update(laid=said))
+    report = ls.recheck(with_section(fed[2], tmp_path / "f.zip", lambda s: s.update(laid=said)))
     assert report.verdict in ("failed", "bad file"), report
 
 
@@ -490,11 +446,9 @@ def test_removed_ranges_and_starts_elsewhere_are_denied(tmp_path):
     assert proof.safe.verdict == "proved"
     file = write_proof(tmp_path / "a.proof.zip", proof, end)
     assert ls.recheck(file).claims[0][1] in ("proved", "proved-on-cells", "refuted")
-    assert forged(file, tmp_path / "f.zip", lambda section: section.pop("laid")).verdict == "failed"
     elsewhere = {"1": [[(12.0).hex(), (19.0).hex()]]}
-    assert (
-        forged(file, tmp_path / "f.zip", lambda section: section.update(laid=elsewhere)).verdict == "failed"
-    )
+    for change in (lambda section: section.pop("laid"), lambda section: section.update(laid=elsewhere)):
+        assert ls.recheck(with_section(file, tmp_path / "f.zip", change)).verdict == "failed"
 
 
 def test_random_starts_lie_where_parts_are_laid_down():

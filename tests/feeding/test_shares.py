@@ -124,9 +124,8 @@ def test_random_feeders_are_within_the_stated_error(seed):
 @pytest.mark.parametrize("height", ["0.25 in", "0.5 in"])
 def test_parts_that_creep_to_the_joint_never_leave_the_arm(height):
     """Above the joint a start near a keeps 1 - 2 h/kappa of its distance from a; cells counted it as one that left."""
-    end = arm_end_of(
-        with_cavity(tables={"arm": {**ls.load("paper-designed").as_dict()["arm"], "surface_height": height}})
-    )
+    arm = ls.load("paper-designed").as_dict()["arm"] | {"surface_height": height}
+    end = arm_end_of(with_cavity(tables={"arm": arm}))
     for noise in (Scattering(), Scattering(speed=Gaussian(0.005))):
         counts = run_trials(end, noise, 300).counts
         assert counts["never"] > 0

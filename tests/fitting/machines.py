@@ -44,15 +44,27 @@ def thrown(plain: Plain, x, side, kappa):
 
 
 def film(
-    draw, truth, n=50, *, error=0.02, speed=0.002, landing=0.01, flipped=0.0, known=True, corner=False
+    draw,
+    truth,
+    n=50,
+    *,
+    error=0.02,
+    speed=0.002,
+    landing=0.01,
+    flipped=0.0,
+    known=True,
+    corner=False,
+    at=None,
 ) -> Throws:
-    """Film single throws from places all over the arm; a share of the sides after is recorded wrong.
+    """Film single throws from places all over the arm, or from one; a share of the sides after is recorded wrong.
 
     With `corner` the film shows where the left corner lies, by the true part, not the centre of mass.
     """
     plain = Plain(described(truth))
     side = draw.integers(0, 3, n)
     x = draw.uniform(plain.a[side] + 2.0, ARM - 1.0)
+    if at is not None:
+        x, side = np.full(n, at[0]), np.full(n, at[1])
     kappa = truth[KAPPA] / (1.0 + speed * draw.standard_normal(n)) ** 2
     after, ends = thrown(plain, x, side, kappa)
     after = after + landing * draw.standard_normal(n)
@@ -87,10 +99,8 @@ def run_film(draw, truth, n=50, *, error=0.02, landing=0.01, twice=False) -> Thr
         read_before[1:] = read_after[:-1]
     follows = np.ones(n, dtype=bool)
     follows[0] = False
-    sides = [np.array([side for _, side in each]) for each in (starts, rows)]
-    return Throws(
-        read_before, sides[0], read_after, sides[1], np.full(n, np.nan), follows, np.arange(2, n + 2)
-    )
+    on, to = (np.array([side for _, side in each]) for each in (starts, rows))
+    return Throws(read_before, on, read_after, to, np.full(n, np.nan), follows, np.arange(2, n + 2))
 
 
 def farthest(draw, truth, *, speed=0.0, landing=0.0) -> np.ndarray:

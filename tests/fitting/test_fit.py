@@ -1,5 +1,7 @@
 """The fit against machines of known truth, which other formulas throw (`tests.fitting.machines`)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -17,6 +19,17 @@ SPEED, LANDING = 0.002, 0.01
 def aimed_at():
     """What the builder of all these machines knows."""
     return ls.load(scene("designed"))
+
+
+def filmed(seed, n=50, **how):
+    """A machine and its film."""
+    draw = np.random.default_rng(seed)
+    truth = machine(draw)
+    return truth, film(draw, truth, n, **how)
+
+
+def arrays_of(throws):
+    return {name: each for name, each in vars(throws).items() if isinstance(each, np.ndarray)}
 
 
 def repeated(count, seed, **how):
@@ -45,15 +58,6 @@ def counted(cases):
         for name, inside in held_by(found, truth).items():
             there[name], held[name] = there.get(name, 0) + 1, held.get(name, 0) + inside
     return there, held
-
-
-@pytest.mark.sweep
-def test_intervals_hold_the_truth():
-    there, held = counted(repeated(20, seed=1))
-    for name, count in there.items():
-        # fewer than this many of 95 % intervals would hold once in ten thousand times
-        assert held[name] >= binom.ppf(1e-4, count, 0.95), name
-    assert all(there[name] == 20 for name in (*PLACES, "region"))
 
 
 @pytest.mark.sweep
@@ -86,13 +90,10 @@ def test_sides_recorded_wrong_are_named_and_move_nothing():
 
 
 def test_a_side_before_that_is_recorded_wrong_is_seen_too():
-    draw = np.random.default_rng(4)
-    truth = machine(draw)
-    throws = film(draw, truth)
+    throws = filmed(4)[1]
     bad = throws.side_before.copy()
     bad[7] = (bad[7] + 2) % 3
-    spoiled = type(throws)(**{**vars(throws), "side_before": bad})
-    found = ls.fit(aimed_at(), spoiled)
+    found = ls.fit(aimed_at(), replace(throws, side_before=bad))
     assert found.misread == ((9, "side_before", int(bad[7]), int(throws.side_before[7])),)
 
 
@@ -115,9 +116,8 @@ def test_throws_that_follow_each_other_share_readings():
         truth = machine(draw)
         found = ls.fit(aimed_at(), run_film(draw, truth, 60), error="0.02 in")
         assert found.rows.throws.shared.sum() == 59
-        inside += sum(
-            found[name].lo <= truth[name] <= found[name].hi for name in PLACES if name not in found.held
-        )
+        fitted = [name for name in PLACES if name not in found.held]
+        inside += sum(found[name].lo <= truth[name] <= found[name].hi for name in fitted)
     assert inside >= binom.ppf(1e-4, 8 * len(PLACES), 0.95) - 3
 
 
@@ -130,9 +130,8 @@ def test_the_error_of_measurement_is_found_from_places_read_twice():
 
 
 def test_without_an_error_the_scatter_is_a_bound():
-    draw = np.random.default_rng(8)
-    truth = machine(draw)
-    found = ls.fit(aimed_at(), film(draw, truth, known=False))
+    truth, throws = filmed(8, known=False)
+    found = ls.fit(aimed_at(), throws)
     assert found.error is None
     assert found.landing.at_most
     assert found.landing.hi > LANDING
@@ -140,14 +139,10 @@ def test_without_an_error_the_scatter_is_a_bound():
 
 
 def test_what_the_throws_cannot_tell_is_kept_and_named():
-    draw = np.random.default_rng(9)
-    truth = machine(draw)
-    throws = film(draw, truth, 400)
+    throws = filmed(9, 400)[1]
     alike = (throws.side_before == 2) & (throws.side_after == 2) & (np.abs(throws.x_before - 10.0) < 2.0)
-    few = type(throws)(
-        **{name: each[alike] if isinstance(each, np.ndarray) else each for name, each in vars(throws).items()}
-    )
-    found = ls.fit(aimed_at(), few)
+    few = {name: each[alike] for name, each in arrays_of(throws).items()}
+    found = ls.fit(aimed_at(), replace(throws, **few))
     assert found.held
     for name in found.held:
         assert found.scene.value(name) == pytest.approx(aimed_at().value(name))
@@ -155,10 +150,9 @@ def test_what_the_throws_cannot_tell_is_kept_and_named():
 
 
 def test_the_scene_holds_values_uncertainty_and_scatter():
-    draw = np.random.default_rng(10)
-    truth = machine(draw)
+    truth, throws = filmed(10)
     given = ls.load("paper-designed")
-    found = ls.fit(given, film(draw, truth))
+    found = ls.fit(given, throws)
     again = ls.load(found.scene.as_dict())
     speed = found["throw.speed"]  # gravity is given: it is the speed that is fitted
     assert speed.unit == "rad/s"
@@ -172,17 +166,14 @@ def test_the_scene_holds_values_uncertainty_and_scatter():
 
 
 def test_the_same_film_gives_the_same_fit():
-    draw = np.random.default_rng(11)
-    throws = film(draw, machine(draw))
+    throws = filmed(11)[1]
     one, two = (ls.fit(aimed_at(), throws) for _ in range(2))
     assert [each.value for each in one.quantities] == [each.value for each in two.quantities]
     assert one.misfit == two.misfit
 
 
 def test_from_far_away_the_same_maximum_is_found():
-    draw = np.random.default_rng(12)
-    truth = machine(draw)
-    throws = film(draw, truth)
+    throws = filmed(12)[1]
     near = ls.fit(aimed_at(), throws)
     far = ls.fit(aimed_at().with_values({KAPPA: 28.0, ALONG: 4.0, HEIGHT: -0.35, RADIUS: 1.1}), throws)
     for name in PLACES:
@@ -190,9 +181,8 @@ def test_from_far_away_the_same_maximum_is_found():
 
 
 def test_places_without_any_error_give_the_truth():
-    draw = np.random.default_rng(13)
-    truth = machine(draw)
-    found = ls.fit(aimed_at(), film(draw, truth, error=0.0, speed=0.0, landing=0.0, known=False))
+    truth, throws = filmed(13, error=0.0, speed=0.0, landing=0.0, known=False)
+    found = ls.fit(aimed_at(), throws)
     for name in PLACES:
         assert found[name].value == pytest.approx(truth[name], abs=1e-5)
     assert found[RADIUS].lo <= truth[RADIUS] <= found[RADIUS].hi
@@ -200,47 +190,24 @@ def test_places_without_any_error_give_the_truth():
 
 def test_further_throws_sharpen_as_they_say():
     """Ten more throws from where it says, against ten more from a place next to it that nobody recommends."""
-    draw = np.random.default_rng(14)
-    truth = machine(draw)
-    throws = film(draw, truth)
+    truth, throws = filmed(14)
     found = ls.fit(aimed_at(), throws)
     best = found.further[0]
     assert best.gain > 0
     assert sorted(each.side for each in found.further) == [0, 1, 2]
     name = max((n for n in best.shrinks if n in PLACES), key=lambda n: best.shrinks[n])
     halves = []
-    for x, side in ((best.x, best.side), (4.0, 0)):
-        more = film_from(draw, truth, np.full(10, x), side)
-        both = {
-            key: np.concatenate([each, getattr(more, key)])
-            for key, each in vars(throws).items()
-            if isinstance(each, np.ndarray)
-        }
+    for at in ((best.x, best.side), (4.0, 0)):
+        more = vars(film(np.random.default_rng(15), truth, 10, at=at))
+        both = {key: np.concatenate([each, more[key]]) for key, each in arrays_of(throws).items()}
         halves.append(ls.fit(aimed_at(), type(throws)(**both))[name].half)
     assert halves[0] < halves[1]
     assert found[name].half / halves[0] == pytest.approx(best.shrinks[name], rel=0.35)
 
 
-def film_from(draw, truth, x, side):
-    from limitsets.parameters.fitting import Throws
-    from tests.fitting.machines import thrown
-    from tests.proofs.forge import Plain
-
-    plain, n = Plain(described(truth)), x.size
-    kappa = truth[KAPPA] / (1.0 + SPEED * draw.standard_normal(n)) ** 2
-    after, ends = thrown(plain, x, np.full(n, side), kappa)
-    noise = 0.02 * draw.standard_normal((2, n))
-    landed = after + LANDING * draw.standard_normal(n)
-    rows = np.arange(100, 100 + n)
-    return Throws(
-        x + noise[0], np.full(n, side), landed + noise[1], ends, np.full(n, 0.02), np.zeros(n, bool), rows
-    )
-
-
 def test_what_goes_with_a_held_quantity_has_no_interval():
-    draw = np.random.default_rng(5)
-    truth = machine(draw)
-    found = ls.fit(aimed_at(), film(draw, truth, 10, error=0.5))
+    throws = filmed(5, 10, error=0.5)[1]
+    found = ls.fit(aimed_at(), throws)
     assert found.held[KAPPA].startswith("the landings do not tell it apart from arm.surface_height")
     height = found[HEIGHT]
     assert (height.lo, height.hi) == (-np.inf, np.inf)
@@ -253,26 +220,18 @@ def test_what_goes_with_a_held_quantity_has_no_interval():
 
 @pytest.mark.parametrize("seed", [3, 4, pytest.param(6, marks=pytest.mark.sweep)])
 def test_intervals_end_where_no_part_exists(seed):
-    draw = np.random.default_rng(seed)
-    truth = machine(draw)
-    found = ls.fit(aimed_at(), film(draw, truth, 10, error=0.5, corner=True))
+    found = ls.fit(aimed_at(), filmed(seed, 10, error=0.5, corner=True)[1])
     base, left, right = 6.75, 5.75, 3.6
     foot = (base**2 + left**2 - right**2) / (2.0 * base)
     top = np.sqrt(left**2 - foot**2)
-    for name, least, most in (
-        (ALONG, 0.0, base),
-        (ABOVE, 0.0, top),
-        (RADIUS, 0.0, base / 2.0),
-        (KAPPA, 0.0, np.inf),
-    ):
+    for name, most in ((ALONG, base), (ABOVE, top), (RADIUS, base / 2.0), (KAPPA, np.inf)):
         if name in found.held or (np.isinf(found[name].lo) and np.isinf(found[name].hi)):
             continue
-        assert least - 1e-9 <= found[name].lo <= found[name].value <= found[name].hi <= most + 1e-9, name
+        assert -1e-9 <= found[name].lo <= found[name].value <= found[name].hi <= most + 1e-9, name
 
 
 def test_an_end_that_the_throws_do_not_set_is_that_of_the_part():
-    draw = np.random.default_rng(80)
-    found = ls.fit(aimed_at(), film(draw, machine(draw), corner=True))
+    found = ls.fit(aimed_at(), filmed(80, corner=True)[1])
     radius = found[RADIUS]
     assert radius.lo == pytest.approx(0.0, abs=1e-12)
     assert RADIUS not in found.scene.tolerance
@@ -288,10 +247,9 @@ def test_the_largest_radius_of_gyration_is_that_of_all_mass_in_the_vertices():
 
 
 def test_the_scene_is_written_in_the_units_of_the_file():
-    draw = np.random.default_rng(15)
-    truth = machine(draw)
+    throws = filmed(15, speed=0.0)[1]
     given = ls.load("paper-designed").with_values({ALONG: "107.33 mm", "throw.speed": "26.3 rpm"})
-    found = ls.fit(given, film(draw, truth, speed=0.0))
+    found = ls.fit(given, throws)
     text = found.scene.as_dict()
     assert text["part"]["mass"]["center"]["along"].endswith(" mm")
     assert text["throw"]["speed"].endswith(" rpm")
@@ -301,8 +259,7 @@ def test_the_scene_is_written_in_the_units_of_the_file():
 
 
 def test_a_scatter_that_may_be_above_0_is_not_written_as_0():
-    draw = np.random.default_rng(5)
-    found = ls.fit(aimed_at(), film(draw, machine(draw), 12, error=0.3, speed=0.0, landing=0.0))
+    found = ls.fit(aimed_at(), filmed(5, 12, error=0.3, speed=0.0, landing=0.0)[1])
     assert 0.0 in (found.speed.value, found.landing.value)
     written = found.scene.world.scatter
     for size, scatter in ((written.speed.value, found.speed), (written.landing.value, found.landing)):

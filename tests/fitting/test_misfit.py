@@ -32,9 +32,8 @@ SIGMA = ERROR * np.sqrt(2.0)
 def with_effect(**effects):
     """paper-initial as it is, and with effects on."""
     bare = ls.load("paper-initial").as_dict()
-    return ls.load(bare), ls.load(
-        bare | {"effects": effects, "world": {"friction": 0.35, "restitution": 0.3}}
-    )
+    world = {"friction": 0.35, "restitution": 0.3}
+    return ls.load(bare), ls.load(bare | {"effects": effects, "world": world})
 
 
 @cache
@@ -80,18 +79,6 @@ def rejected(count, seed, **how):
 
 @pytest.mark.sweep
 @pytest.mark.parametrize("effect", ["roll", "slip"])
-def test_a_machine_with_an_effect_is_told_apart(effect):
-    # of a power of 90 % fewer than this come once in a thousand times
-    assert told_apart(effect, 20, seed=21) >= binom.ppf(1e-3, 20, 0.9)
-
-
-@pytest.mark.sweep
-def test_a_machine_without_one_is_left_alone():
-    assert rejected(20, seed=23) <= binom.ppf(0.9999, 20, 0.05)
-
-
-@pytest.mark.sweep
-@pytest.mark.parametrize("effect", ["roll", "slip"])
 def test_the_power_is_90_percent(effect):
     assert told_apart(effect, 400, seed=22) >= 360
 
@@ -122,7 +109,7 @@ def test_a_number_written_down_wrong_is_named_alone():
     throws = film(draw, machine(draw))
     after = throws.x_after.copy()
     after[6] = 26.5 - after[6] / 2.0
-    found = ls.fit(ls.load(scene("designed")), type(throws)(**{**vars(throws), "x_after": after})).misfit
+    found = ls.fit(ls.load(scene("designed")), replace(throws, x_after=after)).misfit
     assert found.lacking
     assert found.strange == (8,)
 
@@ -198,15 +185,12 @@ def verdict(throws):
 @pytest.mark.parametrize("corner", [True, pytest.param(False, marks=pytest.mark.sweep)])
 def test_another_origin_and_scale_are_told_with_their_size(corner):
     throws = seen(72, corner)
-    farther, larger = (
-        verdict(moved_explaining(throws, change)) for change in (lambda x: x + 1.5, lambda x: 0.92 * x)
-    )
-    assert "too large" in farther
-    assert "multiply each place by" in larger
-    assert float(farther.split("seem to be ")[1].split(" in too large")[0]) == pytest.approx(1.5, abs=0.3)
-    assert float(larger.split("multiply each place by ")[1].split(";")[0]) == pytest.approx(
-        1.0 / 0.92, rel=0.02
-    )
+    changes = (lambda x: x + 1.5, lambda x: 0.92 * x)
+    farther, larger = (verdict(moved_explaining(throws, change)) for change in changes)
+    by = float(farther.split("seem to be ")[1].split(" in too large")[0])
+    assert by == pytest.approx(1.5, abs=0.3)
+    factor = float(larger.split("multiply each place by ")[1].split(";")[0])
+    assert factor == pytest.approx(1.0 / 0.92, rel=0.02)
 
 
 def test_a_film_that_fits_is_left_alone():
@@ -217,10 +201,8 @@ def test_a_film_that_fits_is_left_alone():
 def test_no_mistake_is_invented_for_a_part_that_rolls():
     draw = np.random.default_rng(74)
     for _ in range(3):
-        found = ls.fit(*spoiled_film(draw, "roll"))
-        assert any(
-            "something that it leaves out, like rolling or slipping" in line for line in lines_of(found)
-        )
+        told = "\n".join(lines_of(ls.fit(*spoiled_film(draw, "roll"))))
+        assert "something that it leaves out, like rolling or slipping" in told
 
 
 @pytest.mark.sweep
@@ -248,13 +230,11 @@ def test_far_off_stands_in_the_text_as_in_the_figure():
     found = ls.fit(aimed_at(), replace(throws, x_after=after))
     assert found.misfit.strange
     told = [line for line in lines_of(found) if line.startswith("far off: the landings of row")]
-    assert [line.partition("row")[2].lstrip("s ") for line in told] == [
-        ", ".join(map(str, found.misfit.strange))
-    ]
-    crosses = [
-        line for axes in ls.plot.fit_residuals(found).axes for line in axes.lines if line.get_marker() == "x"
-    ]
-    assert sum(line.get_xdata().size for line in crosses) == len(found.misfit.strange)
+    rows = ", ".join(map(str, found.misfit.strange))
+    assert [line.partition("row")[2].lstrip("s ") for line in told] == [rows]
+    lines = [line for axes in ls.plot.fit_residuals(found).axes for line in axes.lines]
+    crosses = sum(line.get_xdata().size for line in lines if line.get_marker() == "x")
+    assert crosses == len(found.misfit.strange)
 
 
 # ----------------------------------------------------------------

@@ -222,12 +222,8 @@ def test_x_from_the_nominal_part_misses_where_corners_do_not():
     seen = film(draw, truth, corner=True)
     scene = aimed_at()
     a = scene.sides.a
-    nominal = replace(
-        seen,
-        x_before=seen.x_before + a[seen.side_before],
-        x_after=seen.x_after + a[seen.side_after],
-        corner=False,
-    )
+    before, after = seen.x_before + a[seen.side_before], seen.x_after + a[seen.side_after]
+    nominal = replace(seen, x_before=before, x_after=after, corner=False)
     by_corner, by_x = (ls.fit(scene, each)[ALONG] for each in (seen, nominal))
     assert by_corner.lo <= truth[ALONG] <= by_corner.hi
     assert not by_x.lo <= truth[ALONG] <= by_x.hi

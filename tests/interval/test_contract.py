@@ -28,7 +28,6 @@ PAIRS = list(itertools.product(ENDS, ENDS))
 INTERVALS = [(a, b) for a, b in PAIRS if a <= b and not (math.isinf(a) and a == b)]
 NO_INTERVALS = [pair for pair in PAIRS if pair not in INTERVALS]
 BROKEN = [pair for pair in PAIRS if math.isnan(pair[0]) or math.isnan(pair[1])]
-EMPTY = (NAN, NAN)
 BEYOND = Fraction(LARGEST) ** 4
 
 UNARY = ["neg", "absolute", "sqr", "sqrt", "log", "exp", "sin", "cos"]
@@ -87,8 +86,7 @@ def far(x):
 
 
 def test_one_interval_against_rationals_and_arb():
-    flint.ctx.prec = 300
-    try:
+    with flint.ctx.workprec(300):
         for a in INTERVALS:
             values = numbers(a)
             assert interval.neg(a) == (-a[1], -a[0])
@@ -112,18 +110,14 @@ def test_one_interval_against_rationals_and_arb():
                     if name == "exp" and abs(x) > 10**4:  # beyond all doubles, or below the smallest
                         assert got[1] == INF if x > 0 else got[0] == 0.0
                     elif abs(x) < 10**400:
-                        flint.ctx.prec = 1500
-                        ball = getattr(far(x), name)()
-                        flint.ctx.prec = 300
+                        with flint.ctx.workprec(1500):
+                            ball = getattr(far(x), name)()
                         assert not ball < flint.arb(got[0]), (name, a, got)
                         assert math.isinf(got[1]) or not ball > flint.arb(got[1]), (name, a, got)
-    finally:
-        flint.ctx.prec = 53
 
 
 def test_angles_of_every_box_against_arb():
-    flint.ctx.prec = 300
-    try:
+    with flint.ctx.workprec(300):
         for y, x in itertools.product(INTERVALS, INTERVALS):
             got = interval.atan2(y, x)
             assert is_interval(got)
@@ -132,8 +126,6 @@ def test_angles_of_every_box_against_arb():
                     ball = flint.arb.atan2(far(v), far(u))
                     assert not ball < flint.arb(got[0]), (y, x, got)
                     assert not ball > flint.arb(got[1]), (y, x, got)
-    finally:
-        flint.ctx.prec = 53
 
 
 @pytest.mark.parametrize("name", UNARY)
@@ -169,12 +161,6 @@ def test_nothing_is_lost():
     got = interval.mul(interval.sqr(interval.div((1.0, 1.0), (-1.0, 1.0))), (0.0, 8.0))
     assert got[1] == INF
     assert -1e-300 < got[0] <= 0.0
-    for other in ((1.0, 2.0), (-3.0, -1.0)):
-        assert interval.hull(EMPTY, other) == interval.hull(other, EMPTY) == other
-        assert is_empty(interval.minimum(EMPTY, other))
-        assert is_empty(interval.minimum(other, EMPTY))
-    assert is_empty(interval.sin(EMPTY))
-    assert is_empty(interval.atan2((0.0, 0.0), EMPTY))
     quarter = interval.atan2((0.0, INF), (1.0, INF))
     assert -1e-12 < quarter[0] <= 0.0
     assert math.pi / 2 <= quarter[1] < 1.5707963267950
@@ -224,16 +210,6 @@ def test_what_is_not_defined_everywhere_is_marked(name, marked, unmarked):
     assert not any(_marks(name, *a) for a in unmarked)
 
 
-def test_defined_parts_are_enclosed_tightly():
-    assert interval.sqrt((-1.0, 4.0))[0] == 0.0
-    assert 2.0 <= interval.sqrt((-1.0, 4.0))[1] < 2.0 + 1e-14
-    lo, hi = interval.log((-3.0, 1.0))
-    assert lo == -INF
-    assert 0.0 <= hi < 1e-300
-    got = interval.log((math.e, math.e))
-    assert got[1] - got[0] < 1e-14
-
-
 def test_the_rest_of_the_series_of_the_logarithm():
     """The sum of q^j / (2 TERMS + 1 + 2 j) is at most 1 / ((2 TERMS + 1) (1 - q)); 0.7 <= m <= 1.4."""
     most = max(Fraction(7, 10) - 1, Fraction(14, 10) - 1, key=lambda s: abs(s / (s + 2)))
@@ -253,11 +229,8 @@ def test_the_rest_of_the_series_of_the_logarithm():
     )
 )
 def test_the_logarithm_of_one_number_against_arb(x):
-    flint.ctx.prec = 300
-    try:
+    with flint.ctx.workprec(300):
         got, ball = interval.log((x, x)), flint.arb(x).log()
-    finally:
-        flint.ctx.prec = 53
     assert flint.arb(got[0]) <= ball
     assert ball <= flint.arb(got[1])
     assert got[1] - got[0] <= 3e-14 * abs(got[0]) + 1e-320

@@ -62,11 +62,10 @@ BINARY = {
     "div": lambda a, b: a / b,
     "minimum": min,
     "maximum": max,
-    "hull": None,
 }
 
 
-@pytest.mark.parametrize("name", ["add", "sub", "mul", "div", "minimum", "maximum"])
+@pytest.mark.parametrize("name", BINARY)
 @given(a=intervals(), b=intervals())
 def test_binary_operations_against_rationals(name, a, b):
     if name == "div":
@@ -152,24 +151,11 @@ def test_angles_against_arb(y, x, u, v):
         assert narrow[1] - narrow[0] < 1e-12
 
 
-def test_subnormal_operands():
-    tiny = (SMALL, 2 * SMALL)
-    assert within(interval.add(tiny, tiny), Fraction(2 * SMALL), Fraction(4 * SMALL))
-    product = interval.mul(tiny, (0.5, 0.5))
-    assert within(product, Fraction(SMALL) / 2, Fraction(SMALL))
-    assert interval.sqrt(tiny)[0] <= math.sqrt(SMALL) <= interval.sqrt(tiny)[1]
-
-
-def test_nan_rejects():
-    bad = (math.nan, math.nan)
-    for got in (interval.add(bad, (1.0, 2.0)), interval.mul(bad, (1.0, 2.0)), interval.sqr(bad)):
-        assert not interval.contains(got, 1.0)
-
-
 @proof_kernel(entry=True)
 def _loop(a, b, lo, hi):
     for k in range(a.size):
         lo[k], hi[k] = interval.mul((a[k], a[k]), interval.add((b[k], b[k]), (1.0, 1.0)))
+        lo[k], hi[k] = interval.exp((lo[k], hi[k]))
 
 
 def test_the_machine_code_of_a_proof_kernel_has_no_fused_operation():
@@ -368,18 +354,14 @@ def contains(got, x):
 
 @given(x=st.one_of(st.floats(-700.0, 700.0), st.floats(-1.0, 1.0), st.floats(-1e-8, 1e-8)))
 def test_exponential_against_arb(x):
-    flint.ctx.prec = 200
-    try:
+    with flint.ctx.workprec(200):
         got = interval.exp((x, x))
         assert contains(got, x)
         assert got[1] - got[0] < 1e-14 * got[1]
-    finally:
-        flint.ctx.prec = 53
 
 
 def test_near_the_changes_of_n():
-    flint.ctx.prec = 200
-    try:
+    with flint.ctx.workprec(200):
         worst = 0.0
         for n in [*range(-6, 7), 500, 1009, -500, -1010]:
             middle = (n + 0.5) * math.log(2.0)
@@ -389,8 +371,6 @@ def test_near_the_changes_of_n():
                     assert contains(interval.exp((x, x)), x)
                     worst = max(worst, float(abs(arb(e.exponential(x)) / arb(x).exp() - 1)))
         assert worst < e.RELATIVE / 2
-    finally:
-        flint.ctx.prec = 53
 
 
 @given(a=st.floats(-800.0, 800.0), b=st.floats(-800.0, 800.0), share=st.floats(0.0, 1.0))
@@ -408,26 +388,6 @@ def test_beyond_the_range(x, want):
     lo, hi = interval.exp((x, x))
     assert (lo == want[0] and hi < want[1]) if x < 0 else (lo > 1e303 and hi == want[1])
     assert interval.exp((-1e300, 1e300)) == (0.0, math.inf)
-
-
-def test_nan_rejects_of_exponential():
-    assert not interval.contains(interval.exp((math.nan, math.nan)), 1.0)
-    lo, hi = interval.exp((0.0, math.nan))
-    assert not lo <= hi
-
-
-@proof_kernel(entry=True)
-def _loop_exponential(x, lo, hi):
-    for k in range(x.size):
-        lo[k], hi[k] = interval.exp((x[k], x[k]))
-
-
-def test_no_fused_operation():
-    x = np.linspace(-1.0, 1.0, 64)
-    _loop_exponential(x, np.empty(64), np.empty(64))
-    text = "".join(_loop_exponential.inspect_asm().values())
-    assert "vfm" not in text
-    assert "vfnm" not in text
 
 
 # ----------------------------------------------------------------
@@ -504,9 +464,7 @@ def rounded_horner(coefficients):
     size, error = abs(Fraction(coefficients[-1])), Fraction(0)
     for c in reversed(coefficients[:-1]):
         product = size * Q * (1 + U_SINE)
-        error = (
-            error * Q * (1 + U_SINE) + U_SINE * size * Q + size * 2 * U_SINE * Q
-        )  # also q itself is known to 2 u
+        error = error * Q * (1 + U_SINE) + 3 * U_SINE * size * Q  # q itself is known to 2 u
         size = product + abs(Fraction(c))
         error = error * (1 + U_SINE) + U_SINE * size
     return size, error
@@ -516,29 +474,23 @@ def coefficient_error(coefficients, exact):
     return sum(abs(Fraction(c) - x) * Q**k for k, (c, x) in enumerate(zip(coefficients, exact, strict=True)))
 
 
-def exact_sine():
-    return [Fraction((-1) ** (k + 1), math.factorial(2 * k + 3)) for k in range(len(e_of_sine_bound.SINE))]
-
-
-def exact_cosine():
-    return [Fraction((-1) ** (k + 1), math.factorial(2 * k + 2)) for k in range(len(e_of_sine_bound.COSINE))]
+def series_error(coefficients, first):
+    """Size of a series in q whose first term is 1 / first!, and the error of q h(q); q h rounds, q is known to 2 u."""
+    size, rounding = rounded_horner(coefficients)
+    exact = [Fraction((-1) ** (k + 1), math.factorial(2 * k + first)) for k in range(len(coefficients))]
+    remainder = Q ** len(coefficients) / math.factorial(2 * len(coefficients) + first)
+    return size, Q * (rounding + coefficient_error(coefficients, exact) + remainder) + 3 * U_SINE * Q * size
 
 
 def sine_error_relative_to_r():
     """|computed - sin r| / |r| for the polynomial r + r (q h(q))."""
-    size, rounding = rounded_horner(e_of_sine_bound.SINE)
-    h = rounding + coefficient_error(e_of_sine_bound.SINE, exact_sine())
-    remainder = Q ** len(e_of_sine_bound.SINE) / math.factorial(2 * len(e_of_sine_bound.SINE) + 3)
-    inner = Q * (h + remainder) + U_SINE * Q * size + 2 * U_SINE * Q * size  # q h rounds; q is known to 2 u
+    size, inner = series_error(e_of_sine_bound.SINE, 3)
     inner = inner + U_SINE * Q * size  # r (q h) rounds
     return inner + U_SINE * (1 + Q * size + inner)  # and the last sum
 
 
 def cosine_error():
-    size, rounding = rounded_horner(e_of_sine_bound.COSINE)
-    h = rounding + coefficient_error(e_of_sine_bound.COSINE, exact_cosine())
-    remainder = Q ** len(e_of_sine_bound.COSINE) / math.factorial(2 * len(e_of_sine_bound.COSINE) + 2)
-    inner = Q * (h + remainder) + 3 * U_SINE * Q * size
+    _, inner = series_error(e_of_sine_bound.COSINE, 2)
     return inner + U_SINE * (1 + inner)
 
 
@@ -558,8 +510,7 @@ def test_the_bound_for_reduced_arguments():
 
 def test_the_bound_is_met_where_it_is_worst():
     """Near multiples of pi/2 and at the ends of the range, against Arb."""
-    flint.ctx.prec = 200
-    try:
+    with flint.ctx.workprec(200):
         worst = 0.0
         for n in [1, 2, 3, 4, 5, 1000, 83442, -7, -83441]:
             for step in range(-30, 31):
@@ -568,5 +519,3 @@ def test_the_bound_is_met_where_it_is_worst():
                     s, c, _ = e_of_sine_bound.sin_cos(x)
                     worst = max(worst, float(abs(flint.arb(x).sin() - s)), float(abs(flint.arb(x).cos() - c)))
         assert worst < e_of_sine_bound.NEAR / 2
-    finally:
-        flint.ctx.prec = 53

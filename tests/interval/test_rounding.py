@@ -7,6 +7,7 @@ import math
 import platform
 import subprocess
 import sys
+from collections import Counter
 from fractions import Fraction
 from pathlib import Path
 
@@ -77,46 +78,16 @@ def test_enclosures_hold_and_the_guard_notices(name):
 
 
 # ----------------------------------------------------------------
-# IEEE 1788 test vectors, where a copy of them lies beside the checkout; our own vectors run everywhere.
+# IEEE 1788 test vectors, where a copy of them lies beside the checkout.
 # The vectors are third-party data (Interval Test Framework, github.com/oheim/ITF1788) and are not part of the
 # project. Those with bare operands apply to us, infinite and empty ones too; what is asked is containment, with an
 # excess of a few units in the last place where the expected ends are finite.
 
 
 FILE = Path(__file__).resolve().parents[3] / "shared" / "data" / "itf1788.json"
-OURS = {
-    "add": interval.add,
-    "sub": interval.sub,
-    "mul": interval.mul,
-    "div": interval.div,
-    "neg": interval.neg,
-    "abs": interval.absolute,
-    "sqr": interval.sqr,
-    "sqrt": interval.sqrt,
-    "sin": interval.sin,
-    "cos": interval.cos,
-    "atan2": interval.atan2,
-    "min": interval.minimum,
-    "max": interval.maximum,
-}
-# Vectors worked out on paper, in rationals: operation, operands, exact result.
-OWN = [
-    ("add", [(1.0, 2.0), (-3.0, 5.0)], (-2.0, 7.0)),
-    ("sub", [(1.0, 2.0), (-3.0, 5.0)], (-4.0, 5.0)),
-    ("mul", [(-2.0, 3.0), (-5.0, 7.0)], (-15.0, 21.0)),
-    ("mul", [(2.0**-600, 2.0**-600), (2.0**-474, 2.0**-474)], (2.0**-1074, 2.0**-1074)),
-    ("div", [(1.0, 2.0), (-4.0, -2.0)], (-1.0, -0.25)),
-    ("sqr", [(-2.0, 1.0)], (0.0, 4.0)),
-    ("sqrt", [(2.25, 6.25)], (1.5, 2.5)),
-    ("abs", [(-2.0, 1.0)], (0.0, 2.0)),
-    ("min", [(0.0, 3.0), (1.0, 2.0)], (0.0, 2.0)),
-    ("max", [(0.0, 3.0), (1.0, 2.0)], (1.0, 3.0)),
-    ("sin", [(0.0, 0.0)], (0.0, 0.0)),
-    ("cos", [(0.0, 0.0)], (1.0, 1.0)),
-    ("sin", [(1.0, 2.0)], (math.sin(1.0), 1.0)),
-    ("cos", [(-1.0, 1.0)], (math.cos(1.0), 1.0)),
-    ("atan2", [(1.0, 1.0), (-1.0, 1.0)], (math.pi / 4, 3 * math.pi / 4)),
-]
+SAME = ("add", "sub", "mul", "div", "neg", "sqr", "sqrt", "sin", "cos", "atan2")
+OURS = {name: getattr(interval, name) for name in SAME}
+OURS |= {"abs": interval.absolute, "min": interval.minimum, "max": interval.maximum}
 
 
 def number(text):
@@ -125,9 +96,9 @@ def number(text):
 
 def ends_of(operand):
     """Interval of doubles; the empty set is (nan, nan)."""
-    return (
-        (math.nan, math.nan) if operand["kind"] == "empty" else (number(operand["lo"]), number(operand["hi"]))
-    )
+    if operand["kind"] == "empty":
+        return math.nan, math.nan
+    return number(operand["lo"]), number(operand["hi"])
 
 
 def applicable():
@@ -143,14 +114,6 @@ def applicable():
             ends = [ends_of(a) for a in operands]
             found.append((vector["op"], ends, vector["expect"], f"{vector['src']}:{vector['line']}"))
     return found
-
-
-@pytest.mark.parametrize(("name", "operands", "expect"), OWN)
-def test_vectors_worked_out_on_paper(name, operands, expect):
-    got = OURS[name](*operands)
-    assert got[0] <= expect[0] <= expect[1] <= got[1]
-    for mine, exact in zip(got, expect, strict=True):
-        assert abs(mine - exact) <= 1e-12 * abs(exact) + 2.0**-1070
 
 
 if FILE.is_file():
@@ -176,11 +139,6 @@ if FILE.is_file():
                 assert abs(Fraction(mine) - Fraction(exact)) <= 8 * Fraction(math.ulp(exact))
 
     def test_many_vectors_apply():
-        counts = {}
-        for name, *_ in applicable():
-            counts[name] = counts.get(name, 0) + 1
-        assert counts["sin"] >= 40
-        assert counts["cos"] >= 40
-        assert counts["atan2"] >= 100
-        assert counts["div"] >= 300
-        assert counts["mul"] >= 100
+        counts = Counter(name for name, *_ in applicable())
+        for name, least in (("sin", 40), ("cos", 40), ("atan2", 100), ("div", 300), ("mul", 100)):
+            assert counts[name] >= least

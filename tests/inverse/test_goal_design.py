@@ -59,15 +59,13 @@ def test_a_scene_whose_goal_is_proved_has_a_design():
 
 def test_the_scene_itself_is_told_of():
     found = design_for_goal("paper-designed", evaluations=5)
-    assert found.itself.startswith(
-        f"the scene as it is meets the goal, with {found.room_before:.3g} in to spare"
-    )
+    meets = f"the scene as it is meets the goal, with {found.room_before:.3g} in to spare"
+    assert found.itself.startswith(meets)
     own = ls.load(found.before.as_dict() | {"name": found.scene.name})
     assert replace(found, scene=own).itself.endswith("so that paper-designed-design has its values")
     found = design_for_goal("paper-initial", evaluations=5)
-    assert found.itself.startswith(
-        f"the scene as it is is ruled out, as one of those that {found.lacking_before}"
-    )
+    ruled_out = f"the scene as it is is ruled out, as one of those that {found.lacking_before}"
+    assert found.itself.startswith(ruled_out)
     assert found.lacking_before
 
 
@@ -291,7 +289,7 @@ def test_arm_and_throw_are_tried_before_another_part():
 # Robust design: the search's numbers against the table of limit sets, orbits, closed forms, and plane geometry.
 
 
-SPEED = {"throw.speed": "1 %"}
+SPEED, ALONG = {"throw.speed": "1 %"}, "part.mass.center.along"
 
 
 @pytest.fixture(scope="module")
@@ -344,16 +342,16 @@ def test_the_best_margin_of_the_speed_is_where_both_ends_meet():
     scene = ls.load("paper-designed")
     box = Tolerance.of(scene, SPEED)
     found = estimated(scene, box, 2, steps=16)
-    ends = []
-    for sign in (-1, 1):
-        kept = invariant_intervals(box.scene_at(scene, found.margin, (sign,)).map, 12.0, 2)
-        ends.append((kept.threshold(2), float(kept.hi[2])))
-    assert max(end[0] for end in ends) <= found.x <= min(end[1] for end in ends)
-    ends = []
-    for sign in (-1, 1):
-        kept = invariant_intervals(box.scene_at(scene, 1.03 * found.margin, (sign,)).map, 12.0, 2)
-        ends.append((kept.threshold(2), float(kept.hi[2])))
-    assert max(end[0] for end in ends) > min(end[1] for end in ends)
+
+    def room(factor):
+        """Where all places lie that the box leaves for X: from the highest threshold to the lowest top of side 2."""
+        kept = [invariant_intervals(box.scene_at(scene, factor, (s,)).map, 12.0, 2) for s in (-1, 1)]
+        return max(each.threshold(2) for each in kept), min(float(each.hi[2]) for each in kept)
+
+    least, most = room(found.margin)
+    assert least <= found.x <= most
+    least, most = room(1.03 * found.margin)
+    assert least > most
 
 
 @pytest.mark.parametrize("name", ["initial", "designed"])
@@ -407,19 +405,15 @@ def test_what_is_unbeaten_is_beaten_by_none():
         better = (margin >= margin[k]) & (throws <= throws[k])
         return (better & ((margin > margin[k]) | (throws < throws[k]))).any()
 
-    assert {(margin[k], throws[k]) for k in kept} == {
-        (margin[k], throws[k]) for k in range(200) if not beaten(k)
-    }
+    first = [k for k in range(200) if not beaten(k)]
+    assert {(margin[k], throws[k]) for k in kept} == {(margin[k], throws[k]) for k in first}
 
 
 def test_no_part_rests_in_a_box_larger_than_plane_geometry_allows():
     """The study's bound, by formulas of its own, against the package's refusal of parts that tip over."""
     study, scene = load_study("07_robust_design"), ls.load("paper-designed")
-    box = Tolerance.of(
-        scene,
-        {f"part.sides[{k}]": "1 %" for k in range(3)}
-        | {f"part.mass.center.{word}": "0.01 in" for word in ("along", "above")},
-    )
+    texts = {f"part.sides[{k}]": "1 %" for k in range(3)}
+    box = Tolerance.of(scene, texts | dict.fromkeys((ALONG, "part.mass.center.above"), "0.01 in"))
     largest = study.largest_at_rest((5.75, 3.6, 6.75), 4.2255778, 0.7082490)
     signs = list(np.ndindex(2, 2, 2, 2, 2))
     rests = [
@@ -455,11 +449,8 @@ def test_a_small_search_finds_scenes_that_hold_throughout_their_box(small):
 def test_the_margin_of_the_design_is_that_of_its_worst_corner(small):
     """By `failing`, which tries corner after corner at one factor: none at the margin, one a little beyond."""
     box = Tolerance.of(small.scene, small.tolerance)
-    fails = [
-        failing(small.scene, box, 2, small.sampled, share * small.sampled.margin) for share in (1.0, 1.001)
-    ]
-    assert fails[0] == []
-    assert fails[1]
+    for share, fails in ((1.0, False), (1.001, True)):
+        assert bool(failing(small.scene, box, 2, small.sampled, share * small.sampled.margin)) is fails
 
 
 @pytest.mark.sweep
@@ -497,9 +488,8 @@ def test_a_small_search_says_how_it_was_found(small):
     )
     assert small.front[0].candidate.estimate.margin >= small.sampled.margin
     assert small.scene.goal == ls.load(small.scene.as_dict()).goal
-    assert [option.candidate.estimate.margin for option in small.front] == sorted(
-        (option.candidate.estimate.margin for option in small.front), reverse=True
-    )
+    margins = [option.candidate.estimate.margin for option in small.front]
+    assert margins == sorted(margins, reverse=True)
 
 
 def test_the_same_seed_gives_the_same_designs():
@@ -547,7 +537,7 @@ def test_what_cannot_be_designed_is_refused(options, words):
 
 
 def test_the_usual_bounds_are_in_the_scenes_unit():
-    inches, cm = ls.load("paper-designed"), None
+    inches = ls.load("paper-designed")
     tree = inches.as_dict()
     tree["arm"]["length"] = f"{28 * 2.54} cm"
     cm = ls.load(tree)

@@ -31,6 +31,14 @@ def with_throws(name="paper-initial", sensor=None, fast="27.57073926 in"):
     return ls.load(tree)
 
 
+def by_definition(image, answers, target, lost, starts, depth):
+    """Fewest throws, by recursion on whole numbers; `image` of a throw and a cell."""
+    numbers = [[image(k, cell) for cell in range(target.size)] for k in (0, 1)]
+    heard = [as_number(mask) for mask in answers.values()]
+    losing = None if lost is None else as_number(lost)
+    return least(numbers, heard, as_number(target), losing, as_number(starts), depth)
+
+
 @pytest.fixture(scope="module")
 def scene():
     return with_throws(sensor={"beyond": "20 in"})
@@ -52,22 +60,10 @@ def test_coarse_cells_against_the_definition(scene, mode, starts, sensor):
     """13 cells a side, the borders at places that matter added; depth 6."""
     found = ls.feedback(scene, sensor, mode=mode, starts=starts, throws=6, cells=13)
     game = found.game
-    numbers = [
-        [
-            None if game.leaves[k, cell] else sum(1 << int(c) for c in cells_of(game.images[k, cell]))
-            for cell in range(game.n_cells)
-        ]
-        for k in range(2)
-    ]
-    lost = None if game.lost is None else as_number(game.lost)
-    plain = least(
-        numbers,
-        [as_number(mask) for mask in game.answers.values()],
-        as_number(game.target),
-        lost,
-        as_number(found.starts.mask),
-        6,
-    )
+    plain = by_definition(
+        lambda k, cell: None if game.leaves[k, cell] else sum(1 << int(c) for c in cells_of(game.images[k, cell])),
+        game.answers, game.target, game.lost, found.starts.mask, 6,
+    )  # fmt: skip
     assert found.found.verdict == ("not-solved" if plain is None else "solved")
     assert plain is None or found.found.throws == plain
 
@@ -159,9 +155,8 @@ def test_cells_hold_the_images_of_their_points(scene):
             begin = found.grid.index(x, side)
             for k in np.flatnonzero(landed.code >= 0):
                 end = found.grid.index([landed.x[k]], int(landed.side[k]))[0]
-                assert found.game.leaves[throw, begin[k]] or end in cells_of(
-                    found.game.images[throw, begin[k]]
-                )
+                held = cells_of(found.game.images[throw, begin[k]])
+                assert found.game.leaves[throw, begin[k]] or end in held
 
 
 def test_a_certificate_of_a_scene_with_feedback_is_about_its_own_throw(scene, tmp_path):
@@ -260,16 +255,9 @@ def images():
 
 
 def test_the_images_are_those_on_paper(images):
-    assert [images["left"](cells(k)).tolist() for k in range(3)] == [
-        cells(0).tolist(),
-        cells(0, 1).tolist(),
-        cells(1).tolist(),
-    ]
-    assert [images["right"](cells(k)).tolist() for k in range(3)] == [
-        cells(1).tolist(),
-        cells(1, 2).tolist(),
-        cells(2).tolist(),
-    ]
+    for name, wanted in (("left", ((0,), (0, 1), (1,))), ("right", ((1,), (1, 2), (2,)))):
+        for k, numbers in enumerate(wanted):
+            assert images[name](cells(k)).tolist() == cells(*numbers).tolist()
 
 
 def test_three_positions_and_two_throws_solved_by_hand(images):
@@ -322,24 +310,17 @@ def test_forged_policies_are_found_out(images):
     starts = cells(0, 1, 2)
     good = search(game, starts, 5).policy
 
-    def forged(**parts):
-        return type(good)(**{**vars(good), **parts})
-
     no = int(good.first[1])
-    smaller, throw, left, first = (
-        good.belief.copy(),
-        good.throw.copy(),
-        good.left.copy(),
-        good.first.copy(),
-    )
-    smaller[no, 0], throw[no], left[no], first[1] = False, -1, 1, first[0]
-    assert "begin" in broken(forged(belief=smaller), game, starts)
-    assert "stops off" in broken(forged(throw=throw), game, starts)
-    assert "does not fall" in broken(forged(left=left), game, starts)
-    assert "begin" in broken(forged(first=first), game, starts)
-    lost = good.after.copy()
-    lost[no] = -1
-    assert "does not hold" in broken(forged(after=lost), game, starts)
+    for name, at, value, said in (
+        ("belief", (no, 0), False, "begin"),
+        ("throw", no, -1, "stops off"),
+        ("left", no, 1, "does not fall"),
+        ("first", 1, good.first[0], "begin"),
+        ("after", no, -1, "does not hold"),
+    ):
+        array = getattr(good, name).copy()
+        array[at] = value
+        assert said in broken(replace(good, **{name: array}), game, starts)
 
 
 def random_game(random, n, catching):
@@ -365,14 +346,10 @@ def both_ways(relation, leaves, answers, target, lost, starts, depth):
         return of
 
     game = game_of({"a": image(0), "b": image(1)}, answers, target, lost)
-    numbers = [
-        [None if leaves[k][cell] else as_number(relation[k][cell]) for cell in range(target.size)]
-        for k in (0, 1)
-    ]
-    heard = [as_number(mask) for mask in (answers or {"": np.ones(target.size, dtype=bool)}).values()]
-    plain = least(
-        numbers, heard, as_number(target), None if lost is None else as_number(lost), as_number(starts), depth
-    )
+    plain = by_definition(
+        lambda k, cell: None if leaves[k][cell] else as_number(relation[k][cell]),
+        answers or {"": np.ones(target.size, dtype=bool)}, target, lost, starts, depth,
+    )  # fmt: skip
     return game, search(game, starts, depth), plain
 
 
@@ -426,11 +403,5 @@ def test_the_example_of_the_page(capsys):
     assert capsys.readouterr().out == "solved 10\n"
     blind = search(game_of(names["images"], None, names["target"]), names["starts"], 12)
     assert blind.verdict == "not-solved"
-    assert (
-        broken(
-            names["found"].policy,
-            game_of(names["images"], names["answers"], names["target"]),
-            names["starts"],
-        )
-        == ""
-    )
+    game = game_of(names["images"], names["answers"], names["target"])
+    assert broken(names["found"].policy, game, names["starts"]) == ""

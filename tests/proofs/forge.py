@@ -16,21 +16,14 @@ import networkx as nx
 import numpy as np
 
 SLACK = 2.0**-34
+EXACT, SMALL = ("exact", "signed"), ("small-angle", "energy")
 MODELS = {  # flight, flip, along, above, kappa, height, arm
-    "designed": ("exact", "signed", "4.2255778 in", "0.7082490 in", "25.3778518 in", "-0.2 in", "28 in"),
-    "above": ("exact", "signed", "4.2255778 in", "0.7082490 in", "25.3778518 in", "0.1 in", "28 in"),
+    "designed": (*EXACT, "4.2255778 in", "0.7082490 in", "25.3778518 in", "-0.2 in", "28 in"),
+    "above": (*EXACT, "4.2255778 in", "0.7082490 in", "25.3778518 in", "0.1 in", "28 in"),
     "energy": ("exact", "energy", "4.2255778 in", "0.7082490 in", "25.3778518 in", "-0.2 in", "28 in"),
-    "initial": ("exact", "signed", "3.9867006 in", "1.8835981 in", "33.3605945 in", "-0.2 in", "28 in"),
-    "initial-small": (
-        "small-angle",
-        "energy",
-        "3.2444722 in",
-        "1.7898493 in",
-        "85.2549144 in",
-        "-1.0 in",
-        "40 in",
-    ),
-    "small": ("small-angle", "energy", "4.4179581 in", "0.5040259 in", "48.6228609 in", "-1.0 in", "40 in"),
+    "initial": (*EXACT, "3.9867006 in", "1.8835981 in", "33.3605945 in", "-0.2 in", "28 in"),
+    "initial-small": (*SMALL, "3.2444722 in", "1.7898493 in", "85.2549144 in", "-1.0 in", "40 in"),
+    "small": (*SMALL, "4.4179581 in", "0.5040259 in", "48.6228609 in", "-1.0 in", "40 in"),
 }
 LENGTHS = (5.75, 3.6, 6.75)
 
@@ -145,14 +138,11 @@ class Forged:
 
     def seal(self) -> "Forged":
         """Describe the arrays anew, as a forger would."""
-        self.header["arrays"] = {
-            name: {
-                "sha256": hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest(),
-                "dtype": array.dtype.str,
-                "shape": list(array.shape),
-            }
-            for name, array in self.arrays.items()
-        }
+        self.header["arrays"] = {}
+        for name, array in self.arrays.items():
+            digest = hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
+            about = {"sha256": digest, "dtype": array.dtype.str, "shape": list(array.shape)}
+            self.header["arrays"][name] = about
         return self
 
     def bytes(self, method: int = zipfile.ZIP_STORED) -> bytes:

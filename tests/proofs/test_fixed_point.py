@@ -15,15 +15,13 @@ from limitsets.base.errors import LimitsetsError
 from limitsets.proofs.prover.cover import fixed_points, leaves
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.systems.maps import images
+from tests.inverse import exact
 
 mpmath = pytest.importorskip("mpmath")
 mp, mpf = mpmath.mp, mpmath.mpf
 
 KAPPA = "25.3778518"
-PAPER = {
-    "0.1": (3.16, 3.19, 4.81),
-    "0.2": (4.64, 4.55, 5.39),
-}  # docs/model.md
+PAPER = {"0.1": (3.16, 3.19, 4.81), "0.2": (4.64, 4.55, 5.39)}  # docs/model.md
 
 
 def scene(h, **more):
@@ -32,17 +30,8 @@ def scene(h, **more):
 
 def sides(along="4.2255778"):
     """(a, d) of every side of the designed part, from its decimals."""
-    low, left, right = mpf("6.75"), mpf("5.75"), mpf("3.6")
-    x = (low**2 + left**2 - right**2) / (2 * low)
-    apex, corner, far = (x, mp.sqrt(left**2 - x**2)), (mpf(0), mpf(0)), (low, mpf(0))
-    com = mpf(along), mpf("0.7082490")
-    found = []
-    for (px, py), (qx, qy) in ((apex, corner), (far, apex), (corner, far)):
-        length = mp.hypot(qx - px, qy - py)
-        ex, ey = (qx - px) / length, (qy - py) / length
-        u, v = com[0] - px, com[1] - py
-        found.append((u * ex + v * ey, abs(ex * v - ey * u)))
-    return found
+    lengths = dict(zip(exact.SIDES, ("5.75", "3.6", "6.75"), strict=True))
+    return exact.feet(lengths | {exact.ALONG: along, exact.ABOVE: "0.7082490"})
 
 
 def exact_fixed_point(a, d, h, kappa):
@@ -157,7 +146,7 @@ def test_with_a_tolerance_each_value_has_its_own_fixed_point_in_the_bracket(tmp_
     assert ls.recheck(proof.save(tmp_path / "x.proof.zip")).verdict == "proved"
 
 
-def test_the_bracket_of_a_tolerance_in_pieces_holds_those_of_all_pieces():
+def test_the_bracket_of_a_tolerance_in_pieces_holds_those_of_all_pieces(tmp_path):
     proof = ls.certify(scene("0.1"), ["attracts-all"], tolerance={"part.mass.center.along": "0.01 in"})
     assert proof.proved
     assert len(proof.attractions) > 1
@@ -165,6 +154,7 @@ def test_the_bracket_of_a_tolerance_in_pieces_holds_those_of_all_pieces():
         for side, (a, d) in enumerate(sides(along)):
             lo, hi = record(proof)["jog_fixed_points"][str(side)]
             assert lo < exact_fixed_point(a, d, "0.1", KAPPA) < hi
+    assert ls.recheck(proof.save(tmp_path / "x.proof.zip")).verdict == "proved"
 
 
 # ---------------------------------------------------------------- random parts

@@ -37,13 +37,9 @@ def touching(name, share):
     """Scene and part with kappa times 1 + share; decimals of one are those of the other."""
     (h, along, above, kappa), _ = TOUCHING[name]
     kappa = mp.nstr(mp.mpf(kappa) * (1 + mp.mpf(share)), 38)
-    changes = {
-        "arm.surface_height": h,
-        "part.mass.center.along": along,
-        "part.mass.center.above": above,
-        "throw.kappa": kappa,
-    }
-    scene = ls.load(name).with_values({key: f"{text} in" for key, text in changes.items()})
+    names = ("arm.surface_height", "part.mass.center.along", "part.mass.center.above", "throw.kappa")
+    texts = zip(names, (h, along, above, kappa), strict=True)
+    scene = ls.load(name).with_values({key: f"{text} in" for key, text in texts})
     return scene, Part(name, (h, along, above, kappa))
 
 
@@ -120,12 +116,8 @@ def test_an_end_of_the_limit_set_that_touches_a_critical_point(name, share):
         for one in ends.section["ends"]
     )
     expected = limit_set(scene, part)
-    flat = [
-        (side, x, which)
-        for side, parts in enumerate(expected)
-        for pair in parts
-        for x, which in zip(pair, ("lo", "hi"), strict=True)
-    ]
+    pairs = [(side, pair) for side, parts in enumerate(expected) for pair in parts]
+    flat = [(side, *end) for side, pair in pairs for end in zip(pair, ("lo", "hi"), strict=True)]
     assert [(side, which) for side, *_, which in found] == [(side, which) for side, _, which in flat]
     for (_, lo, hi, _), (_, x, _) in zip(found, flat, strict=True):
         assert lo <= x <= hi

@@ -503,6 +503,35 @@ def whole(header: bytes, arrays: dict[str, bytes]) -> bytes:
     return zipped({"header.json": header, "arrays.npz": zipped(arrays)})
 
 
+NO_NOISE = (("throw.speed", 100), ("throw.speed", -1), ("arm.length", 1))
+SPOILED = {  # texts of a header, and what is written for each
+    '"version": 1': ['"version": ' + "1" * 3_000_000, '"version": 1e999999999'],
+    "28 in": [f"{n} in" for n in ("1e99999", "1" * 5000, "28,0", "nan", "-28", "2**9")],
+    '"28 in"': ['"28"', '"28 parsec"', '"28 deg"'],
+    "5.75 in": ["57.5 in", "0 in"],
+    "1.25 in": ["0 in"],
+    "0.7082490 in": ["-0.7 in", "7 in"],
+    "25.3778518 in": ["0 in"],
+    '"side": 2, "along"': [f'"side": {side}, "along"' for side in ("3", "true", '"2"')],
+    '"flip": "signed"': ['"flip": "__import__"'],
+    '"flight": "exact"': ['"flight": ["exact"]'],
+    '"prefix": "0."': ['"prefix": "../"', '"prefix": {}'],
+    '"name": "throw"': ['"name": "logistic"'],
+    '"format": "limitsets-proof"': ['"format": []'],
+    '"noise": null': ['"noise": 3', *(f'"noise": {{"{name}": "{share} %"}}' for name, share in NO_NOISE)],
+    '"tolerance": null': ['"tolerance": {"throw.speed": 1}', '"tolerance": {"a.b": "1 %"}'],
+    '"boxes": [': ['"boxes": [], "other": ['],
+    '"max_rank": ': ['"max_rank": 0.'],
+    '"q": "0x1': ['"q": "0x9'],
+    "p+0": ["p+9999"],
+    '"invariant", "section": {}': [f'"invariant", "section": {other}' for other in ('{"x": 1}', "1")],
+    '"claim": "invariant"': ['"claim": "trapping"'],
+    '"state"': ['"effects": {}, "state"'],
+    '"throw": {': [f'{more}, "throw": {{' for more in ('"effects": {"landing": true}', '"effects": [1]')],
+    '"kappa": "25': ['"speed": "1 rad/s", "kappa": "25'],
+}
+
+
 def damaged_files(f):
     """Name and bytes of files that are not certificates."""
     (header, arrays), data = parts(f), f.bytes()
@@ -532,51 +561,7 @@ def damaged_files(f):
     yield "an open string", whole(b'"' + b'\\"' * (1 << 20), arrays)
     yield "not utf-8", whole(header.replace(b"forge", b"\xff\xfe\xfd__"), arrays)
     yield "a list", whole(b"[1, 2]", arrays)
-    for old, new in [
-        ('"version": 1', '"version": ' + "1" * 3_000_000),
-        ('"version": 1', '"version": 1e999999999'),
-        ("28 in", "1e99999 in"),
-        ("28 in", "1" * 5000 + " in"),
-        ("28 in", "28,0 in"),
-        ("28 in", "28"),
-        ("28 in", "nan in"),
-        ("28 in", "28 parsec"),
-        ("28 in", "28 deg"),
-        ("28 in", "-28 in"),
-        ("28 in", "2**9 in"),
-        ("5.75 in", "57.5 in"),
-        ("5.75 in", "0 in"),
-        ("1.25 in", "0 in"),
-        ("0.7082490 in", "-0.7 in"),
-        ("0.7082490 in", "7 in"),
-        ("25.3778518 in", "0 in"),
-        ('"side": 2, "along"', '"side": 3, "along"'),
-        ('"side": 2, "along"', '"side": true, "along"'),
-        ('"side": 2, "along"', '"side": "2", "along"'),
-        ('"flip": "signed"', '"flip": "__import__"'),
-        ('"flight": "exact"', '"flight": ["exact"]'),
-        ('"prefix": "0."', '"prefix": "../"'),
-        ('"prefix": "0."', '"prefix": {}'),
-        ('"name": "throw"', '"name": "logistic"'),
-        ('"format": "limitsets-proof"', '"format": []'),
-        ('"noise": null', '"noise": {"throw.speed": "100 %"}'),
-        ('"noise": null', '"noise": {"throw.speed": "-1 %"}'),
-        ('"noise": null', '"noise": {"arm.length": "1 %"}'),
-        ('"noise": null', '"noise": 3'),
-        ('"tolerance": null', '"tolerance": {"throw.speed": 1}'),
-        ('"tolerance": null', '"tolerance": {"a.b": "1 %"}'),
-        ('"boxes": [', '"boxes": [], "other": ['),
-        ('"max_rank": ', '"max_rank": 0.'),
-        ('"q": "0x1', '"q": "0x9'),
-        ("p+0", "p+9999"),
-        ('"claim": "invariant", "section": {}', '"claim": "trapping", "section": {}'),
-        ('"claim": "invariant", "section": {}', '"claim": "invariant", "section": {"x": 1}'),
-        ('"claim": "invariant", "section": {}', '"claim": "invariant", "section": 1'),
-        ('"state"', '"effects": {}, "state"'),
-        ('"throw": {', '"effects": {"landing": true}, "throw": {'),
-        ('"throw": {', '"effects": [1], "throw": {'),
-        ('"throw": {', '"throw": {"speed": "1 rad/s", '),
-    ]:
+    for old, new in ((old, new) for old, texts in SPOILED.items() for new in texts):
         text = header.decode()
         assert old in text, old
         yield f"{old} -> {new[:40]}", whole(text.replace(old, new).encode(), arrays)

@@ -15,10 +15,10 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from flint import arb
-from tests.proofs.random_scenes import case
 
 import limitsets as ls
 from limitsets.proofs.prover.certifying import certify
+from tests.attack.generate import draft
 from tests.proofs import forge
 from tests.proofs.test_end_points import CONTRACTING
 from tests.proofs.test_recheck import COARSE, checker, parts, verdict, whole
@@ -100,11 +100,10 @@ def test_orbits_that_attract(tmp_path):
     ("old", "new"), [("-0.2 in", "-.2 in"), ("28 in", "28. in"), ("28 in", "+2.8e+001  in")]
 )
 def test_numbers_as_a_scene_may_write_them(tmp_path, old, new):
-    tree = json.loads(json.dumps(ls.load("paper-designed").as_dict()).replace(f'"{old}"', f'"{new}"'))
-    tree["arm"] = {
-        key: new if text == old else text for key, text in ls.load("paper-designed").text["arm"].items()
-    }
-    assert new in tree["arm"].values()
+    tree = ls.load("paper-designed").as_dict()
+    arm = {key: new if text == old else text for key, text in ls.load("paper-designed").text["arm"].items()}
+    tree["arm"] = arm
+    assert new in arm.values()
     report = checker.recheck(certify(ls.load(tree), ["invariant"]).save(tmp_path / "x.zip"), workers=1)
     assert report.reason == ""
 
@@ -113,14 +112,6 @@ def test_numbers_as_a_scene_may_write_them(tmp_path, old, new):
 def test_numbers_no_scene_has(text):
     with pytest.raises(checker.file.BadFileError):
         checker.file.quantity(text, "length", "x")
-
-
-def test_equal_numbers_in_other_words():
-    for text in (".5 in", "0.5 in", "+.5 in", "5e-1 in", "50.e-002 in"):
-        assert (
-            checker.file.quantity(text, "length", "x").lo
-            == checker.file.quantity("12.7 mm", "length", "x").lo
-        )
 
 
 # --------------------------------------------------------------------------------- throws, against 40 digits
@@ -202,21 +193,21 @@ class Spoiler:
         self.all, self.cycles = cycles, cycles["cycles"]
         self.cycle = rng.choice(self.cycles)
 
-    def outer_inward(self):
+    def move_end(self, outer, inner):
+        """Move an end's outer and inner number outward by so much."""
         end = self.rng.choice(self.ends["ends"])
-        away = 1 if end["which"] == "lo" else -1
-        end["outer"] = moved(end["outer"], 1e-7 * away)
-        end["inner"] = moved(end["inner"], 2e-7 * away)
+        away = -1 if end["which"] == "lo" else 1
+        end["outer"], end["inner"] = moved(end["outer"], outer * away), moved(end["inner"], inner * away)
+
+    def outer_inward(self):
+        self.move_end(-1e-7, -2e-7)
 
     def outer_inward_of_the_inner(self):
         end = self.rng.choice(self.ends["ends"])
         end["outer"] = end["inner"]
 
     def inner_outward(self):
-        end = self.rng.choice(self.ends["ends"])
-        away = -1 if end["which"] == "lo" else 1
-        end["outer"] = moved(end["outer"], 2e-7 * away)
-        end["inner"] = moved(end["inner"], 1e-7 * away)
+        self.move_end(2e-7, 1e-7)
 
     def inner_missing(self):
         self.rng.choice(self.ends["ends"])["inner"] = None
@@ -247,9 +238,6 @@ class Spoiler:
         one, other = self.rng.sample(range(len(self.ends["ends"])), 2)
         self.ends["ends"][one], self.ends["ends"][other] = self.ends["ends"][other], self.ends["ends"][one]
 
-    def ends_empty(self):
-        self.ends["ends"] = self.rng.choice([[], self.ends["ends"][:1], {}])
-
     def too_few_images(self):
         self.ends["images"] = 1
 
@@ -258,8 +246,7 @@ class Spoiler:
         piece[3] = 1 - piece[3]
 
     def critical_point_decided(self):
-        piece = self.rng.choice([p for p in self.ends["pieces"] if p[3] == 2])
-        piece[3] = self.rng.randrange(2)
+        self.rng.choice([p for p in self.ends["pieces"] if p[3] == 2])[3] = self.rng.randrange(2)
 
     def critical_point_beside_its_piece(self):
         at = self.rng.choice([k for k, p in enumerate(self.ends["pieces"]) if p[3] == 2])
@@ -301,9 +288,8 @@ class Spoiler:
 
     def other_multiplier(self):
         by = self.rng.choice([0.99, 1.01, 2.0, -1.0])
-        self.cycle["multiplier"] = [
-            (by * float.fromhex(end)).hex() for end in self.cycle["multiplier"][:: 1 if by > 0 else -1]
-        ]
+        ends = sorted(by * float.fromhex(end) for end in self.cycle["multiplier"])
+        self.cycle["multiplier"] = [end.hex() for end in ends]
 
     def multiplier_turned(self):
         self.cycle["multiplier"].reverse()
@@ -344,9 +330,6 @@ class Spoiler:
     def said_to_be_all(self):
         self.all["complete"] = True
 
-    def none_at_all(self):
-        self.cycles.clear()
-
     def noise_added(self):
         self.f.header["noise"] = {"throw.speed": "0.001 %"}
         kappa = self.f.header["boxes"][0]["parameters"]["kappa"]
@@ -355,38 +338,16 @@ class Spoiler:
     def cells_added(self):
         self.f.arrays["0.component"][self.rng.choice([0, 5])] = 0
 
-    def no_section(self):
-        self.f.header["claims"][self.rng.choice([ENDS, CYCLES])]["section"] = None
-
-    def empty_section(self):
-        self.f.header["claims"][self.rng.choice([ENDS, CYCLES])]["section"] = {}
-
-    def another_key(self):
+    def another_key_or_one_missing(self):
         where = self.rng.choice([self.ends, self.ends["ends"][0], self.all, self.cycle])
-        where["critical"] = None
-
-    def key_missing(self):
-        where = self.rng.choice([self.ends, self.ends["ends"][0], self.all, self.cycle])
-        del where[self.rng.choice(sorted(where))]
+        if self.rng.randrange(2):
+            where["critical"] = None
+        else:
+            del where[self.rng.choice(sorted(where))]
 
     def of_another_kind(self):
-        odd = [
-            None,
-            True,
-            False,
-            -1,
-            3,
-            2.0,
-            10**9,
-            "0",
-            "nan",
-            "inf",
-            "0x1.8p+9999",
-            "-0x1.0p+1023",
-            [],
-            {},
-            [[]],
-        ]
+        odd = [None, True, False, -1, 3, 2.0, 10**9, [], {}, [[]]]
+        odd += ["0", "nan", "inf", "0x1.8p+9999", "-0x1.0p+1023"]
         where = self.rng.choice([self.ends, self.all, self.cycle, self.rng.choice(self.ends["ends"])])
         row = self.rng.choice([self.rng.choice(self.ends["pieces"]), *(
             self.cycle[key] for key in ("interval", "multiplier", "itinerary"))])  # fmt: skip
@@ -395,12 +356,12 @@ class Spoiler:
         where[key] = self.rng.choice([new for new in odd if (type(new), new) != (type(old), old)])
 
 
-WAYS = sorted(name for name in vars(Spoiler) if not name.startswith("_"))
+WAYS = sorted(name for name in vars(Spoiler) if not name.startswith("_") and name != "move_end")
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_no_spoiled_section_is_proved(good, tmp_path, way):
-    for seed in range(60 if way == "of_another_kind" else 8):
+    for seed in range({"of_another_kind": 60, "another_key_or_one_missing": 16}.get(way, 8)):
         rng = random.Random(f"{way} {seed}")
         model = rng.choice(["designed", "small"])
         f = good[model].copy()
@@ -491,17 +452,11 @@ def spoiled_sizes(f):
     cycle = sections(f)[1]["cycles"][0]
     yield "many cycles", told(cycles={"cycles": [cycle] * 1000})
     yield "a long itinerary", told(cycles={"cycles": [{**cycle, "itinerary": [0] * 100_000}]})
-    yield (
-        "deep",
-        whole(
-            header.replace(b'"images": ', b'"images": ' + b"[" * 50_000 + b"]" * 50_000 + b', "x": '), arrays
-        ),
-    )
+    deep = b'"images": ' + b"[" * 50_000 + b"]" * 50_000 + b', "x": '
+    yield "deep", whole(header.replace(b'"images": ', deep), arrays)
     for text in ("nan", "inf", "0x1.0p+1024", "0x1.0p+99999", "0X1P3", "1.5", "0x1.0000000000000000001p+3"):
-        yield (
-            f"inner {text}",
-            told(end_points={"ends": [{**end, "inner": text}, *sections(f)[0]["ends"][1:]]}),
-        )
+        ends = [{**end, "inner": text}, *sections(f)[0]["ends"][1:]]
+        yield f"inner {text}", told(end_points={"ends": ends})
 
 
 def test_absurd_sizes_give_one_clear_line_at_once(good, tmp_path):
@@ -544,12 +499,9 @@ def test_the_impact_is_bracketed_next_to_the_joint():
     """Angles a thousand times smaller than where the search begins: half of these were denied."""
 
     rng, tried = random.Random(3), 0
-    for seed in range(60):
-        raw = case(seed).scene
-        try:
-            scene = checker.scene.read_scene(raw, None)
-        except checker.file.BadFileError:  # the part does not rest on all of its sides
-            continue
+    for seed in range(30):
+        raw, *_ = draft(np.random.default_rng(seed))
+        scene = checker.scene.read_scene(raw, None)
         for s in scene.sides:
             x = arb(float(s.a) + float(s.arm - s.a) * 10 ** rng.uniform(-7, -2))
             if not (s.exact and s.concave and x > s.a):

@@ -21,10 +21,10 @@ from mpmath import mp, mpf
 import limitsets as ls
 from limitsets.feeder.thrower import impact_angles
 from limitsets.systems.maps import images
+from tests.one_throw import highest_off
 from tests.proofs import forge
 from tests.proofs.test_by_angle import DESIGNED, MODELS, WIDTHS, an_open_box, boxed, by_hand, feet, written
 from tests.proofs.test_recheck import checker, verdict
-from tests.proofs.test_tolerances import reread
 
 pytestmark = pytest.mark.usefixtures("precision")
 
@@ -67,7 +67,13 @@ def test_what_two_throws_prove_is_confirmed(tmp_path, given):
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
     folder = tmp_path_factory.mktemp("two")
-    return {key: reread(proof_of(*TRUE[key]).save(folder / f"{key}.proof.zip")) for key in ("one", "landing")}
+    return {
+        key: forge.opened(proof_of(*TRUE[key]).save(folder / f"{key}.proof.zip"))
+        for key in ("one", "landing")
+    }
+
+
+SECTION = ("claims", 0, "section")
 
 
 def section(f):
@@ -81,10 +87,8 @@ def judged(f, tmp_path):
 
 def highest(speed):
     """Highest place off side 2 of a long orbit of paper-designed, thrown slower by a share."""
-    throw = ls.load("paper-designed").with_values({"throw.kappa": 25.3778518 / (1 - speed) ** 2}).map
-    path = ls.orbit(throw, 15.0, 2, 200_000)
-    x, side = np.asarray(path.x)[1000:], np.asarray(path.side)[1000:]
-    return float(x[side != 2].max())
+    slow = ls.load("paper-designed").with_values({"throw.kappa": 25.3778518 / (1 - speed) ** 2})
+    return highest_off(slow.map)
 
 
 def of_another_place(f, x):
@@ -111,25 +115,21 @@ def test_a_place_far_beyond_is_still_believed(good, tmp_path):
 
 
 def test_without_two_throws_the_cells_do_not_do(good, tmp_path):
-    for change in ({"throws": 0}, None):
+    for change in (forge.put(*SECTION, "throws", 0), forge.leave_out(*SECTION, "throws")):
         f = good["one"].copy()
-        section(f).pop("throws")
-        section(f).update(change or {})
+        change(f)
         found = judged(f, tmp_path)
         assert found[0] == "failed"
         assert "an attracting cell of another side reaches beyond" in found[1]
 
 
-@pytest.mark.parametrize("throws", [1, 3, -2, 2.0, "2", True, None, 10**30])
-def test_other_numbers_of_throws_are_no_certificate(good, tmp_path, throws):
-    f = good["one"].copy()
-    section(f)["throws"] = throws
-    assert judged(f, tmp_path)[0] == "bad file"
+OTHER = [1, 3, -2, 2.0, "2", True, None, 10**30]
 
 
-def test_two_throws_from_anywhere_are_no_certificate(good, tmp_path):
+@pytest.mark.parametrize(("key", "entry"), [*(("throws", each) for each in OTHER), ("from_anywhere", True)])
+def test_other_numbers_of_throws_and_starts_anywhere_are_no_certificate(good, tmp_path, key, entry):
     f = good["one"].copy()
-    section(f)["from_anywhere"] = True
+    section(f)[key] = entry
     assert judged(f, tmp_path)[0] == "bad file"
 
 
@@ -137,7 +137,7 @@ def test_noise_of_the_throw_leaves_nothing_the_same(tmp_path):
     """A speed that differs at every throw by 0.38 % keeps the goal; by two throws it may not be shown."""
     noise = {"throw.speed": "0.38 %"}
     proof = ls.certify("paper-designed", ["goal"], noise=noise)
-    f = reread(proof.save(tmp_path / "noisy.proof.zip"))
+    f = forge.opened(proof.save(tmp_path / "noisy.proof.zip"))
     assert judged(f, tmp_path) == ("proved", "")
     section(f)["throws"] = 2
     assert judged(f, tmp_path) == ("proved", "")  # the cells do, two throws are not asked
@@ -182,10 +182,8 @@ def test_a_tolerance_or_noise_wider_than_was_proved_fails(good, tmp_path):
         value = Fraction("25.3778518")
         ends = [value / (1 + Fraction(str(dev))) ** 2, value / (1 - Fraction(str(dev))) ** 2]
         box = f.header["boxes"][0]
-        box["scene"]["throw"]["kappa"] = [
-            f"{float(ends[0]) - 1e-9:.12f} in",
-            f"{float(ends[1]) + 1e-9:.12f} in",
-        ]
+        wide = float(ends[0]) - 1e-9, float(ends[1]) + 1e-9
+        box["scene"]["throw"]["kappa"] = [f"{end:.12f} in" for end in wide]
         box["parameters"]["kappa"] = [(float(ends[0]) - 1e-6).hex(), (float(ends[1]) + 1e-6).hex()]
         assert judged(f, tmp_path)[0] == "failed"
     f = good["landing"].copy()
@@ -249,9 +247,7 @@ def read_wide(model, landing):
 def test_no_box_with_two_throws_that_go_beyond_is_proved(model, landing):
     """Two throws of the package's own map, of a scene in the box; x a little below where they end."""
     scene, read, known = read_wide(model, landing)
-    assert sorted(where for _, where, _ in known) == sorted(
-        name for name in DESIGNED if name.startswith("part")
-    )
+    assert {where for _, where, _ in known} == {name for name in DESIGNED if name.startswith("part")}
     random, proved, looked = np.random.default_rng(2), 0, 0
     names = ["throw.kappa", "arm.surface_height", *(where for _, where, _ in known)]
     for _ in range(40):
@@ -268,14 +264,11 @@ def test_no_box_with_two_throws_that_go_beyond_is_proved(model, landing):
         angles = [impact_angles(throw, [at], on)[0] for at, on in ((x, side), (between, int(one.side[0])))]
         point = [*map(float, angles), between - float(one.x[0]), *(values[name] for name in names)]
         end = float(two.x[0]) + landing
+        ids = [own for own, _, _ in known]
         for size in 10.0 ** random.uniform(-8, -1, 4):
             # the point lies anywhere in the box
-            share = random.uniform(0, 1, len(point))
-            box = [
-                (v - size * s - 1e-9, v + size * (1 - s) + 1e-9)
-                for v, s in zip(point, share.tolist(), strict=True)
-            ]
-            ids = [own for own, _, _ in known]
+            places = zip(point, random.uniform(0, 1, len(point)).tolist(), strict=True)
+            box = [(v - size * s - 1e-9, v + size * (1 - s) + 1e-9) for v, s in places]
             assert checker.two_throws.pair_stays(read, kind, ids, box, arb(end - 1e-7)) >= 0
         box = [(v - 1e-8, v + 1e-8) for v in point]
         proved += checker.two_throws.pair_stays(read, kind, ids, box, arb(end + 1e-4)) == -1
@@ -332,9 +325,6 @@ def test_what_neither_rises_nor_falls_costs_its_derivative(monkeypatch):
     monkeypatch.setattr(checker.two_throws, "weigh", lambda *_: [0.0, 0.0, u])
     box = list(zip(lo.tolist(), hi.tolist(), strict=True))
     ids = [own for own, _, _ in known]
-    for x in (middle + 1e-5, top - 1e-5):
-        assert (
-            checker.two_throws.pair_stays(read, checker.two_throws.Two(*kind), ids, box, arb(x))
-            == checker.two_throws.AT_SECOND
-        )
-    assert checker.two_throws.pair_stays(read, checker.two_throws.Two(*kind), ids, box, arb(top + 0.5)) == -1
+    two, open_at = checker.two_throws.Two(*kind), checker.two_throws.AT_SECOND
+    for x, stays in ((middle + 1e-5, open_at), (top - 1e-5, open_at), (top + 0.5, -1)):
+        assert checker.two_throws.pair_stays(read, two, ids, box, arb(x)) == stays

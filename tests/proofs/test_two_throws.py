@@ -17,8 +17,8 @@ from limitsets.proofs.prover.attraction import attraction
 from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.proofs.prover.two_throws import FLIP, JOG, TwoThrows, kinds_of_two_throws, stays_below
-from limitsets.systems.maps import advance, images
-from tests.one_throw import mean_after
+from limitsets.systems.maps import advance
+from tests.one_throw import highest_off, highest_scattered, mean_after
 from tests.proofs.test_by_angle import DESIGNED, boxed, written
 from tests.proofs.test_probabilities import certificate, mesh
 from tests.proofs.test_recheck import checker
@@ -73,51 +73,20 @@ class Attacked:
 
     def scenes(self, random, inside):
         """Maps at all corners, and at random places inside."""
-        values = [Fraction(written_value(self.scene, name)) for name in self.widths]
-        signs = [
-            *product((-1, 1), repeat=len(values)),
-            *random.uniform(-1, 1, (inside, len(values))).tolist(),
-        ]
-        for each in signs:
-            moved = {
-                name: float(value + width * Fraction(sign))
-                for (name, width), value, sign in zip(self.widths.items(), values, each, strict=True)
-            }
+        count = len(self.widths)
+        corners, between = product((-1, 1), repeat=count), random.uniform(-1, 1, (inside, count)).tolist()
+        for signs in (*corners, *between):
+            widths = zip(self.widths.items(), signs, strict=True)
+            moved = {name: self.scene.value(name) + float(width) * sign for (name, width), sign in widths}
             yield self.scene.with_values(moved).map
 
     def highest(self, random, inside=20, throws=100_000):
-        """Highest place off the side that long orbits reach; the first throws lead to the limit set."""
-        found = -math.inf
-        for throw in self.scenes(random, inside):
-            path = ls.orbit(throw, 0.5 * throw.arm_length, 2, throws)
-            x, side = np.asarray(path.x)[1000:], np.asarray(path.side)[1000:]
-            assert x.size > throws - 1000  # none leaves
-            found = max(found, x[side != self.side].max())
-        return float(found)
+        """Highest place off the side that long orbits reach."""
+        return max(highest_off(throw, throws, self.side) for throw in self.scenes(random, inside))
 
-    def highest_with_noise(self, random, starts=4000, throws=1500):
+    def highest_with_noise(self, random):
         """As `highest`, of many starts, each landing moved to either end of the noise as a random number has it."""
-        found = -math.inf
-        for throw in self.scenes(random, 0):
-            x, side = np.full(starts, 0.5 * throw.arm_length), np.full(starts, 2)
-            for count in range(throws):
-                after, sides = np.empty_like(x), np.empty_like(side)
-                for k in range(throw.a.size):
-                    own = np.flatnonzero(side == k)
-                    landed = images(throw, x[own], k)
-                    after[own], sides[own] = landed.x, landed.side
-                x, side = after + self.landing * random.choice((-1.0, 1.0), starts), sides
-                if count > 300:
-                    found = max(found, x[side != self.side].max(initial=-math.inf))
-        return float(found)
-
-
-def written_value(scene, name):
-    path = name.replace("[", ".").replace("]", "").split(".")
-    node = scene.as_dict()
-    for word in path:
-        node = node[int(word) if word.isdigit() else word]
-    return node.split()[0]
+        return max(highest_scattered(throw, self.landing, random) for throw in self.scenes(random, 0))
 
 
 # by how much what is proved may exceed what orbits reach; paper-initial: its highest place is three throws from what
@@ -154,9 +123,8 @@ def test_no_orbit_exceeds_it_with_the_worst_landings_either():
     box = Attacked("paper-designed", {name: SMALL[name] for name in ("throw.kappa", "part.sides[0]")}, 0.02)
     reached = box.highest_with_noise(np.random.default_rng(7))
     # twice the noise: of the first landing and of the last; both are within reach of the random ones
-    assert reached > Attacked("paper-designed", {"throw.kappa": Fraction(1, 100)}).highest(
-        np.random.default_rng(7), 0
-    )
+    still = Attacked("paper-designed", {"throw.kappa": Fraction(1, 100)})
+    assert reached > still.highest(np.random.default_rng(7), 0)
     for less in (1e-7, 1e-3, 0.03):
         assert not box.proved(reached - less)
     assert box.proved(reached + 0.003)
@@ -300,20 +268,16 @@ def chain_of(speed, landing, strata, tmp_path):
         strata=strata,
     )
     path = forged.write(tmp_path / "x.proof.zip")
-    claim = of_checker("brackets").read_chances(*checker.report.open_and_look(path))
-    whole = of_checker("brackets").mesh_of(claim.edges)
-    kinds, absorbed = of_checker("brackets").kinds_of(claim, whole)
-    chain = of_checker("links").chain_of(claim.noisy, whole, kinds, absorbed, lambda more: None)
+    brackets, links = of_checker("brackets"), of_checker("links")
+    claim = brackets.read_chances(*checker.report.open_and_look(path))
+    whole = brackets.mesh_of(claim.edges)
+    chain = links.chain_of(claim.noisy, whole, *brackets.kinds_of(claim, whole), lambda more: None)
     return chain, [slice(*whole.first[k : k + 2]) for k in range(3)]
 
 
 # speed, landing, strata, midpoints of each law
-LAWS = [
-    (0.0, 0.05, 1, 1000),
-    pytest.param(0.01, 0.2, 8, 100, marks=pytest.mark.sweep),
-    pytest.param(0.05, 0.1, 8, 100, marks=pytest.mark.sweep),
-    pytest.param(0.3, 0.1, 8, 100, marks=pytest.mark.sweep),
-]
+WIDER = [(0.01, 0.2, 8, 100), (0.05, 0.1, 8, 100), (0.3, 0.1, 8, 100)]
+LAWS = [(0.0, 0.05, 1, 1000), *(pytest.param(*law, marks=pytest.mark.sweep) for law in WIDER)]
 
 
 @pytest.mark.usefixtures("precision")

@@ -1,8 +1,5 @@
 """Certified regions: what is proved of a cell holds at parameters drawn in it, and a spoiled certificate is refused."""
 
-import io
-import json
-import zipfile
 from fractions import Fraction
 
 import numpy as np
@@ -29,7 +26,7 @@ from limitsets.parameters.regions import (
 from limitsets.parameters.regions.plane import regions
 from limitsets.parameters.regions.record import Visit, visit
 from limitsets.systems.maps import images, orbit
-from tests.proofs.forge import Forged
+from tests.proofs.forge import Forged, opened, put
 
 X = 20.0
 
@@ -37,9 +34,8 @@ X = 20.0
 @pytest.fixture(scope="module")
 def plane():
     """Part of the border between feeders that have the goal and feeders that do not."""
-    speed = CellAxis.of(
-        "throw.speed", ["155 deg/s", "155.25 deg/s", "155.5 deg/s", "158.25 deg/s", "158.5 deg/s"]
-    )
+    speeds = ("155", "155.25", "155.5", "158.25", "158.5")
+    speed = CellAxis.of("throw.speed", [f"{each} deg/s" for each in speeds])
     height = evenly("arm.surface_height", "-0.22 in", "-0.2 in", 2)
     return certified("paper-designed", speed, height, depth=1)
 
@@ -53,16 +49,8 @@ def level():
 
 @pytest.fixture(scope="module")
 def files(plane, level, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("planes")
-    return {
-        name: held.save(folder / f"{name}.proof.zip") for name, held in (("plane", plane), ("level", level))
-    }
-
-
-def opened(path) -> Forged:
-    with zipfile.ZipFile(path) as file:
-        arrays = np.load(io.BytesIO(file.read("arrays.npz")))
-        return Forged(json.loads(file.read("header.json")), {name: arrays[name] for name in arrays.files})
+    folder, planes = tmp_path_factory.mktemp("planes"), {"plane": plane, "level": level}
+    return {name: held.save(folder / f"{name}.proof.zip") for name, held in planes.items()}
 
 
 def set_at(f, name, at, value):
@@ -164,11 +152,8 @@ def test_a_cell_of_a_single_parameter_is_proved_like_the_scene():
 def test_a_scene_without_a_goal_has_regions_by_its_starts():
     tree = ls.load("paper-designed").as_dict()
     del tree["goal"]
-    found = certified(
-        ls.load(tree),
-        evenly("throw.speed", "157 deg/s", "158 deg/s", 1),
-        evenly("arm.surface_height", "-0.3 in", "-0.2 in", 2),
-    )
+    speed = evenly("throw.speed", "157 deg/s", "158 deg/s", 1)
+    found = certified(ls.load(tree), speed, evenly("arm.surface_height", "-0.3 in", "-0.2 in", 2))
     assert found.code.tolist() == [1, 1]
     assert {record.goal for record in found.records} == {""}
 
@@ -230,10 +215,8 @@ def test_regions_go_round_corners_but_not_across():
 
 def test_the_roomiest_point_is_that_of_an_exhaustive_search():
     rng = np.random.default_rng(5)
-    axes = (
-        evenly("throw.speed", "0 deg/s", "8 deg/s", 8),
-        evenly("arm.surface_height", "-0.8 in", "0 in", 8),
-    )
+    speed, height = ("throw.speed", "0 deg/s", "8 deg/s"), ("arm.surface_height", "-0.8 in", "0 in")
+    axes = tuple(evenly(*span, 8) for span in (speed, height))
     cells = [(i, i + 1, j, j + 1) for i in range(8) for j in range(8)]
     for _ in range(20):
         code = (rng.random(64) < 0.8).astype(np.int8)
@@ -277,8 +260,12 @@ def rows_of(f: Forged, k: int) -> slice:
     return slice(sum(sizes[:k]), sum(sizes[: k + 1]))
 
 
-def code(f, was, now):
-    f.arrays["goal"][cell_with(f, was)] = now
+def coded(was, now):
+    """Another code of a cell."""
+    return lambda f: set_at(f, "goal", cell_with(f, was), now)
+
+
+SECTION = ("claims", 0, "section")
 
 
 def forgotten_chain(f):
@@ -311,18 +298,11 @@ def dropped(f):
     f.arrays["component"][inside[inside.size // 2]] = -1
 
 
-def replaced_text(f, path, value):
-    node = f.header["claims"][0]["section"]
-    for word in path[:-1]:
-        node = node[word]
-    node[path[-1]] = value
-
-
 FORGERIES = {
-    "undecided is called proved": lambda f: code(f, 0, 1),
-    "undecided is called refuted": lambda f: code(f, 0, 2),
-    "refuted is called proved": lambda f: code(f, 2, 1),
-    "refuted is called undecided": lambda f: code(f, 2, 0),
+    "undecided is called proved": coded(0, 1),
+    "undecided is called refuted": coded(0, 2),
+    "refuted is called proved": coded(2, 1),
+    "refuted is called undecided": coded(2, 0),
     "an orbit is missing": forgotten_chain,
     "an orbit is shifted": lambda f: set_at(f, "chain.ends", (1, slice(None)), f.arrays["chain.ends"][1] + 0.5),
     "an interval of an orbit is wider": lambda f: set_at(f, "chain.ends", (2, 1), f.arrays["chain.ends"][2, 1] + 0.5),
@@ -330,11 +310,11 @@ FORGERIES = {
     "an orbit takes another branch": lambda f: set_at(f, "chain", (0, 2), 1 - f.arrays["chain"][0, 2]),
     "a cell lies over another": lambda f: set_at(f, "cells", (0, 1), f.arrays["cells"][0, 1] + 1),
     "the cells leave a gap": lambda f: set_at(f, "cells", (0, 1), f.arrays["cells"][0, 1] - 1),
-    "a border lies elsewhere": lambda f: replaced_text(f, ["axes", 0, "borders", 0], "150 deg/s"),
-    "a border is no border": lambda f: replaced_text(f, ["axes", 0, "borders", 1], "156 deg/s"),
-    "the goal asks for more": lambda f: replaced_text(f, ["scene", "goal", "oriented_beyond", "x"], "18 in"),
-    "another part": lambda f: replaced_text(f, ["scene", "part", "mass", "center", "along"], "4.2 in"),
-    "another arm": lambda f: replaced_text(f, ["scene", "arm", "length"], "28.1 in"),
+    "a border lies elsewhere": put(*SECTION, "axes", 0, "borders", 0, "150 deg/s"),
+    "a border is no border": put(*SECTION, "axes", 0, "borders", 1, "156 deg/s"),
+    "the goal asks for more": put(*SECTION, "scene", "goal", "oriented_beyond", "x", "18 in"),
+    "another part": put(*SECTION, "scene", "part", "mass", "center", "along", "4.2 in"),
+    "another arm": put(*SECTION, "scene", "arm", "length", "28.1 in"),
     "a target is forgotten": narrowed,
     "a rank is too low": lambda f: rank_of(f, 0),
     "nothing is claimed where all starts are": lambda f: rank_of(f, -1),
@@ -351,7 +331,7 @@ FORGERIES = {
     "a border that is none": lambda f: set_at(f, "cells", (0, 0), -1),
     "a block of no cell": lambda f: set_at(f, "blocks", (0, 0), 10_000),
     "a code that is none": lambda f: set_at(f, "goal", 0, 3),
-    "noise": lambda f: f.header.__setitem__("noise", {"throw.speed": "1 %"}),
+    "noise": put("noise", {"throw.speed": "1 %"}),
     "one more array": lambda f: f.arrays.__setitem__("edges.9.0", np.arange(3.0)),
 }  # fmt: skip
 

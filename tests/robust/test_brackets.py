@@ -30,12 +30,9 @@ def test_moments_of_sine_and_cosine_are_within_their_error():
     found = moments(phi)
     for k in range(3):
         for p, c, s in zip(phi, found.c[k], found.s[k], strict=True):
-            exact = [
-                mpmath.quad(lambda t, f=f, k=k, p=p: t**k * f(p * t), [0, 0.5, 1])
-                for f in (mpmath.cos, mpmath.sin)
-            ]
-            assert abs(c - exact[0]) < ERROR
-            assert abs(s - exact[1]) < ERROR
+            for mine, f in ((c, mpmath.cos), (s, mpmath.sin)):
+                exact = mpmath.quad(lambda t, f=f, k=k, p=p: t**k * f(p * t), [0, 0.5, 1])
+                assert abs(mine - exact) < ERROR
 
 
 def test_normal_strata_have_the_masses_of_the_law():
@@ -57,8 +54,8 @@ NOISES = [
     (BOTH, 100),
     (Scattering(landing=Uniform(0.05)), 1000),
     (Scattering(speed=Uniform(0.01)), 1000),
-    pytest.param(Scattering(speed=Uniform(0.1)), 1000, marks=pytest.mark.sweep),
-    pytest.param(Scattering(speed=Uniform(0.1), landing=Uniform(0.05)), 100, marks=pytest.mark.sweep),
+    (Scattering(speed=Uniform(0.1)), 1000),
+    (Scattering(speed=Uniform(0.1), landing=Uniform(0.05)), 100),
 ]
 
 
@@ -81,9 +78,9 @@ def test_one_throw_is_bounded_at_every_place(name, scatter, count):
         found = mean_after(scene, scatter, [(nodes.place[row], values[row]) for row in rows], x, side, count)
         none = np.full(chain.free.size, -np.inf)
         above, below = chain.above(values, none), -chain.above(-values, none)
+        on = [side == k for k in range(3)]
         high, low = (
-            np.select([side == k for k in range(3)], [np.interp(x, nodes.place[row], b[row]) for row in rows])
-            for b in (above, below)
+            np.select(on, [np.interp(x, nodes.place[row], b[row]) for row in rows]) for b in (above, below)
         )
         # Midpoints of a function that jumps where the branch changes and at 17.3: each by half a weight.
         slack = np.ptp(values) / count
@@ -100,6 +97,12 @@ def _stretched(scene):
     return float(scene.sides.a[2]), 1.0 + 2.0 * abs(scene.map.surface_height) / scene.map.kappa
 
 
+def fed_beyond(scene, scatter, x, starts, cells, throws):
+    """Brackets of parts that start even on a stretch of side 2 and come beyond x on that side."""
+    words = {"starts": [(2, *starts)], "cells": cells, "throws": throws, "mean": False}
+    return absorption_brackets(scene, scatter, right=(x, 2), **words)
+
+
 def test_a_linear_map_with_uniform_noise_has_its_closed_form():
     scene = ls.load("paper-designed-small-angle")
     a, q = _stretched(scene)
@@ -107,15 +110,7 @@ def test_a_linear_map_with_uniform_noise_has_its_closed_form():
     # Each jog leads farther than the noise back: absorbed within n throws is x_n >= X, a sum of uniform numbers.
     assert (q - 1.0) * (lo - a) > 2.0 * b
     for cells in (60, 1500):
-        found = absorption_brackets(
-            scene,
-            Scattering(landing=Uniform(b)),
-            right=(x_right, 2),
-            starts=[(2, lo, hi)],
-            cells=cells,
-            throws=7,
-            mean=False,
-        )
+        found = fed_beyond(scene, Scattering(landing=Uniform(b)), x_right, (lo, hi), cells, 7)
         low, high = found.within["right"]
         exact = ladder((a, q), (lo, hi), b, x_right, 7)
         assert (low - 1e-12 <= exact).all()
@@ -135,15 +130,7 @@ def _arrived(x, least, scatter):
 
 def test_speed_alone_has_its_closed_form():
     scene, p, lo, hi, x_right = ls.load("paper-designed-small-angle"), 0.05, 17.2, 17.7, 18.0
-    found = absorption_brackets(
-        scene,
-        Scattering(speed=Uniform(p)),
-        right=(x_right, 2),
-        starts=[(2, lo, hi)],
-        cells=4000,
-        throws=1,
-        mean=False,
-    )
+    found = fed_beyond(scene, Scattering(speed=Uniform(p)), x_right, (lo, hi), 4000, 1)
     low, high = found.within["right"][:, 1]
     starts = lo + (hi - lo) * (np.arange(100_000) + 0.5) / 100_000
     exact = float(_arrived(starts, x_right, p).mean())
@@ -181,15 +168,7 @@ def test_a_linear_map_with_normal_noise_has_its_closed_form():
     scene = ls.load("paper-designed-small-angle")
     a, q = _stretched(scene)
     sigma, x_right, lo, hi = 0.02, 18.0, 15.0, 16.0
-    found = absorption_brackets(
-        scene,
-        Scattering(landing=Gaussian(sigma)),
-        right=(x_right, 2),
-        starts=[(2, lo, hi)],
-        cells=600,
-        throws=6,
-        mean=False,
-    )
+    found = fed_beyond(scene, Scattering(landing=Gaussian(sigma)), x_right, (lo, hi), 600, 6)
     low, high = found.within["right"]
     starts = np.linspace(lo, hi, 20001)
     for n in range(1, 7):
@@ -202,9 +181,7 @@ def test_a_linear_map_with_normal_noise_has_its_closed_form():
 
 def test_a_throw_without_noise_is_certain():
     scene = ls.load("paper-designed")
-    found = absorption_brackets(
-        scene, Scattering(), right=(8.5, 2), starts=[(2, 8.0, 8.4)], cells=3000, throws=3, mean=False
-    )
+    found = fed_beyond(scene, Scattering(), 8.5, (8.0, 8.4), 3000, 3)
     # (8, side 2) -> 8.262013 -> 8.557124; what starts beyond x_1 with x_1 -> 8.5 arrives with the first throw.
     low, high = found.within["right"]
     assert low[2] > 1.0 - 1e-6
@@ -217,17 +194,13 @@ def test_a_throw_without_noise_is_certain():
 # ------------------------------------------------------------ throws
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("name", "scatter", "cells"),
     [
-        pytest.param("paper-designed", BOTH, 500, marks=pytest.mark.sweep),
-        pytest.param(
-            "paper-designed",
-            Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02)),
-            300,
-            marks=pytest.mark.sweep,
-        ),
-        pytest.param("paper-initial", Scattering(landing=Uniform(0.1)), 300, marks=pytest.mark.sweep),
+        ("paper-designed", BOTH, 500),
+        ("paper-designed", Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02)), 300),
+        ("paper-initial", Scattering(landing=Uniform(0.1)), 300),
     ],
 )
 def test_brackets_meet_the_shares_of_many_throws(name, scatter, cells):
@@ -251,16 +224,9 @@ def test_brackets_meet_the_shares_of_many_throws(name, scatter, cells):
 
 
 def test_right_and_wrong_add_up_and_narrow_with_the_cells():
+    scatter, words = Scattering(landing=Uniform(0.1)), {"right": (20.0, 2), "wrong": 20.0, "throws": 6}
     wide, narrow = (
-        absorption_brackets(
-            "paper-initial",
-            Scattering(landing=Uniform(0.1)),
-            right=(20.0, 2),
-            wrong=20.0,
-            cells=cells,
-            throws=6,
-            mean=False,
-        )
+        absorption_brackets("paper-initial", scatter, **words, cells=cells, mean=False)
         for cells in (200, 600)
     )
     for name in ("right", "wrong", "any"):

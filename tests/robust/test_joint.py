@@ -24,6 +24,7 @@ from limitsets.parameters.margins.margin_result import Margin
 from limitsets.parameters.sheet import sheet_run
 from limitsets.proofs.prover.certifying import certify
 from limitsets.proofs.prover.query import Query
+from tests.one_throw import highest_off, highest_scattered
 from tests.plates import plate
 
 # ----------------------------------------------------------------
@@ -40,20 +41,13 @@ def scene(tolerance):
     return ls.load(ls.load("paper-designed").as_dict() | {"tolerance": tolerance})
 
 
-def highest_off(factor, signs):
+def highest_at(factor, signs):
     """Highest place off side 2 of a long orbit at one corner."""
     base = ls.load("paper-designed")
     speed, side, height = (s * factor for s in signs)
-    moved = base.with_values(
-        {
-            "throw.kappa": base.kappa / (1 + 0.01 * speed) ** 2,
-            "part.sides[0]": 5.75 * (1 + 0.01 * side),
-            "arm.surface_height": -0.2 + 0.02 * height,
-        }
-    )
-    path = ls.orbit(moved.map, 15.0, 2, 300_000)
-    x, at = np.asarray(path.x)[1000:], np.asarray(path.side)[1000:]
-    return float(x[at != 2].max())
+    values = {"throw.kappa": base.kappa / (1 + 0.01 * speed) ** 2, "part.sides[0]": 5.75 * (1 + 0.01 * side)}
+    moved = base.with_values(values | {"arm.surface_height": -0.2 + 0.02 * height})
+    return highest_off(moved.map, 300_000)
 
 
 @pytest.fixture(scope="module")
@@ -64,17 +58,14 @@ def found():
 def test_the_factor_is_that_of_the_worst_corner(found):
     assert found.closed
     corners = list(product((-1, 1), repeat=3))
-    assert max(highest_off(found.proved, signs) for signs in corners) < 20.0
-    assert max(highest_off(1.01 * found.refuted, signs) for signs in corners) > 20.0
+    assert max(highest_at(found.proved, signs) for signs in corners) < 20.0
+    assert max(highest_at(1.01 * found.refuted, signs) for signs in corners) > 20.0
 
 
 def test_its_certificates_are_confirmed_and_so_is_the_orbit_that_refutes(found, tmp_path):
     files = found.save(tmp_path)
-    assert [file.name.split("tolerance")[1] for file in files] == [
-        "-oriented-beyond.proof.zip",
-        "-reaches.proof.zip",
-        ".refuted.zip",
-    ]
+    names = [file.name.split("tolerance")[1] for file in files]
+    assert names == ["-oriented-beyond.proof.zip", "-reaches.proof.zip", ".refuted.zip"]
     for file in files:
         report = ls.recheck(file)
         word = "refuted" if file.name.endswith(".refuted.zip") else "proved"
@@ -145,29 +136,6 @@ def corner(factor, signs):
     return base.with_values(values | {"throw.kappa": base.kappa / (1 + 0.01 * factor * signs[0]) ** 2}).map
 
 
-def highest_of(throw, count):
-    """Highest place off side 2 of a long orbit."""
-    path = ls.orbit(throw, 15.0, 2, count)
-    x, at = np.asarray(path.x)[1000:], np.asarray(path.side)[1000:]
-    return float(x[at != 2].max())
-
-
-def highest_scattered(throw, landing):
-    """The same of many orbits whose landings are moved to either end of the noise, at random."""
-    random, found = np.random.default_rng(0), -np.inf
-    x, side = np.full(4000, 15.0), np.full(4000, 2)
-    for count in range(3000):
-        after, sides = np.empty_like(x), np.empty_like(side)
-        for k in range(3):
-            own = np.flatnonzero(side == k)
-            landed = ls.maps.images(throw, x[own], k)
-            after[own], sides[own] = landed.x, landed.side
-        x, side = after + landing * random.choice((-1.0, 1.0), x.size), sides
-        if count > 200:
-            found = max(found, x[side != 2].max(initial=-np.inf))
-    return float(found)
-
-
 @pytest.mark.sweep
 def test_nine_quantities_and_the_landing_place(tmp_path):
     found = joint_margin(scene(NINE), GOALS[:1], width=0.01, seconds=15.0)
@@ -178,17 +146,16 @@ def test_nine_quantities_and_the_landing_place(tmp_path):
     assert found.reason
     assert found.noise.keys() == {"landing.x"}
     for file in found.save(tmp_path):
-        report = ls.recheck(file)
-        assert report.verdict == ("refuted" if file.name.endswith(".refuted.zip") else "proved"), (
-            report.reason
-        )
+        word = "refuted" if file.name.endswith(".refuted.zip") else "proved"
+        assert ls.recheck(file).verdict == word
     corners = list(product((-1, 1), repeat=8))
-    heights = [highest_of(corner(found.proved, signs), 20_000) for signs in corners]
+    heights = [highest_off(corner(found.proved, signs), 20_000) for signs in corners]
     assert max(heights) < 20.0
     worst = corners[int(np.argmax(heights))]
-    assert highest_scattered(corner(found.proved, worst), 0.01 * found.proved) < 20.0
-    beyond = 1.01 * found.refuted
-    assert highest_scattered(corner(beyond, worst), 0.01 * beyond) > 20.0
+    for factor, above in ((found.proved, False), (1.01 * found.refuted, True)):
+        random = np.random.default_rng(0)
+        reached = highest_scattered(corner(factor, worst), 0.01 * factor, random, 3000)
+        assert (reached > 20.0) is above
 
 
 @pytest.mark.parametrize(
@@ -250,8 +217,6 @@ def test_a_pinwheel_is_covered_though_no_cut_parts_its_boxes():
 # ----------------------------------------------------------------
 # Margins of several pieces: what one certificate states of all of them, and what becomes of a quantity that fails.
 
-
-ALL_BUT_MARGINS = ["joint", "curve", "noise", "audit"]
 
 # A trapezium in mm, 3.9 mm below the joint: a deviation of its surface height may lead above the joint.
 OVER_THE_JOINT = plate(
@@ -370,18 +335,9 @@ def test_a_sheet_goes_on_without_the_margin_that_fails(monkeypatch, capfd, tmp_p
         raise ZeroDivisionError
 
     monkeypatch.setattr(sheet_run, "joint_margin", no_joint)
-    asks = [
-        "--quantity",
-        "throw.speed",
-        "--quantity",
-        "arm.surface_height",
-        "--reading",
-        "fixed",
-        "--width",
-        "0.5",
-    ]
-    more = ["--tolerance", "throw.speed=1 %", "--without", "curve", "--without", "audit", "--workers", "1"]
-    code = main(["robustness", "paper-designed", *asks, *more, "-o", str(tmp_path)])
+    asks = "--quantity throw.speed --quantity arm.surface_height --reading fixed --width 0.5 --workers 1"
+    more = ["--tolerance", "throw.speed=1 %", "--without", "curve", "--without", "audit"]
+    code = main(["robustness", "paper-designed", *asks.split(), *more, "-o", str(tmp_path)])
     out = capfd.readouterr().out
     assert code == 1
     assert f"no margin of throw.speed, fixed: {BUG}" in out
@@ -416,7 +372,13 @@ def made_up(scene, quantity, proved, refuted, unit, reason=""):
     )
 
 
-def test_the_csv_of_a_sheet_has_each_value_as_the_scene_gives_it():
+@pytest.fixture(scope="module")
+def sheet():
+    words = {"reading": "fixed", "width": 0.5, "leave_out": ["joint", "curve", "noise", "audit"]}
+    return ls.robustness("paper-designed", "throw.speed", **words)
+
+
+def test_the_csv_of_a_sheet_has_each_value_as_the_scene_gives_it(sheet):
     """62 mm was 61.99999999999999, 0 mm and the height of a margin of 0 were empty, and 34.5449 g stood beside %."""
     scene = ls.load(OVER_THE_JOINT)
     rows = [
@@ -426,20 +388,14 @@ def test_the_csv_of_a_sheet_has_each_value_as_the_scene_gives_it():
         made_up(scene, "arm.surface_height", 0.0, 5.9, "mm"),
         made_up(scene, "landing.x", 2.0, None, "mm"),
     ]
-    sheet = ls.robustness(
-        "paper-designed", "throw.speed", reading="fixed", width=0.5, leave_out=ALL_BUT_MARGINS
-    )
     table = list(csv.DictReader(io.StringIO(replace(sheet, scene=scene, entries=tuple(rows)).table().csv())))
     assert [(row["value"], row["value_unit"]) for row in table] == [
         ("62.0", "mm"), ("0.0", "mm"), ("34.5449", "g"), ("-3.8895", "mm"), ("", ""),
     ]  # fmt: skip
 
 
-def test_a_page_tells_the_reason_of_a_margin_of_nothing(tmp_path):
+def test_a_page_tells_the_reason_of_a_margin_of_nothing(sheet):
     """A row of 0 beside 5.9 mm had no reason in report.md: what the checker denies is not proved."""
-    sheet = ls.robustness(
-        "paper-designed", "throw.speed", reading="fixed", width=0.5, leave_out=ALL_BUT_MARGINS
-    )
     denied = made_up(sheet.scene, "arm.surface_height", 0.0, 0.1, "in", "the checker does not confirm it")
     page = robustness_page(replace(sheet, entries=(*sheet.entries, denied)), {})
     assert "Where the two columns are apart" in page

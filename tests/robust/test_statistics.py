@@ -42,6 +42,10 @@ def gaussian():
     return noise_statistics("paper-designed", noise, goal=GOAL, cells=512)
 
 
+def solved(scene, noise, cells):
+    return noise_statistics(scene, noise, goal=GOAL, cells=cells, sensitivity=False)
+
+
 def within(found, thrown, names, sigmas=4.0):
     """Each number within its error bars of what was thrown."""
     for name in names:
@@ -49,17 +53,8 @@ def within(found, thrown, names, sigmas=4.0):
         assert abs(found.numbers[name] - thrown.numbers[name]) < sigmas * error, name
 
 
-NUMBERS = (
-    "time on side 0",
-    "time on side 1",
-    "time on side 2",
-    "share of jog",
-    "time beyond",
-    "mean throws",
-    "95 % throws",
-    "fed",
-    "first beyond is wrong",
-)
+NUMBERS = tuple(f"time on side {side}" for side in range(3))
+NUMBERS += ("share of jog", "time beyond", "mean throws", "95 % throws", "fed", "first beyond is wrong")
 
 
 @pytest.mark.sweep
@@ -89,7 +84,7 @@ def test_bounded_noise_against_throws_on_a_short_arm():
     """The arm ends just beyond the limit set: throws are lost, and the class is left at a small rate."""
     scene = ls.load("paper-designed").with_values({"arm.length": 23.6})
     noise = Scattering(speed=Uniform(0.01), landing=Uniform(0.05))
-    found = noise_statistics(scene, noise, goal=GOAL, cells=512, sensitivity=False)
+    found = solved(scene, noise, 512)
     thrown = throw_many(scene, noise, GOAL, starts_from(scene), throws=400_000, parts=5_000, seed=8)
     within(found, thrown, ("time on side 0", "time beyond", "fed", "mean throws"))
     assert 0.0 < found.numbers["escape"] < 0.01
@@ -115,7 +110,7 @@ def surviving(scene, noise, parts, throws):
 
 
 def test_no_noise_against_the_limit_set_and_a_long_orbit():
-    found = noise_statistics("paper-designed", Scattering(), goal=GOAL, cells=2048, sensitivity=False)
+    found = solved("paper-designed", Scattering(), 2048)
     path = ls.orbit(ls.load("paper-designed").map, 15.0, 2, 1_000_000)
     for side in range(3):
         assert found.numbers[f"time on side {side}"] == pytest.approx(np.mean(path.side == side), abs=4e-4)
@@ -133,16 +128,8 @@ def test_slopes_are_those_of_secants(gaussian):
     """The slope times the logarithm of two levels, against the difference of the numbers there on other cells."""
     for name in ("speed", "landing"):
         apart = math.log(1.1 / 0.9)
-        high, low = (
-            noise_statistics(
-                "paper-designed",
-                gaussian.scatter.scaled(factor, name),
-                goal=GOAL,
-                cells=768,
-                sensitivity=False,
-            ).numbers
-            for factor in (1.1, 0.9)
-        )
+        scaled = [gaussian.scatter.scaled(factor, name) for factor in (1.1, 0.9)]
+        high, low = (solved("paper-designed", noise, 768).numbers for noise in scaled)
         for number in ("time on side 0", "mean throws"):
             slope = gaussian.sensitivity[name][number]
             secant = (high[number] - low[number]) / apart
@@ -156,7 +143,7 @@ def test_slopes_are_those_of_secants(gaussian):
 @pytest.mark.sweep
 def test_levels_begin_without_noise(gaussian):
     levels = noise_levels("paper-designed", gaussian.scatter, factors=(0.0, 1.0), goal=GOAL, cells=512)
-    still = noise_statistics("paper-designed", Scattering(), goal=GOAL, cells=512, sensitivity=False)
+    still = solved("paper-designed", Scattering(), 512)
     assert levels.numbers["mean throws"][0] == pytest.approx(still.numbers["mean throws"], rel=1e-9)
     assert levels.numbers["wrong beyond"][0] == 0.0 < levels.numbers["wrong beyond"][1]
 
@@ -181,8 +168,7 @@ def test_scene_with_scatter_and_a_goal_needs_no_more():
     found = noise_statistics(scene, goal=OrientedBeyond(*GOAL), cells=256, sensitivity=False)
     assert found.scatter == Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
     assert found.goal == GOAL
-    same = noise_statistics("paper-designed", found.scatter, goal=GOAL, cells=256, sensitivity=False)
-    assert same.numbers == found.numbers
+    assert solved("paper-designed", found.scatter, 256).numbers == found.numbers
 
 
 def test_maps_without_forced_branches_go_by_points():
@@ -201,13 +187,9 @@ def test_tilt_is_speed_by_another_name():
     """kappa goes with sin(tilt) and 1 / speed^2: small deviations of the one are those of the other."""
     scene = ls.load("paper-designed").with_values({"gravity.tilt": "30 deg"})
     sigma = 0.002
-    by_speed = noise_statistics(
-        scene, Scattering(speed=Gaussian(sigma)), goal=GOAL, cells=256, sensitivity=False
-    )
+    by_speed = solved(scene, Scattering(speed=Gaussian(sigma)), 256)
     tilt = 2.0 * sigma * math.tan(math.pi / 6)  # d ln sin(t) = dt / tan(t)
-    by_tilt = noise_statistics(
-        scene, Scattering(tilt=Gaussian(tilt)), goal=GOAL, cells=256, sensitivity=False
-    )
+    by_tilt = solved(scene, Scattering(tilt=Gaussian(tilt)), 256)
     for name in ("time on side 2", "mean throws", "time beyond"):
         assert by_tilt.numbers[name] == pytest.approx(by_speed.numbers[name], rel=1e-3)
 
@@ -298,9 +280,8 @@ def test_kappa_of_speed_and_tilt():
     noise = Scattering(speed=Uniform(0.02), tilt=Gaussian(0.01))
     strata = kappa_strata(noise, scene, 16)
     inverse = integrate.quad(lambda d: (1 + d) ** -2 / 0.04, -0.02, 0.02)[0]
-    tilted = integrate.quad(lambda t: math.sin(math.pi / 6 + t) * stats.norm.pdf(t, scale=0.01), -0.06, 0.06)[
-        0
-    ]
+    law = stats.norm(scale=0.01)
+    tilted = integrate.quad(lambda t: math.sin(math.pi / 6 + t) * law.pdf(t), -0.06, 0.06)[0]
     assert strata.weight @ strata.mean == pytest.approx(inverse * tilted / 0.5, rel=1e-6)
     assert strata.lo == pytest.approx(1.02**-2 * math.sin(math.pi / 6 - 0.06) / 0.5, rel=1e-9)
 

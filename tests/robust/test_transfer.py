@@ -72,13 +72,8 @@ def test_rows_and_ways_out_add_up_to_one():
     noise = Scattering(speed=Gaussian(0.01), landing=Gaussian(0.1))
     for grading in ("uniform", "graded"):
         cover = ls.grid(scene.domain, cells=300, grading=grading)
-        chain = transfer(
-            thrown(still_map(scene)),
-            cover,
-            parameter=kappa_strata(noise, scene, 8),
-            landing=noise.landing,
-            strata=8,
-        )
+        laws = {"parameter": kappa_strata(noise, scene, 8), "landing": noise.landing}
+        chain = transfer(thrown(still_map(scene)), cover, **laws, strata=8)
         total = chain.matrix.sum(axis=1) + chain.sinks.sum(axis=1)
         np.testing.assert_allclose(total, 1.0, rtol=0, atol=1e-13)
         assert chain.sinks.min() >= 0.0
@@ -130,27 +125,20 @@ def test_arcsine_density_without_noise():
     cells = 4096
     (found,) = classes(transfer(ls.maps.Logistic(4.0), ls.grid(LINE, cells=cells)))
     exact = np.diff(2.0 / np.pi * np.arcsin(np.sqrt(np.linspace(0.0, 1.0, cells + 1))))
-    assert (
-        np.abs(found.weight - exact).sum() < 0.04
-    )  # sqrt(width) ln(1/width), see tests/sets/test_measure.py
+    # sqrt(width) ln(1/width), see tests/sets/test_measure.py
+    assert np.abs(found.weight - exact).sum() < 0.04
     assert found.residual < 1e-12
 
 
-@pytest.mark.parametrize(
-    "params", [ls.maps.Logistic(3.7), ls.maps.Doubling(), Tent(1.8)], ids=lambda p: type(p).__name__
-)
-def test_no_noise_agrees_with_invariant_measures(params):
-    cover = ls.grid(LINE, cells=512)
+DESIGNED = ls.load("paper-designed")
+STILL = [(params, LINE) for params in (ls.maps.Logistic(3.7), ls.maps.Doubling(), Tent(1.8))]
+
+
+@pytest.mark.parametrize(("params", "domain"), [*STILL, (DESIGNED.map, DESIGNED.domain)])
+def test_no_noise_agrees_with_invariant_measures(params, domain):
+    cover = ls.grid(domain, cells=512)
     (measure,) = invariant_measures(ls.transitions(params, cover))
     (found,) = [part for part in classes(transfer(params, cover)) if part.closed]
-    np.testing.assert_allclose(found.weight, measure.weight, rtol=0, atol=1e-9)
-
-
-def test_no_noise_agrees_with_invariant_measures_of_a_scene():
-    scene = ls.load("paper-designed")
-    cover = ls.grid(scene.domain, cells=1024)
-    (measure,) = invariant_measures(ls.transitions(scene.map, cover))
-    (found,) = [part for part in classes(transfer(scene.map, cover)) if part.closed]
     np.testing.assert_allclose(found.weight, measure.weight, rtol=0, atol=1e-9)
 
 
@@ -204,11 +192,8 @@ def test_a_parameter_that_scatters():
     def centred(deviation):
         return ls.maps.Logistic(3.6 + deviation)
 
-    (found,) = [
-        part
-        for part in classes(transfer(centred, ls.grid(LINE, cells=n), parameter=Uniform(0.1)))
-        if part.closed
-    ]
+    parts = classes(transfer(centred, ls.grid(LINE, cells=n), parameter=Uniform(0.1)))
+    (found,) = [part for part in parts if part.closed]
     assert np.abs(found.weight - weight).sum() < 0.02
 
 
@@ -419,14 +404,8 @@ def test_two_closed_classes_are_kept_apart():
 
     chain = replace(free, throw=csr_array(matrix), landing=None, sinks=np.zeros((n + 1, 2)))
     parts = classes(chain)
-    assert [part.cells.mask.nonzero()[0].tolist() for part in parts if part.closed] == [
-        [0],
-        [1],
-        [2],
-        [8],
-        [9],
-        [10],
-    ]
+    closed = [part.cells.mask.nonzero()[0].tolist() for part in parts if part.closed]
+    assert closed == [[0], [1], [2], [8], [9], [10]]
     found = absorption(chain, np.zeros(n + 1, dtype=bool))
     # from 3 .. 7 a ruin between 2 and 8
     share = (np.arange(3, 8) - 2) / 6.0
