@@ -233,11 +233,8 @@ class Place:
 
     def fill(self) -> None:
         source, copy = Path(limitsets.__file__).parent, self.copy / "limitsets"
-        for part in (
-            "base",
-            "numbers",
-            "systems/maps",
-        ):  # the box kernels of the maps stand on the wings below
+        # the box kernels of the maps stand on the wings below
+        for part in ("base", "numbers", "systems/maps"):
             shutil.copytree(source / part, copy / part, ignore=shutil.ignore_patterns("__pycache__"))
         (copy / "systems" / "__init__.py").touch()
         shutil.copy(source / "__init__.py", copy / "__init__.py")
@@ -258,15 +255,9 @@ class Place:
         file = self.user / "script.py"
         file.write_text(script)
         # No bytecode: Python tells two versions of a file apart by second and size alone.
-        env = {
-            **os.environ,
-            "PYTHONPATH": str(self.copy),
-            "NUMBA_CACHE_DIR": str(self.cache),
-            "PYTHONDONTWRITEBYTECODE": "1",
-        }
-        done = subprocess.run(
-            [sys.executable, str(file)], env=env, cwd=self.user, capture_output=True, text=True, check=False
-        )
+        env = {**os.environ, "PYTHONPATH": str(self.copy), "NUMBA_CACHE_DIR": str(self.cache)}
+        how = {"env": env | {"PYTHONDONTWRITEBYTECODE": "1"}, "cwd": self.user, "text": True}
+        done = subprocess.run([sys.executable, str(file)], capture_output=True, check=False, **how)
         assert done.returncode == 0, done.stderr
         found: dict[str, Any] = json.loads(done.stdout)
         return found
@@ -291,19 +282,13 @@ def life(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 @pytest.mark.parametrize("name", ANSWERS)
-def test_a_first_process_compiles_and_a_second_one_loads(life: dict[str, Any], name: str) -> None:
+def test_a_first_process_compiles_a_second_loads_and_an_edit_gives_the_new_number(
+    life: dict[str, Any], name: str
+) -> None:
     assert life["first"][name] == [ANSWERS[name], 0]
     assert life["again"][name] == [ANSWERS[name], 0 if name in NOT_KEPT else 1]
-
-
-@pytest.mark.parametrize("name", ANSWERS)
-def test_an_edit_gives_the_new_number(life: dict[str, Any], name: str) -> None:
     assert life["edited"][name] == [ANSWERS_AFTER[name], 0]
-
-
-@pytest.mark.parametrize("name", ANSWERS)
-def test_an_edit_undone_gives_the_old_number_from_the_disk(life: dict[str, Any], name: str) -> None:
-    assert life["back"][name] == life["again"][name]
+    assert life["back"][name] == life["again"][name]  # undone, from the disk
 
 
 @pytest.fixture
@@ -420,9 +405,8 @@ def test_a_generic_for_proofs_stays_uncontracted_inside_an_estimate() -> None:
     assert (out == expected).all()
     estimate(Weight(0.1), x, out)
     assert not FUSED.search(machine_code(exact))
-    assert bool(FUSED.search(machine_code(estimate))) == bool(
-        FUSED.search(machine_code(_compiled_estimate())),
-    )
+    fused = FUSED.search(machine_code(_compiled_estimate()))
+    assert bool(FUSED.search(machine_code(estimate))) == bool(fused)
 
 
 def _plain_sum(a: float, b: float, c: float) -> float:

@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.face.cli.arguments import bounds_of
-from tests.cli.command import run
+from tests.cli.command import documented, json_of, names_in, prints, refusal, run
 from tests.fitting.machines import ABOVE, ALONG, HEIGHT, RADIUS, farthest, film
 
 # ----------------------------------------------------------------
@@ -27,39 +26,25 @@ def points_of(scene):
 
 
 def test_words_and_a_scene_that_loads_again(capfd):
-    code, out, _ = run(capfd, "design", "paper-initial", "--critical-points", "10,10,20", "--vary", VARY)
-    assert code == 0
+    out = prints(capfd, "design paper-initial --critical-points 10,10,20 --vary", VARY)
     assert "Reached: every critical point wanted" in out
     assert "condition number of the derivatives: 7.066" in out
-    rows = {
-        line.split()[0]: line.rpartition(")")[2].split()[-5:]
-        if line.strip()[:2] == "r_"
-        else line.split()[1:3]
-        for line in out.splitlines()
-        if line.strip()[:2] in ("pa", "r_")
-    }
-    assert rows["r_0"][:2] == ["19.9999992", "10"]
-    assert rows["part.mass.center.along"][0] == "3.9867006"
+    lines = {line.split()[0]: line for line in out.splitlines() if line.strip()[:2] in ("pa", "r_")}
+    assert lines["r_0"].rpartition(")")[2].split()[-5:][:2] == ["19.9999992", "10"]
+    assert lines["part.mass.center.along"].split()[1] == "3.9867006"
     Path("printed.toml").write_text(out[out.index('name = "') :], encoding="utf-8")
     assert points_of(ls.load("printed.toml")) == pytest.approx([10, 10, 20], abs=1e-9)
-    assert {path.name for path in Path().iterdir()} == {"printed.toml"}
+    assert names_in() == {"printed.toml"}
 
 
 def test_a_file_and_a_folder(capfd):
     words = ("design", "paper-initial", "--critical-points", "25.4 cm,10 in,20", "--vary", VARY)
-    code, out, _ = run(capfd, *words, "-o", "found.toml")
-    assert code == 0
+    out = prints(capfd, *words, "-o", "found.toml")
     assert out.splitlines()[-1] == "scene: found.toml"
     assert points_of(ls.load("found.toml")) == pytest.approx([10, 10, 20], abs=1e-9)
-    code, out, _ = run(capfd, *words, "--stages", "2", "-o", "deep/found", "--json")
-    assert code == 0
+    out = prints(capfd, *words, "--stages", "2", "-o", "deep/found", "--json")
     folder = Path("deep/found")
-    assert {path.name for path in folder.iterdir()} == {
-        "paper-initial-design.toml",
-        "design.json",
-        "design.png",
-        "part.png",
-    }
+    assert names_in(folder) == {"paper-initial-design.toml", "design.json", "design.png", "part.png"}
     record = json.loads(out)
     assert record == json.loads((folder / "design.json").read_text(encoding="utf-8"))
     assert record["reached"] is True
@@ -69,18 +54,12 @@ def test_a_file_and_a_folder(capfd):
     assert (folder / "design.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_near_miss_that_is_written_is_said_to_be_one(capfd):
-    words = ("--critical-points", "10,free,20", "--vary", "throw.speed", "--starts", "0", "-o", "found.toml")
-    code, out, _ = run(capfd, "design", "paper-initial", *words, "--bounds", "throw.speed=:'150 deg/s'")
-    assert code == 1
-    assert out.splitlines()[-1] == "scene: found.toml (the nearest miss, no answer)"
-
-
-def test_not_reached_is_exit_1(capfd):
+def test_not_reached_is_exit_1_and_a_near_miss_that_is_written_is_said_to_be_one(capfd):
     words = ("--critical-points", "10,free,20", "--vary", "throw.speed", "--starts", "0")
-    bounds = ("--bounds", "throw.speed=:'150 deg/s'")
-    code, out, _ = run(capfd, "design", "paper-initial", *words, *bounds)
-    assert code == 1
+    near = ("design paper-initial", *words, "--bounds", "throw.speed=:'150 deg/s'")
+    out = prints(capfd, *near, "-o", "found.toml", code=1)
+    assert out.splitlines()[-1] == "scene: found.toml (the nearest miss, no answer)"
+    out = prints(capfd, *near, code=1)
     assert "Not reached: the nearest found misses by" in out
     assert "name = " not in out
     assert "nearest miss, no answer; add -o FILE.toml" in out
@@ -90,25 +69,27 @@ def test_not_reached_is_exit_1(capfd):
 
 
 @pytest.mark.parametrize(
-    "words",
+    ("words", "said"),
     [
-        ("no-such-scene", "--critical-points", "10,10,20", "--vary", VARY),
-        ("paper-initial", "--critical-points", "10,10", "--vary", VARY),
-        ("paper-initial", "--critical-points", "10,ten,20", "--vary", VARY),
-        ("paper-initial", "--critical-points", "10,10,20", "--vary", "speed"),
-        ("paper-initial", "--critical-points", "10,10,20", "--vary", VARY, "--bounds", "throw.speed=3"),
-        ("paper-initial", "--critical-points", "10,10,20", "--vary", VARY, "-o", "taken/deeper"),
-        ("paper-initial", "--critical-points", "10,10,20", "--vary", VARY, "-o", "taken.toml/found.toml"),
-        ("paper-initial", "--vary", VARY),
+        ("no-such-scene --critical-points 10,10,20", ""),
+        ("paper-initial --critical-points 10,10", ""),
+        ("paper-initial --critical-points 10,ten,20", ""),
+        ("paper-initial --critical-points 10,10,20 --vary speed", ""),
+        ("paper-initial --critical-points 10,10,20 --bounds throw.speed=3", ""),
+        ("paper-initial --critical-points 10,10,20 -o taken/deeper", ""),
+        ("paper-initial --critical-points 10,10,20 -o taken.toml/found.toml", ""),
+        ("paper-initial", "give one of them"),
+        ("paper-designed --robust --critical-points 10,10,20", "give one of them"),
+        ("paper-designed --robust --bounds 'arm.length=20 in'", "QUANTITY=LOWEST:HIGHEST"),
+        ("paper-designed --robust --bounds 'arm.length=:20 in'", "a lower and a higher one"),
+        ("paper-designed --robust --vary arm.legnth", "arm.length"),
     ],
 )
-def test_bad_input_is_exit_2(capfd, words):
+def test_bad_input_is_exit_2(capfd, words, said):
     Path("taken").write_text("a file")
     Path("taken.toml").write_text("a file")
-    code, out, err = run(capfd, "design", *words)
-    assert code == 2
-    assert out == ""
-    assert err
+    vary = () if "--robust" in words or "--vary" in words else ("--vary", VARY)
+    assert said in refusal(capfd, f"design {words}", *vary)
 
 
 def test_bare_bounds_are_in_the_unit_of_the_scenes_text():
@@ -135,23 +116,10 @@ def test_bounds_that_are_turned_round_are_refused(word):
 def test_a_search_writes_scene_answer_and_figure(here, capfd):
     tree = ls.load("paper-designed").as_dict() | {"tolerance": {"throw.speed": "1 %"}}
     ls.dump(ls.load(tree), "given.toml")
-    code, out, _ = run(
+    record = json_of(
         capfd,
-        "design",
-        "given.toml",
-        "--robust",
-        "--evaluations",
-        "4",
-        "--vary",
-        "part.mass.center.along,throw.kappa",
-        "--seconds",
-        "0",
-        "--out",
-        "found",
-        "--json",
+        "design given.toml --robust --evaluations 4 --vary part.mass.center.along,throw.kappa --seconds 0 --out found",
     )
-    assert code == 0
-    record = json.loads(out)
     assert record["margins"] == []
     assert {path.name for path in Path("found").iterdir()} == {
         "paper-designed-robust.toml",
@@ -169,40 +137,22 @@ def test_a_search_writes_scene_answer_and_figure(here, capfd):
 @pytest.mark.sweep
 def test_the_scene_alone(capfd):
     words = ("--robust", "--evaluations", "20", "--seconds", "0", "-o", "found.toml")
-    code, out, _ = run(capfd, "design", "paper-designed", *words)
-    assert code == 0
+    out = prints(capfd, "design paper-designed", *words)
     assert out.splitlines()[-1] == "scene: found.toml"
     assert [path.name for path in Path().iterdir()] == ["found.toml"]
     assert ls.load("found.toml").value("throw.kappa") > 0
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ((), "give one of them"),
-        (("--robust", "--critical-points", "10,10,20", "--vary", "throw.speed"), "give one of them"),
-        (("--robust", "--bounds", "arm.length=20 in"), "QUANTITY=LOWEST:HIGHEST"),
-        (("--robust", "--bounds", "arm.length=:20 in"), "a lower and a higher one"),
-        (("--robust", "--vary", "arm.legnth"), "arm.length"),
-    ],
-)
-def test_what_it_refuses(here, capfd, words, says):
-    code, _, err = run(capfd, "design", "paper-designed", *words)
-    assert code == 2
-    assert says in err
-
-
 def test_where_nothing_is_found_the_nearest_miss_is_written(capfd):
     words = ("--robust", "--bounds", "part.mass.center.along=0.1:0.2", "--evaluations", "20")
-    code, out, _ = run(capfd, "design", "paper-designed", *words, "-o", "missed")
-    assert code == 1
+    out = prints(capfd, "design paper-designed", *words, "-o", "missed", code=1)
     assert "nearest miss" in out
     assert "none that feeds among" in out
     assert out.splitlines()[-1] == "scene: missed/paper-designed-robust.toml (the nearest miss, no answer)"
     record = json.loads(Path("missed/design.json").read_text(encoding="utf-8"))
     assert sum(record["ruled_out"].values()) == record["evaluations"]
     assert ls.load(record["scene"]) == ls.load("missed/paper-designed-robust.toml")
-    code, out, _ = run(capfd, "design", "paper-designed", *words, "--json", "--csv", "missed.csv")
+    code, out, _ = run(capfd, "design paper-designed", *words, "--json", "--csv", "missed.csv")
     assert (code, set(json.loads(out))) == (1, set(record))
     assert "nearest miss" in Path("missed.csv").read_text(encoding="utf-8")
 
@@ -211,7 +161,6 @@ def test_where_nothing_is_found_the_nearest_miss_is_written(capfd):
 # `limitsets fit`: words, JSON as docs/json.md has it, files, exit codes.
 
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "json.md"
 TRUTH = {"throw.kappa": 25.6, ALONG: 4.25, ABOVE: 0.69, HEIGHT: -0.21, RADIUS: 1.25}
 
 
@@ -222,25 +171,12 @@ def throws():
     lines = ["x_before [mm],side_before,x_after [mm],side_after"]
     columns = (made.x_before * 25.4, made.side_before, made.x_after * 25.4, made.side_after)
     lines += [f"{x!r},{i},{y!r},{j}" for x, i, y, j in zip(*(each.tolist() for each in columns), strict=True)]
-    path = Path("throws.csv")
-    path.write_text("\n".join(lines), encoding="utf-8")
-    return path
-
-
-def keys_in_docs():
-    """The keys that docs/json.md gives for `fit`."""
-    section = DOCS.read_text(encoding="utf-8").split("## fit\n")[1].split("\n## ")[0]
-    heads = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
-    return {key for head in heads for key in re.findall(r"`(\w+)`", head)}
+    Path("throws.csv").write_text("\n".join(lines), encoding="utf-8")
 
 
 def test_json_has_the_keys_of_the_docs(capfd, throws):
-    code, out, _ = run(
-        capfd, "fit", "paper-designed", str(throws), "--error", "0.508 mm", "--no-margin", "--json"
-    )
-    assert code == 0
-    record = json.loads(out)
-    assert set(record) == keys_in_docs()
+    record = json_of(capfd, "fit paper-designed throws.csv", "--error", "0.508 mm", "--no-margin")
+    assert set(record) == documented("fit")
     assert record["unit"] == "in"
     assert record["error"] == 0.02
     assert record["throws"] == len(record["residuals"]) == 50
@@ -257,26 +193,8 @@ def test_json_has_the_keys_of_the_docs(capfd, throws):
 
 
 def test_a_table_and_files(capfd, throws):
-    words = (
-        "fit",
-        "paper-designed",
-        str(throws),
-        "--error",
-        "0.02",
-        "--no-margin",
-        "-o",
-        "out",
-        "--csv",
-        "t.csv",
-    )
-    code, out, _ = run(capfd, *words)
-    assert code == 0
-    assert {path.name for path in Path("out").iterdir()} == {
-        "fitted.toml",
-        "fit.json",
-        "part.png",
-        "residuals.png",
-    }
+    out = prints(capfd, "fit paper-designed throws.csv --error 0.02 --no-margin -o out --csv t.csv")
+    assert names_in("out") == {"fitted.toml", "fit.json", "part.png", "residuals.png"}
     rows = list(csv.DictReader(Path("t.csv").read_text(encoding="utf-8").splitlines()))
     speed = rows[0]
     assert speed["quantity"] == "throw.speed"
@@ -291,7 +209,7 @@ def test_a_table_and_files(capfd, throws):
 
 @pytest.mark.sweep
 def test_whether_the_margin_is_enough(capfd, throws):
-    code, out, _ = run(capfd, "fit", "paper-designed", str(throws), "--error", "0.508 mm", "--json")
+    code, out, _ = run(capfd, "fit paper-designed throws.csv", "--error", "0.508 mm", "--json")
     record = json.loads(out)
     judged = record["enough"]
     assert set(judged) == {"verdict", "sentences", "repeats", "margins", "together", "beyond"}
@@ -314,6 +232,4 @@ def test_whether_the_margin_is_enough(capfd, throws):
     ],
 )
 def test_bad_input_is_exit_2_of_fit(capfd, throws, words, said):
-    code, out, err = run(capfd, "fit", *words)
-    assert (code, out) == (2, "")
-    assert said in err
+    assert said in refusal(capfd, "fit", *words)

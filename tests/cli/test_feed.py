@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from tests.cli.command import run
+from tests.cli.command import DOCS, json_of, prints, refusal, run
 from tests.feeding.own_throws import thrown
 from tests.feeding.scenes import with_cavity
 from tests.plates import left_by_some
@@ -21,6 +22,8 @@ from tests.scene.test_load import BOTH, chamfered
 
 # ----------------------------------------------------------------
 # `limitsets feed`: words, JSON, files, exit codes.
+
+PAGE = (DOCS / "json.md").read_text(encoding="utf-8")
 
 
 def written(name, **changes):
@@ -31,8 +34,7 @@ def written(name, **changes):
 def test_words_files_and_exit(capfd):
     file = written("paper-designed", rate="2 Hz")
     quick = ("--trials", "200")
-    code, out, _ = run(capfd, "feed", file, *quick, "-o", "fed")
-    assert code == 0
+    out = prints(capfd, "feed", file, *quick, "-o", "fed")
     assert "the arm ends at x = 20 in, side 2 is wanted" in out
     assert "safety: PROVED" in out
     assert "within 786 throws" in out
@@ -43,12 +45,8 @@ def test_words_files_and_exit(capfd):
 @pytest.mark.sweep
 def test_json_alone_and_noise(capfd):
     file = written("paper-designed")
-    code, out, _ = run(
-        capfd, "feed", file, "--json", "--no-proof", "--scatter", "landing.x=0.1 in", "--law", "bounded",
-        "--trials", "50", "--seed", "4",
-    )  # fmt: skip
-    assert code == 0
-    table = json.loads(out)
+    words = "--no-proof --scatter 'landing.x=0.1 in' --law bounded --trials 50 --seed 4"
+    table = json_of(capfd, f"feed {file} {words}")
     assert table["safety"] is None
     assert table["scatter"] == {"landing": "Uniform(bound=0.1)"}
     assert table["trials"]["seed"] == 4
@@ -59,15 +57,13 @@ def test_json_alone_and_noise(capfd):
 def test_the_certificate_is_written_and_rechecked(capfd):
     file = written("paper-designed", position="20.5 in")
     quick = ("--trials", "50", "--certificate", "fed.proof.zip")
-    code, out, _ = run(capfd, "feed", file, *quick)
-    assert code == 0
+    out = prints(capfd, "feed", file, *quick)
     assert "certificate: fed.proof.zip, rechecked in" in out
-    code, out, _ = run(capfd, "recheck", "fed.proof.zip")
-    assert code == 0
+    out = prints(capfd, "recheck fed.proof.zip")
     assert "feeds: the arm ends at x = 20.5 in" in out
     assert "feeds: PROVED" in out
-    code, out, _ = run(capfd, "feed", file, *quick, "--no-recheck", "--json")
-    assert json.loads(out)["certificate"] == {"file": "fed.proof.zip", "denied": False, "recheck": None}
+    record = json_of(capfd, "feed", file, *quick, "--no-recheck")
+    assert record["certificate"] == {"file": "fed.proof.zip", "denied": False, "recheck": None}
 
 
 def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
@@ -82,8 +78,7 @@ def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
 
     monkeypatch.setattr(writing, "section_of", too_few)
     quick = ("--trials", "50", "--certificate", "fed.proof.zip")
-    code, out, _ = run(capfd, "feed", file, *quick)
-    assert code == 1
+    out = prints(capfd, "feed", file, *quick, code=1)
     assert "progress: UNDECIDED, the checker denies it: side 0, cell" in out
     assert "the checker denies the certificate: it is kept as fed.denied.zip" in out
     assert Path("fed.denied.zip").exists()
@@ -106,15 +101,12 @@ def test_a_run_that_is_ended_leaves_no_draft():
 
 
 def test_not_proved_is_exit_1(capfd):
-    code, out, _ = run(capfd, "feed", written("paper-initial"), "--trials", "50")
-    assert code == 1
+    out = prints(capfd, "feed", written("paper-initial"), "--trials", "50", code=1)
     assert "safety: REFUTED" in out
 
 
 def test_a_scene_without_a_cavity_is_told_so(capfd):
-    code, _, err = run(capfd, "feed", "paper-designed")
-    assert code == 2
-    assert "add [cavity]" in err
+    assert "add [cavity]" in refusal(capfd, "feed paper-designed")
 
 
 @pytest.mark.sweep
@@ -124,24 +116,19 @@ def test_many_parts_at_once(capfd):
     tables = {"world": {"friction": 0.9, "throw_rate": "2 Hz"}, "effects": {"contact": True}}
     ls.dump(with_cavity("paper-designed", tables=tables), "many.toml")
     quick = ("--no-proof", "--trials", "20", "--parts", "2", "--batches", "2")
-    code, out, _ = run(capfd, "feed", "many.toml", *quick, "--json")
-    assert code == 0
+    out = prints(capfd, "feed many.toml", *quick, "--json")
     crowds = json.loads(out)["crowds"]
-    page = (Path(__file__).resolve().parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
-    line = next(line for line in page.splitlines() if line.startswith("| `crowds`"))
+    line = next(line for line in PAGE.splitlines() if line.startswith("| `crowds`"))
     named = re.search(r"`\{(.*?)\}`", line).group(1).split(", ")
     for crowd, between in zip(crowds, (True, False), strict=True):
         assert list(crowd) == named
         assert (crowd["parts"], crowd["batches"], crowd["between"]) == (2, 2, between)
         rate = crowd["right_per_throw"]["value"]
         assert crowd["right_per_minute"] == pytest.approx(120.0 * rate)
-    code, out, _ = run(capfd, "feed", "many.toml", *quick)
-    assert code == 0
+    out = prints(capfd, "feed many.toml", *quick)
     assert "2 parts at once that push each other (arm: hinge):" in out
     assert "right per throw" in out
-    code, _, err = run(capfd, "feed", written("paper-designed"), *quick)
-    assert code == 2
-    assert "effects.contact" in err
+    assert "effects.contact" in refusal(capfd, "feed", written("paper-designed"), *quick)
 
 
 # ----------------------------------------------------------------
@@ -150,27 +137,29 @@ def test_many_parts_at_once(capfd):
 
 def test_certify_exits_with_0_where_all_that_is_laid_down_is_proved(capfd):
     ls.dump(ls.load(left_by_some()), "left.toml")
-    assert run(capfd, "certify", "left.toml", "--claim", "goal")[0] == 1
+    prints(capfd, "certify left.toml --claim goal", code=1)
     scene = ls.load("left.toml")
     words = "--laid", f"2={0.4 * scene.arm_length}:{0.5 * scene.arm_length}"
-    code, out, _ = run(capfd, "certify", "left.toml", *words, "--json")
+    code, out, _ = run(capfd, "certify left.toml", *words, "--json")
     (record,) = json.loads(out)
     assert (code, record["verdict"], list(record["starts"])) == (0, "proved", ["within"])
     assert record["laid"] == record["starts"]["within"]
-    code, out, _ = run(capfd, "recheck", "left.proof.zip")
+    code, out, _ = run(capfd, "recheck left.proof.zip")
     assert (code, out.splitlines()[-1]) == (0, "PROVED")
 
 
 def test_certify_says_where_parts_are_laid_down(capfd):
-    code, out, _ = run(capfd, "certify", "paper-designed", "--laid", "0=8:20", "--laid", "2=12:40 cm")
-    assert code == 0
+    out = prints(capfd, "certify paper-designed --laid 0=8:20 --laid '2=12:40 cm'")
     assert "x = 8 to 20 in on side 0, x = 4.72441 to 15.748 in on side 2" in out
     assert "attracts-all" not in out
 
 
 @pytest.mark.parametrize(
-    ("word", "said"),
-    [
+    "command", [*(f"{name} paper-designed" for name in ("certify", "margin", "robustness")), "feed fed.toml"]
+)
+def test_bad_ranges_are_refused_in_a_line(capfd, command):
+    ls.dump(with_cavity(), "fed.toml")
+    for word, said in (
         ("0", "SIDE=LO:HI"),
         ("0=8", "SIDE=LO:HI"),
         ("0=8:9:10", "SIDE=LO:HI"),
@@ -182,24 +171,14 @@ def test_certify_says_where_parts_are_laid_down(capfd):
         ("0=1:8", "tips over the joint"),
         ("0=8:28.001", "the arm's end"),
         ("0=8:9 deg", "deg"),
-    ],
-)
-@pytest.mark.parametrize("command", ["certify", "margin", "robustness", "feed"])
-def test_bad_ranges_are_refused_in_a_line(capfd, command, word, said):
-    scene = "paper-designed"
-    if command == "feed":
-        scene = "fed.toml"
-        ls.dump(with_cavity(), scene)
-    code, out, err = run(capfd, command, scene, "--laid", word)
-    assert (code, out) == (2, "")
-    assert said in err
-    assert len(err.splitlines()) == 1
+    ):
+        assert said in refusal(capfd, command, "--laid", word)
 
 
 def test_critical_points_have_no_starts(capfd):
-    code, _, err = run(capfd, "design", "paper-designed", "--critical-points", "10,10,20", "--laid", "0=8:9")
-    assert code == 2
-    assert "critical points have no starts" in err
+    assert "critical points have no starts" in refusal(
+        capfd, "design paper-designed --critical-points 10,10,20 --laid 0=8:9"
+    )
 
 
 def test_a_design_is_asked_for_what_is_laid_down_alone(capfd):
@@ -213,8 +192,8 @@ def test_a_design_is_asked_for_what_is_laid_down_alone(capfd):
     record = json.loads(out)
     assert (code, record["verdict"]) == (0, "proved")
     assert record["room"] > 0.0 >= record["room_before"]
-    assert run(capfd, "certify", "found.toml", "--claim", "goal", *laid)[0] == 0
-    assert run(capfd, "recheck", "found.proof.zip")[0] == 0
+    prints(capfd, "certify found.toml --claim goal", *laid)
+    prints(capfd, "recheck found.proof.zip")
     # apart from the package: every part that is laid down comes beyond X, on side 2 alone, and none leaves the arm
     scene = ls.load("found.toml")
     x, side = np.linspace(120.0, 150.0, 3001), np.full(3001, 2)
@@ -230,15 +209,12 @@ def test_a_design_is_asked_for_what_is_laid_down_alone(capfd):
 def test_feed_says_where_parts_are_laid_down(capfd):
     ls.dump(with_cavity(), "fed.toml")
     words = "--laid", "0=6:14", "--trials", "50", "--certificate", "fed.proof.zip"
-    code, out, _ = run(capfd, "feed", "fed.toml", *words)
-    assert code == 0
+    out = prints(capfd, "feed fed.toml", *words)
     assert "where parts are laid down: x = 6 to 14 in on side 0" in out
     assert "no start that is laid down feeds another side than 2" in out
     assert "every start that is laid down is fed within" in out
     assert Path("fed.proof.zip").exists()
-    code, _, err = run(capfd, "feed", "fed.toml", "--laid", "0=6:21")
-    assert code == 2
-    assert "up to the end of the arm, 20 in" in err
+    assert "up to the end of the arm, 20 in" in refusal(capfd, "feed fed.toml --laid 0=6:21")
 
 
 # ----------------------------------------------------------------
@@ -263,8 +239,7 @@ def without_lines():
 
 def test_analyse_says_in_its_first_line_what_it_switched_on(capfd):
     without_lines()
-    code, out, _ = run(capfd, "analyse", "chamfered.toml", "--cells", "512", "-o", "found")
-    assert code == 0
+    out = prints(capfd, "analyse chamfered.toml --cells 512 -o found")
     assert out.splitlines()[0] == f"{FIRST} landing = true and roll = true in [effects]"
     page = Path("found/report.md").read_text(encoding="utf-8")
     assert "**Switched on landing and roll: the part cannot rest on side 3" in page.split("\n\n")[1]
@@ -279,49 +254,35 @@ def test_analyse_says_in_its_first_line_what_it_switched_on(capfd):
 
 def test_with_the_lines_nothing_is_switched_on_and_nothing_said(capfd):
     written_chamfer()
-    code, out, err = run(capfd, "analyse", "chamfered.toml", "--cells", "512", "-o", "found", "--json")
+    code, out, err = run(capfd, "analyse chamfered.toml --cells 512 -o found --json")
     assert code == 0
     assert "switched on" not in err
     assert json.loads(out)["effects"]["tipping"] == []
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("certify", "chamfered.toml"),
-        ("throw", "chamfered.toml", "--x", "20", "--side", "0"),
-        ("audit", "chamfered.toml"),
-        ("margin", "chamfered.toml"),
-    ],
-)
-def test_all_others_name_the_lines(words, capfd):
+def test_all_others_name_the_lines(capfd):
     without_lines()
-    code, out, err = run(capfd, *words)
-    assert (code, out) == (2, "")
-    assert "the part cannot rest on side 3" in err
-    assert "add landing = true and roll = true to [effects]" in err
+    for command in ("certify", "throw --x 20 --side 0", "audit", "margin"):
+        err = refusal(capfd, f"{command} chamfered.toml")
+        assert "the part cannot rest on side 3" in err
+        assert "add landing = true and roll = true to [effects]" in err
 
 
 @pytest.mark.sweep
 def test_with_the_lines_all_of_them_go(capfd):
     written_chamfer(goal={"stays_on_arm": True})
     for kind in ("part", "limit-set", "map", "basins", "morse", "flight"):
-        assert run(capfd, "plot", "chamfered.toml", kind, "-o", f"{kind}.png")[0] == 0
+        prints(capfd, "plot chamfered.toml", kind, "-o", f"{kind}.png")
     titles = [axes.get_title() for axes in ls.plot.map(ls.load("chamfered.toml")).axes]
     assert titles[3] == "on side 3: no part rests there"
-    code, out, _ = run(
-        capfd, "throw", "chamfered.toml", "--x", "20", "--side", "0", "--count", "50", "--json"
-    )
+    code, out, _ = run(capfd, "throw chamfered.toml --x 20 --side 0 --count 50 --json")
     sides = {row["side"] for row in json.loads(out)}
     assert code == 0
     assert sides == {0, 1, 2, 4}
-    code, out, _ = run(capfd, "audit", "chamfered.toml", "--json")
-    assert code == 0
+    out = prints(capfd, "audit chamfered.toml --json")
     assert 3 not in {row["side"] for row in json.loads(out)}
     assert all("3" not in row["ranges"] for row in json.loads(out))
-    code, _, err = run(capfd, "throw", "chamfered.toml", "--x", "20", "--side", "3")
-    assert code == 2
-    assert "tips over on side 3" in err
+    assert "tips over on side 3" in refusal(capfd, "throw chamfered.toml --x 20 --side 3")
 
 
 # ----------------------------------------------------------------
@@ -332,22 +293,18 @@ LAWS = ("bounded", "gaussian")
 WITHOUT = "of the scene without its scatter"
 
 # A latch of 2 mm steel with a weight: parts leave the arm towards the joint from one start in ten.
-LATCH = {
-    "name": "latch",
-    "part": {
-        "vertices": [[f"{x} mm", f"{y} mm"] for x, y in ((0, 0), (120, 0), (140, 60), (25, 85))],
-        "mass": {
-            "plate_density": "7850 kg/m^3",
-            "plate_thickness": "2 mm",
-            "points": [{"x": "100 mm", "y": "12 mm", "mass": "45 g"}],
-        },
-    },
-    "arm": {"surface_height": "-12 mm", "length": "650 mm"},
-    "throw": {"speed": "38 rpm"},
-    "gravity": {"acceleration": "9.81 m/s^2"},
-    "goal": {"oriented_beyond": {"x": "443 mm", "side": 0}},
-    "world": {"scatter": {"speed": "0.4 %", "landing": "1 mm"}},
-}
+LATCH = tomllib.loads("""
+name = "latch"
+part.vertices = [["0 mm", "0 mm"], ["120 mm", "0 mm"], ["140 mm", "60 mm"], ["25 mm", "85 mm"]]
+part.mass.plate_density = "7850 kg/m^3"
+part.mass.plate_thickness = "2 mm"
+part.mass.points = [{ x = "100 mm", y = "12 mm", mass = "45 g" }]
+arm = { surface_height = "-12 mm", length = "650 mm" }
+throw.speed = "38 rpm"
+gravity.acceleration = "9.81 m/s^2"
+goal.oriented_beyond = { x = "443 mm", side = 0 }
+world.scatter = { speed = "0.4 %", landing = "1 mm" }
+""")
 
 
 def scattering(law, scene="paper-designed"):
@@ -364,19 +321,15 @@ def latch(law):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_margin_of_a_scene_that_scatters_is_that_of_the_scene_without_its_scatter(law):
+def test_a_margin_of_a_scene_that_scatters_is_that_of_the_scene_without_its_scatter(capfd, law):
     """Bounded scatter was refused, and normal scatter gave 0 because "there is no such part or throw"."""
     (plain,) = ls.margin("paper-designed", "throw.speed", width=0.1)
     (found,) = ls.margin(scattering(law), "throw.speed", width=0.1)
     assert (found.proved, found.refuted) == (plain.proved, plain.refuted)
     assert found.model.left_out == ("scatter",)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_margin_in_the_shell_says_that_the_scatter_is_left_out(capfd, law):
     ls.dump(scattering(law), "mine.toml")
-    code, out, _ = run(capfd, "margin", "mine.toml", "throw.speed", "--width", "0.1")
-    assert code == 1  # proved of another scene than the one that was asked about
+    # proved of another scene than the one that was asked about
+    out = prints(capfd, "margin mine.toml throw.speed --width 0.1", code=1)
     assert WITHOUT in out.splitlines()[0]
     (row,) = (line.split() for line in out.splitlines() if line.startswith(" throw.speed"))
     proved, refuted = (float(word) for word in row if re.fullmatch(r"[0-9.]+", word))
@@ -428,16 +381,16 @@ def test_feed_says_what_ends_a_part_and_how_throws_scatter(capfd):
     tree = with_cavity("paper-designed").as_dict()
     world = {"scatter": {"speed": "0.5 %", "landing": "0.02 in"}, "throw_rate": "2 Hz"}
     ls.dump(ls.load(tree | {"world": world, "effects": {"spread": "gaussian"}}), "mine.toml")
-    _, out, _ = run(capfd, "feed", "mine.toml", "--trials", "2000", "--no-level", "--no-proof")
+    _, out, _ = run(capfd, "feed mine.toml --trials 2000 --no-level --no-proof")
     assert "or comes to lie where its throw acts beyond the end: " in out
     assert "speed: normal, standard deviation 0.5 %; landing: normal, standard deviation 0.02 in" in out
 
 
 def test_a_deviation_without_its_unit_is_told_of_percent(capfd):
     """Only units of a speed were allowed, of which nobody gives the scatter."""
-    _, _, err = run(capfd, "feed", "paper-designed", "--scatter", "throw.speed=0.4")
+    _, _, err = run(capfd, "feed paper-designed --scatter throw.speed=0.4")
     assert '"<decimal number> %" or an angular speed' in err
-    _, _, err = run(capfd, "certify", "paper-designed", "--noise", "landing.x=1")
+    _, _, err = run(capfd, "certify paper-designed --noise landing.x=1")
     assert "%" not in err  # a share of a landing means nothing
 
 

@@ -17,13 +17,12 @@ from limitsets.feeder.engine.crowd import depth_of_overlap
 from limitsets.feeder.engine.member import Film
 from limitsets.feeder.engine.stage import OVERLAP
 from limitsets.systems.maps import images
-from tests.studies.test_studies import STUDIES
+from tests.feeding.scenes import with_cavity
 
 pytest.importorskip("pymunk")
 
 DESIGNED, INITIAL = ls.load("paper-designed"), ls.load("paper-initial")
-CAVITY = {"position": "20 in", "width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"}
-FED = ls.load({**DESIGNED.as_dict(), "cavity": CAVITY})
+FED = with_cavity()
 STUDY_02 = 8.8e-5
 """Worst error of x' in that study, at its step."""
 
@@ -31,13 +30,6 @@ STUDY_02 = 8.8e-5
 def by_map(scene, x, side, factor=1.0):
     found = images(scene.map._replace(kappa=scene.map.kappa * factor), np.array([x]), side)
     return float(found.x[0]), int(found.side[0])
-
-
-def test_the_cavity_is_the_committed_one():
-    import tomllib
-
-    sizes = tomllib.loads((STUDIES / "sizes.toml").read_text(encoding="utf-8"))
-    assert sizes["cavity"] == CAVITY
 
 
 @pytest.mark.parametrize("scene", [DESIGNED, INITIAL], ids=["designed", "initial"])
@@ -108,9 +100,15 @@ def polygon(count, radius=1.0, **words):
     return ls.load({**tree, "part": {"vertices": corners, "mass": mass}, **words})
 
 
-def collide(one, two, masses, poses, velocities, **how):
-    """Let two parts meet in the air; states just before and after, and the last centres of mass."""
-    crowd = Crowd([one, two], friction=1.0, masses=masses, step=1e-4, **how)
+def kinetic(state, masses, inertia):
+    """Energy of motion."""
+    parts = zip(masses, state, strict=True)
+    return 0.5 * sum(m * (v[0] ** 2 + v[1] ** 2 + inertia * v[2] ** 2) for m, v in parts)
+
+
+def collide(part, masses, poses, velocities, **how):
+    """Let two like parts meet in the air; states just before and after, and the last centres of mass."""
+    crowd = Crowd([part, part], friction=1.0, masses=masses, step=1e-4, **how)
     for number, pose in enumerate(poses):
         crowd.drop(number, pose)
         crowd.members[number].body.velocity = velocities[number]
@@ -121,7 +119,7 @@ def collide(one, two, masses, poses, velocities, **how):
         if crowd.overlapped:
             break
     after = [(*body.velocity, body.angular_velocity) for body in bodies]
-    gained = -one.kappa * crowd.step
+    gained = -part.kappa * crowd.step
     before = [(across, up + gained, rate) for across, up, rate in before]  # what gravity adds in that step
     return np.array(before), np.array(after), [tuple(body.position) for body in bodies]
 
@@ -131,9 +129,8 @@ def test_a_central_impact_of_two_parts(e):
     """v1' = v1 - (1 + e) m2/(m1 + m2) (v1 - v2), and nothing across without friction."""
     square = polygon(4)
     poses = [(5.0, 40.0, 0.0), (5.0 + math.sqrt(2.0) + 0.05, 40.0, 0.0)]
-    before, after, _ = collide(
-        square, square, (1.0, 3.0), poses, [(4.0, 1.0), (-2.0, 1.0)], sliding=0.0, restitution=e
-    )
+    how = {"sliding": 0.0, "restitution": e}
+    before, after, _ = collide(square, (1.0, 3.0), poses, [(4.0, 1.0), (-2.0, 1.0)], **how)
     share = (1 + e) * 6.0 / 4.0
     assert after[0, 0] == pytest.approx(4.0 - 3.0 * share, abs=1e-9)
     assert after[1, 0] == pytest.approx(-2.0 + share, abs=1e-9)
@@ -147,9 +144,8 @@ def test_an_impact_off_the_centre(e):
     half, lift = math.cos(math.pi / 4), 0.3
     # the left one stands on a corner, which meets the other's upright side 0.3 above its middle
     poses = [(5.0, 40.0, math.pi / 4), (5.0 + 1.0 + half + 0.02, 40.0 - lift, 0.0)]
-    before, after, _ = collide(
-        square, square, masses, poses, [(3.0, 0.0), (0.0, 0.0)], sliding=0.0, restitution=e
-    )
+    how = {"sliding": 0.0, "restitution": e}
+    before, after, _ = collide(square, masses, poses, [(3.0, 0.0), (0.0, 0.0)], **how)
     compliance = 1.0 / masses[0] + 1.0 / masses[1] + lift**2 / (inertia * masses[1])
     impulse = (1 + e) * 3.0 / compliance
     expected = [(3.0 - impulse, 0.0), (impulse / masses[1], -lift * impulse / (inertia * masses[1]))]
@@ -159,14 +155,8 @@ def test_an_impact_off_the_centre(e):
         )  # the corner has turned by no more than that
         assert after[number, 2] == pytest.approx(rate, abs=2e-3)
 
-    def energy(state):
-        total = sum(
-            m * (v[0] ** 2 + v[1] ** 2 + inertia * v[2] ** 2) for m, v in zip(masses, state, strict=True)
-        )
-        return 0.5 * total
-
     lost = 0.5 * (1 - e * e) * 9.0 / compliance
-    assert energy(before) - energy(after) == pytest.approx(lost, abs=6e-3)
+    assert kinetic(before, masses, inertia) - kinetic(after, masses, inertia) == pytest.approx(lost, abs=6e-3)
 
 
 @pytest.mark.parametrize("sliding", [0.0, 0.6])
@@ -176,26 +166,19 @@ def test_impacts_keep_momentum_and_its_moment_about_the_joint(sliding, e):
     for _ in range(10):
         angles, off = random.uniform(0, math.tau, 2), random.uniform(-1.5, 1.5)
         poses = [(5.0, 60.0, angles[0]), (15.5, 60.0 + off, angles[1])]
-        before, after, places = collide(
-            DESIGNED, DESIGNED, masses, poses, [(6.0, 0.0), (-5.0, 0.0)], sliding=sliding, restitution=e
-        )
+        how = {"sliding": sliding, "restitution": e}
+        before, after, places = collide(DESIGNED, masses, poses, [(6.0, 0.0), (-5.0, 0.0)], **how)
         changes = []
         for state in (before, after):
             momentum = sum(m * v[:2] for m, v in zip(masses, state, strict=True))
-            moment = sum(
-                m * (x * v[1] - y * v[0] + inertia * v[2])
-                for m, v, (x, y) in zip(masses, state, places, strict=True)
-            )
+            each = zip(masses, state, places, strict=True)
+            moment = sum(m * (x * v[1] - y * v[0] + inertia * v[2]) for m, v, (x, y) in each)
             changes.append(np.array([*momentum, moment]))
         assert np.abs(after - before).max() > 0.1
         assert changes[1][:2] == pytest.approx(changes[0][:2], abs=1e-9)
         # the two points of a contact lie apart by the overlap, a step's way at most: friction has that lever
         assert changes[1][2] == pytest.approx(changes[0][2], abs=1e-9 if sliding == 0.0 else 0.05)
-        kinetic = [
-            sum(m * (v[0] ** 2 + v[1] ** 2 + inertia * v[2] ** 2) for m, v in zip(masses, state, strict=True))
-            for state in (before, after)
-        ]
-        assert kinetic[1] <= kinetic[0] + 1e-9
+        assert kinetic(after, masses, inertia) <= kinetic(before, masses, inertia) + 1e-9
 
 
 @pytest.mark.parametrize("contact", ["hinge", "unilateral"])
@@ -239,11 +222,8 @@ def test_a_part_in_motion_in_the_cavity_is_not_marked_as_ejected():
     film = Film(True, 1.0, [])
     for where in ("cavity", "unfinished", "cavity", "arm"):
         film.end(1.0, [Rest(0, where, 25.0, -1, (25.0, -3.0, 0.0), ())])
-    assert [(at, word) for at, _, word in film.marks] == [
-        (1.0, "in the cavity"),
-        (4.0, "ejected"),
-        (4.0, "rest"),
-    ]
+    marks = [(at, word) for at, _, word in film.marks]
+    assert marks == [(1.0, "in the cavity"), (4.0, "ejected"), (4.0, "rest")]
 
 
 @pytest.mark.parametrize("beyond", [0.05, 0.4, 1.2])
@@ -328,16 +308,14 @@ def test_parts_that_overlap_at_the_start_are_refused():
 
 
 def test_a_cavity_that_does_not_take_the_part():
-    shallow = ls.load({**FED.as_dict(), "cavity": {**CAVITY, "depth": "2 in"}})
     with pytest.raises(AnswerError, match="standing out by"):
-        seat_of(shallow, 2)
+        seat_of(with_cavity(depth="2 in"), 2)
     with pytest.raises(AnswerError, match=r"without \[cavity\]"):
         seat_of(DESIGNED, 2)
 
 
-@pytest.mark.parametrize(
-    ("scenes", "words", "said"),
-    [
+def test_wrong_calls_are_refused():
+    for scenes, words, said in (
         ([DESIGNED, INITIAL], {"friction": 1.0}, "kappa of the scenes"),
         ([DESIGNED, FED], {"friction": 1.0}, "cavity of the scenes"),
         ([DESIGNED], {}, "world.friction"),
@@ -346,11 +324,9 @@ def test_a_cavity_that_does_not_take_the_part():
         ([DESIGNED], {"friction": 1.0, "contact": "glue"}, "'hinge' or 'unilateral'"),
         ([DESIGNED], {"friction": 1.0, "restitution": 2.0}, "0 to 1"),
         ([DESIGNED], {"friction": 1.0, "step": 0.1}, "at most 0.05"),
-    ],
-)
-def test_wrong_calls_are_refused(scenes, words, said):
-    with pytest.raises(AnswerError, match=said):
-        Crowd(scenes, **words)
+    ):
+        with pytest.raises(AnswerError, match=said):
+            Crowd(scenes, **words)
 
 
 @pytest.mark.parametrize("place", [(3.0, 2), (29.0, 2), (10.0, 3)])

@@ -15,7 +15,7 @@ from limitsets.feeder.engine import compare, throw
 from limitsets.feeder.engine.crowd import depth_of_overlap
 from limitsets.feeder.engine.depression import EMPTY, UNFINISHED, Motion, Plate, fall_speed
 from limitsets.feeder.engine.member import ground_of
-from limitsets.feeder.engine.stage import IDLE, _bounce, _stick, set_up, settle, slides_back
+from limitsets.feeder.engine.stage import IDLE, _bounce, _stick, fly, set_up, settle, slides_back
 from limitsets.feeder.engine.throwing import accelerate
 from tests.feeding.scenes import with_cavity
 
@@ -145,9 +145,8 @@ def test_a_missing_engine_is_named_with_its_remedy(monkeypatch):
         throw(DESIGNED, 15.0, 2)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
+def test_wrong_calls_are_refused():
+    for words, said in (
         ({"contact": "glue"}, "'hinge' or 'unilateral'"),
         ({"friction": 0.5}, "a hinge has none"),
         ({"contact": "unilateral", "friction": 0.5, "rolls": True}, "rolls anyway"),
@@ -158,28 +157,20 @@ def test_a_missing_engine_is_named_with_its_remedy(monkeypatch):
         ({"contact": "unilateral", "friction": math.inf}, "a number from 0"),
         ({"contact": "unilateral", "friction": 1.0, "restitution": 1.5}, "0 to 1"),
         ({"step": 0.0}, "above 0"),
-    ],
-)
-def test_wrong_calls_are_refused(words, said):
-    with pytest.raises(AnswerError, match=said):
-        throw(DESIGNED, 15.0, 2, **words)
+    ):
+        with pytest.raises(AnswerError, match=said):
+            throw(DESIGNED, 15.0, 2, **words)
 
 
-def test_a_side_the_part_has_not():
+def test_sides_that_do_not_fit_the_part_or_the_starts():
     with pytest.raises(MapError, match="from 0 to 2"):
         throw(DESIGNED, 15.0, 3)
-
-
-def test_sides_that_do_not_fit_the_starts():
     with pytest.raises(AnswerError, match="a side per start"):
         compare(DESIGNED, [8.0, 9.0], [0, 1, 2])
 
 
 # ----------------------------------------------------------------
 # Rolling, bouncing, strokes and unilateral contact in the engine, against mechanics written out here.
-
-
-pytest.importorskip("pymunk")
 
 
 @pytest.mark.parametrize("x", [19.0, 19.5, 19.95])
@@ -266,8 +257,6 @@ def test_when_an_impact_slides_back(friction, back):
     mu A < |B| up to mu = 0.563; the impulse that stops it lies outside the cone of 0.5, and in that of 0.54.
     """
     stage = set_up(DESIGNED, 14.1501654661399, 2)
-    from limitsets.feeder.engine.stage import fly
-
     fly(stage, 60.0)
     assert slides_back(stage, stage.body.velocity, stage.body.angular_velocity, friction) == back
 
@@ -285,8 +274,6 @@ def test_what_is_seen_of_unilateral_contact():
 # ----------------------------------------------------------------
 # One part and one depression: free fall, impact, friction and rest by textbook mechanics.
 
-
-pytest.importorskip("pymunk")
 
 PART = ls.load("paper-designed")
 STILL = Motion(0.0, 0.0, 0.0)
@@ -478,13 +465,8 @@ def test_the_cavity_is_that_of_the_scene(depth):
 
 def test_depressions_are_cut_into_the_arm():
     ground = ground_of(ls.load("paper-designed"), depressions=[(15.0, 7.0, 1.5), (2.0, 7.0, 1.0)])
-    assert [round(surface(ground, x), 9) for x in (1.0, 5.0, 12.0, 18.0, 25.0)] == [
-        -0.2,
-        -1.2,
-        -0.2,
-        -1.7,
-        -0.2,
-    ]
+    heights = [round(surface(ground, x), 9) for x in (1.0, 5.0, 12.0, 18.0, 25.0)]
+    assert heights == [-0.2, -1.2, -0.2, -1.7, -0.2]
     assert [ground.is_arm(x) for x in (1.0, 5.0, 12.0)] == [True, False, True]
     solid = [piece.corners.tolist() for piece in ground.pieces]
     pairs = [(one, two) for k, one in enumerate(solid) for two in solid[:k]]

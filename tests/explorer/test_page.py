@@ -1,9 +1,6 @@
 """The page without a browser: what a visitor does, and what is shown then."""
 
-import json
 import math
-import subprocess
-import sys
 import time
 from typing import NamedTuple
 
@@ -161,10 +158,8 @@ def test_throws_of_the_limit_set_that_land_on_another_vertex_are_said(page):
     page.beat()
     _, reach = page._found.sets[0][0][-1]
     assert ls.analysis.other_vertex_first(page.scene)[0][0][0] < reach  # on side 0 alone
-    assert (
-        "careful: of some throws of the limit set from side 0 another vertex lands first"
-        in page._careful.object
-    )
+    careful = "careful: of some throws of the limit set from side 0 another vertex lands first"
+    assert careful in page._careful.object
 
 
 def test_a_point_mass_has_a_slider(page):
@@ -178,13 +173,8 @@ def test_a_point_mass_has_a_slider(page):
 
 
 def test_what_a_browser_sends_as_a_place_may_be_anything(page):
-    for sent in (
-        None,
-        "tap",
-        {},
-        {"what": "tap", "x": "1", "y": 2},
-        {"what": "tap", "x": 1.0, "y": math.inf},
-    ):
+    places = {"what": "tap", "x": "1", "y": 2}, {"what": "tap", "x": 1.0, "y": math.inf}
+    for sent in (None, "tap", {}, *places):
         page.lanes.canvas._handle_msg(sent)
     assert page._film is None
     page.lanes.canvas._handle_msg({"what": "tap", "x": 21.0, "y": -2.0})
@@ -396,20 +386,3 @@ def test_the_address_is_printed(monkeypatch, capsys):
 def test_any_other_address_needs_the_names_of_who_may_come():
     with pytest.raises(LimitsetsError, match="allowed origins"):
         ls.explore(ls.maps.Henon()).show(address="0.0.0.0", show=False)
-
-
-def test_without_the_extra_one_line_names_it():
-    script = (
-        "import sys; sys.modules['panel'] = None; from limitsets.__main__ import main; sys.argv[1:] = ['explore'];"
-        "sys.exit(main())"
-    )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert "pip install 'limitsets[explore]'" in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-
-
-def test_neither_the_package_nor_analyse_loads_panel():
-    script = "import sys, json, limitsets, limitsets.face.cli.app; print(json.dumps(sorted(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert not {"panel", "bokeh"} & set(json.loads(done.stdout))

@@ -88,9 +88,8 @@ def written(folder: Path) -> dict[str, Any]:
             found[name] = certificate(file)
         elif file.suffix in (".csv", ".toml", ".md"):
             lines = file.read_text(encoding="utf-8").splitlines()
-            found[name] = [
-                line for line in lines if not re.fullmatch(r"\| [\w ,-]+ \| \d+\.\d{3} \|", line)
-            ]  # seconds
+            seconds = re.compile(r"\| [\w ,-]+ \| \d+\.\d{3} \|")
+            found[name] = [line for line in lines if not seconds.fullmatch(line)]
         elif file.suffix == ".zarr":
             import xarray
 
@@ -111,10 +110,8 @@ def of_commands(name: str, scene: Any, lines: tuple[str, ...], folder: Path) -> 
         out.mkdir()
         words = [word.replace("SCENE", str(file)).replace("OUT", str(out)) for word in shlex.split(line)]
         code, record, said = command(*words)
-        yield (
-            f"{name}: {line}",
-            plain({"exit": code, "json": record, "said": said if code == 2 else ""} | written(out), str(own)),
-        )
+        answer = {"exit": code, "json": record, "said": said if code == 2 else ""} | written(out)
+        yield f"{name}: {line}", plain(answer, str(own))
 
 
 def of_scenes(folder: Path) -> Iterator[tuple[str, Any]]:
@@ -186,14 +183,9 @@ def of_map(name: str, chosen: Any, grid: Any, claims: list[str]) -> Iterator[tup
         graph = ls.transitions(chosen, grid, method)
         found = ls.attractors(graph, throws=200)
         basins = ls.basins(graph, found)
-        yield (
-            f"{name}: {method}",
-            {
-                "edges": [digest(each) for each in graph.ranges if isinstance(each, np.ndarray)],
-                "attractors": json.loads(as_json(list(found))),
-                "basins": json.loads(as_json(basins)),
-            },
-        )
+        edges = [digest(each) for each in graph.ranges if isinstance(each, np.ndarray)]
+        sets = {"attractors": json.loads(as_json(list(found))), "basins": json.loads(as_json(basins))}
+        yield f"{name}: {method}", {"edges": edges, **sets}
     asks: dict[str, Callable[[], Any]] = {
         "certify": lambda: ls.certify(chosen, grid, claims=claims),
         "basin entropy": lambda: ls.resilience.basin_entropy(graph, found, box=4),

@@ -107,15 +107,9 @@ def blocks(page: Path, language: str) -> list[str]:
 
 def pages_with(language: str) -> list:
     """List the pages that have such blocks; long programs belong to the sweep."""
-    return [
-        pytest.param(
-            page,
-            marks=[pytest.mark.sweep] if language == "python" and page.stem not in SHORT else [],
-            id=page.stem,
-        )
-        for page in PAGES_BLOCKS
-        if blocks(page, language)
-    ]
+    found = [page for page in PAGES_BLOCKS if blocks(page, language)]
+    long = [page for page in found if language == "python" and page.stem not in SHORT]
+    return [pytest.param(page, marks=[pytest.mark.sweep] * (page in long), id=page.stem) for page in found]
 
 
 @pytest.mark.parametrize("page", PAGES_BLOCKS, ids=lambda page: page.stem)
@@ -133,9 +127,8 @@ def test_python_runs(page, tmp_path):
     program = tmp_path / "page.py"
     body = "\n".join(blocks(page, "python"))
     program.write_text(body, encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, program.name], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    how = {"cwd": tmp_path, "capture_output": True, "text": True, "check": False}
+    done = subprocess.run([sys.executable, program.name], **how)
     assert done.returncode == 0, done.stderr
 
 
@@ -174,11 +167,8 @@ def test_options_are_there(page):
 
 
 def merged(below: dict, above: dict) -> dict:
-    both = {
-        key: merged(below[key], above[key])
-        for key in below.keys() & above.keys()
-        if isinstance(above[key], dict)
-    }
+    inner = [key for key in below.keys() & above.keys() if isinstance(above[key], dict)]
+    both = {key: merged(below[key], above[key]) for key in inner}
     return {**below, **above, **both}
 
 
@@ -206,21 +196,15 @@ def text(page):
 def test_the_index_lists_every_page_notebook_and_study_once():
     links = re.findall(r"^\* \[[^]]+\]\(([^)]+)\)", text("index.md"), re.M)
     top = DOCS.parent
-    pages = [
-        *DOCS.glob("*.md"),
-        *top.glob("notebooks/*.ipynb"),
-        *top.glob("studies/*/README.md"),
-        *top.glob("*.md"),
-    ]
+    places = ("docs/*.md", "notebooks/*.ipynb", "studies/*/README.md", "*.md")
+    pages = [page for place in places for page in top.glob(place)]
     assert sorted((DOCS / link).resolve() for link in links) == sorted(set(pages) - {DOCS / "index.md"})
 
 
 def test_the_reference_lists_every_public_name_and_room():
     listed = re.findall(r"^   limitsets\.(\w+)$", text("reference.md"), re.M)
-    rooms = {name for name, place in limitsets._PUBLIC.items() if ":" not in place} - INNER | {
-        "proofs",
-        "checker",
-    }
+    rooms = {name for name, place in limitsets._PUBLIC.items() if ":" not in place} - INNER
+    rooms |= {"proofs", "checker"}
     assert sorted(listed) == sorted({*limitsets.__all__} | rooms)
 
 
@@ -262,11 +246,9 @@ for space in NAMESPACES:
     TOP |= names_of(import_module(f"limitsets.{space}"), f"ls.{space}")
 ROOMS = dict(TOP)
 for room, place in limitsets._PUBLIC.items():
-    if (
-        ":" not in place
-        and room not in INNER_DOCSTRINGS
-        and hasattr(import_module(f"limitsets.{place}"), "__all__")
-    ):
+    if ":" in place or room in INNER_DOCSTRINGS:
+        continue
+    if hasattr(import_module(f"limitsets.{place}"), "__all__"):
         ROOMS |= names_of(import_module(f"limitsets.{place}"), f"ls.{room}")
 CLASSES = {name: thing for name, thing in ROOMS.items() if inspect.isclass(thing)}
 FUNCTIONS = {name: thing for name, thing in TOP.items() if inspect.isfunction(inspect.unwrap(thing))}
@@ -285,10 +267,8 @@ def section(thing, title):
 
 def entries(thing, *titles):
     """What sections describe, by name: what stands behind the colon."""
-    lines = [
-        line for title in titles for line in section(thing, title) or () if line and not line[0].isspace()
-    ]
-    named = (line.partition(" : ") for line in lines)
+    lines = [line for title in titles for line in section(thing, title) or ()]
+    named = (line.partition(" : ") for line in lines if line and not line[0].isspace())
     return {name.strip().lstrip("*"): kind for names, _, kind in named for name in names.split(",")}
 
 
@@ -324,9 +304,7 @@ def test_functions_have_an_example(name):
 @pytest.mark.parametrize("name", sorted(CLASSES))
 def test_classes_describe_their_fields(name):
     thing = CLASSES[name]
-    own = (
-        [each.name for each in fields(thing)] if is_dataclass(thing) else list(getattr(thing, "_fields", ()))
-    )
+    own = [each.name for each in fields(thing)] if is_dataclass(thing) else getattr(thing, "_fields", ())
     told = set().union(*(entries(each, "Attributes", "Parameters") for each in thing.__mro__))
     assert not {each for each in own if not each.startswith("_")} - told
 

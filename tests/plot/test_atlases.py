@@ -144,11 +144,8 @@ def test_surfaces_show_the_largest_attractor_and_nothing_where_there_is_none(fee
 
 
 def test_the_line_of_the_goal_parts_what_holds_from_what_does_not(feeders):
-    (line,) = [
-        each
-        for each in ls.plot.atlas_surface(feeders, "threshold").axes[0].collections
-        if each.get_gid() == "level"
-    ]
+    collections = ls.plot.atlas_surface(feeders, "threshold").axes[0].collections
+    (line,) = [each for each in collections if each.get_gid() == "level"]
     data = feeders.dataset
     for x, y in line.get_paths()[0].vertices[::5]:
         near = data.threshold.sel({"throw.speed": x, "arm.surface_height": y}, method="nearest")
@@ -175,11 +172,8 @@ def test_the_map_has_a_line_where_the_goal_ends_with_ticks_where_it_fails(goal):
             turned = complex(x1 - x0, y1 - y0) / size * complex(math.cos(angle), math.sin(angle))
             for side, inside in ((1, True), (-1, False)):  # two pixels of the atlas off
                 off = 40.0 * side
-                x, y = (
-                    figure.axes[0]
-                    .transData.inverted()
-                    .transform((0.5 * (x0 + x1) + off * turned.real, 0.5 * (y0 + y1) + off * turned.imag))
-                )
+                beside = 0.5 * (x0 + x1) + off * turned.real, 0.5 * (y0 + y1) + off * turned.imag
+                x, y = figure.axes[0].transData.inverted().transform(beside)
                 near = float(threshold.sel({"throw.speed": x, "arm.surface_height": y}, method="nearest"))
                 if not math.isnan(near):
                     assert ((near > 20.0) if goal == "oriented_beyond" else (near < 20.0)) == inside
@@ -250,27 +244,21 @@ def test_one_quantity_is_a_line():
     assert image_of(ls.plot.atlas(found)).get_array().shape[:2] == (1, 7)
 
 
-@pytest.mark.parametrize(
-    ("variable", "side", "words"),
-    [
+def test_what_is_no_surface(feeders):
+    for variable, side, words in (
         ("class", None, "the variable to draw"),
         ("nothing", None, "the variable to draw"),
         ("reach", None, "the side of reach"),
         ("reach", 3, "the side of reach"),
         ("threshold", 0, "the side of threshold"),
-    ],
-)
-def test_what_is_no_surface(feeders, variable, side, words):
-    with pytest.raises(AnswerError, match=words):
-        ls.plot.atlas_surface(feeders, variable, side)
+    ):
+        with pytest.raises(AnswerError, match=words):
+            ls.plot.atlas_surface(feeders, variable, side)
 
 
 def test_an_atlas_without_classes():
-    found = ls.atlas(
-        "paper-designed",
-        "throw.kappa=25.3778518:26:2",
-        task="limitsets.parameters.atlas.examples:critical_points",
-    )
+    task = "limitsets.parameters.atlas.examples:critical_points"
+    found = ls.atlas("paper-designed", "throw.kappa=25.3778518:26:2", task=task)
     with pytest.raises(AnswerError, match=r"one with the variable class, .* with ls\.plot\.atlas_surface"):
         ls.plot.atlas(found)
 
@@ -278,9 +266,8 @@ def test_an_atlas_without_classes():
 def test_a_surface_of_a_map_with_one_side_needs_no_side():
     """A fixed point of the logistic map lies at 1 - 1/r."""
     found = ls.atlas(ls.maps.Logistic(2.5), "r=2:2.8:3", variables=["reach", "share"], domain=[(0.0, 1.0)])
-    (line, *_) = [
-        line for line in ls.plot.atlas_surface(found, "reach").axes[0].lines if len(line.get_ydata()) == 3
-    ]
+    lines = ls.plot.atlas_surface(found, "reach").axes[0].lines
+    (line, *_) = [line for line in lines if len(line.get_ydata()) == 3]
     assert line.get_ydata() == pytest.approx([0.5, 1 - 1 / 2.4, 1 - 1 / 2.8])
 
 
@@ -322,8 +309,7 @@ def test_against_t_or_another_quantity(thrown):
     assert figure.axes[0].get_xlim() == (0.0, 1.0)
     with pytest.raises(AnswerError, match=r"arm\.length"):
         ls.plot.bifurcation(thrown, "arm.length")
-    plane = ls.continuation(
-        TwoState(1.0), {"r": (0.8, 0.9)}, steps=1, cells=16, domain=[(-2.0, 2.0), (-2.0, 2.0)]
-    )
+    square = [(-2.0, 2.0), (-2.0, 2.0)]
+    plane = ls.continuation(TwoState(1.0), {"r": (0.8, 0.9)}, steps=1, cells=16, domain=square)
     with pytest.raises(AnswerError, match="one-dimensional"):
         ls.plot.bifurcation(plane)

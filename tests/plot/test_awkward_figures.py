@@ -17,12 +17,9 @@ from tests.plot.artists import drawn, named
 def many_sides(count=12):
     """A regular polygon, which can rest on every side: more than ten of them."""
     turns = [2 * math.pi * (k - 0.5) / count - math.pi / 2 for k in range(count)]
+    corners = [[f"{40 * math.cos(t):.6f} mm", f"{40 * math.sin(t):.6f} mm"] for t in turns]
     return {
-        "name": "dozen",
-        "part": {
-            "vertices": [[f"{40 * math.cos(t):.6f} mm", f"{40 * math.sin(t):.6f} mm"] for t in turns],
-            "mass": {"plate_density": "3 kg/m^2"},
-        },
+        "part": {"vertices": corners, "mass": {"plate_density": "3 kg/m^2"}},
         "arm": {"surface_height": "-2 mm", "length": "600 mm"},
         "throw": {"kappa": "200 mm"},
     }
@@ -30,11 +27,8 @@ def many_sides(count=12):
 
 @pytest.mark.parametrize(("kappa", "x"), [("14 in", 27.0), ("20 in", 50.0)])
 def test_titles_of_a_high_throw_stay_in_their_panels(kappa, x):
-    tree = ls.load("paper-designed").as_dict() | {
-        "throw": {"kappa": kappa},
-        "arm": {"surface_height": "-0.2 in", "length": "120 in"},
-    }
-    made = drawn(ls.plot.flight(ls.load(tree), x, 2))
+    high = {"throw.kappa": kappa, "arm.length": "120 in"}
+    made = drawn(ls.plot.flight(ls.load("paper-designed").with_values(high), x, 2))
     left, right = (axes.title if axes.get_title() else axes._left_title for axes in made.axes)
     boxes = [text.get_window_extent() for text in (left, right)]
     assert made.axes[0].get_position().y0 == made.axes[1].get_position().y0  # they stand beside each other
@@ -109,10 +103,8 @@ def test_basins_in_the_plane_show_the_attractor():
     made = drawn(ls.plot.basins(graph, shares, found))
     pictures = [each for axes in made.axes for each in named(axes, "attractor")]
     assert len(pictures) == len(found) * graph.grid.sides
-    shown = sum(
-        int(np.asarray(each.get_array()).astype(bool)[~np.ma.getmaskarray(each.get_array())].sum())
-        for each in pictures
-    )
+    arrays = [each.get_array() for each in pictures]
+    shown = sum(int(np.asarray(each).astype(bool)[~np.ma.getmaskarray(each)].sum()) for each in arrays)
     assert shown == sum(len(each.cells) for each in found)
     assert "the limit set itself" in [text.get_text() for text in made.legends[0].get_texts()]
     with pytest.raises(AnswerError, match="attractors"):
@@ -131,18 +123,16 @@ def test_the_morse_graph_names_the_unit():
 
 def test_the_morse_graph_of_the_plane_shows_both_axes():
     graph, found, _ = plane()
-    (attracting,) = [
-        text.get_text() for text in ls.plot.morse(graph).axes[0].texts if "$x_1$" in text.get_text()
-    ][:1]
+    texts = [text.get_text() for text in ls.plot.morse(graph).axes[0].texts]
+    attracting = next(text for text in texts if "$x_1$" in text)
     assert "$x_0$" in attracting
     assert found[0].cells.extents(axis=1)
 
 
 def test_the_morse_graph_of_a_map_without_sides_names_none_and_stays_legible():
     """An arrow to a way out runs behind the words of another node."""
-    graph = ls.transitions(
-        ls.maps.Leslie(), ls.grid([(-0.001, 90.0), (-0.001, 70.0)], depth=12), "corners-padded"
-    )
+    rectangle = ls.grid([(-0.001, 90.0), (-0.001, 70.0)], depth=12)
+    graph = ls.transitions(ls.maps.Leslie(), rectangle, "corners-padded")
     words = named(ls.plot.morse(graph).axes[0], "words")
     assert words
     for each in words:

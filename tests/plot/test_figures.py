@@ -61,9 +61,8 @@ def test_limit_set(source):
     count = len(found.scene.sides)
     figure = plot.limit_set(found.scene, found.limit_sets)
     (axes,) = figure.axes
-    bars = sorted(
-        (-round(bar.get_y()), bar.get_x(), bar.get_x() + bar.get_width()) for bar in named(axes, "limit set")
-    )
+    drawn_bars = named(axes, "limit set")
+    bars = sorted((-round(bar.get_y()), bar.get_x(), bar.get_x() + bar.get_width()) for bar in drawn_bars)
     wanted = sorted((side, lo, hi) for side, parts in found.extents[0].items() for lo, hi in parts)
     assert bars == [pytest.approx(each) for each in wanted]
     assert len(named(axes, "limit set again")) == len(found.extents[0][0])
@@ -73,9 +72,8 @@ def test_limit_set(source):
     lines = named(axes, "critical point")
     marks = sorted((-round(float(np.mean(line.get_ydata()))), line.get_xdata()[0]) for line in lines)
     assert marks == [(side, point.x) for side, points in found.critical_points.items() for point in points]
-    assert [label.get_text() for label in axes.get_yticklabels()][:count] == [
-        f"side {side}" for side in range(count)
-    ]
+    labels = [label.get_text() for label in axes.get_yticklabels()][:count]
+    assert labels == [f"side {side}" for side in range(count)]
     assert axes.get_ylim()[0] < -count
     assert found.scene.unit in axes.get_xlabel()
     assert found.scene.name in axes.get_title(loc="left")
@@ -113,8 +111,6 @@ def test_what_can_be_drawn():
 
 
 def test_axes_of_ones_own():
-    from matplotlib.figure import Figure
-
     mine = Figure()
     axes = mine.subplots()
     found = analysed("paper-initial")
@@ -222,9 +218,8 @@ def test_sets_differ_in_grey():
 def chain(length):
     graph = nx.DiGraph()
     for k in range(length):
-        graph.add_node(
-            k, cells=k + 1, attracting=k == 0, extents={0: [(0.0, 1.0)]}, exits=["inward"] if k == 3 else []
-        )
+        exits = ["inward"] if k == 3 else []
+        graph.add_node(k, cells=k + 1, attracting=k == 0, extents={0: [(0.0, 1.0)]}, exits=exits)
     graph.add_edges_from((k + 1, k) for k in range(length - 1))
     return graph
 
@@ -344,13 +339,9 @@ def test_legends_titles_and_axes_stay_apart_and_inside(source):
 
 
 def test_pyplot_is_never_imported():
-    code = (
-        "import sys, limitsets as ls; ls.plot.map(ls.load('paper-designed')); "
-        "print('matplotlib.pyplot' in sys.modules)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True
-    )
+    code = "import sys, limitsets as ls; ls.plot.map(ls.load('paper-designed')); "
+    command = [sys.executable, "-W", "error", "-c", code + "print('matplotlib.pyplot' in sys.modules)"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False"]
 
 
@@ -393,9 +384,8 @@ def test_outline_sides_in_flip_order_centre_masses_arm_and_units():
     assert mass.get_xydata()[0] == pytest.approx((110, 15))
     assert [text.get_text() for text in named(axes, "mass")] == ["60 g"]
     assert named(axes, "arm")
-    assert (
-        named(axes, "measure")[0].get_text() == f"a = {scene.centre[0]:.4g} mm, d = {scene.centre[1]:.4g} mm"
-    )
+    a, d = scene.centre
+    assert named(axes, "measure")[0].get_text() == f"a = {a:.4g} mm, d = {d:.4g} mm"
 
 
 @pytest.mark.parametrize("source", ["paper-designed", "paper-quadrilateral", LEAD])
@@ -403,12 +393,10 @@ def test_names_of_the_sides_keep_off_the_part_and_each_other(source):
     figure = drawn(ls.plot.part(ls.load(source)))
     (axes,) = figure.axes
     (outline,) = named(axes, "part")
-    boxes = [
-        Text.get_window_extent(text) for text in named(axes, "side")
-    ]  # of the words, without their leader
-    assert not any(
-        outline.get_path().transformed(outline.get_transform()).intersects_bbox(box) for box in boxes
-    )
+    # of the words, without their leader
+    boxes = [Text.get_window_extent(text) for text in named(axes, "side")]
+    path = outline.get_path().transformed(outline.get_transform())
+    assert not any(path.intersects_bbox(box) for box in boxes)
     assert not any(one.overlaps(two) for k, one in enumerate(boxes) for two in boxes[:k])
     assert all(figure.bbox.contains(*corner) for box in boxes for corner in box.corners())
 
@@ -420,7 +408,7 @@ def test_a_part_given_by_three_lengths():
 
 def test_plot_part_needs_no_analysis(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    code, out, err = run(capfd, "plot", "paper-designed", "part", "--json")
+    code, out, err = run(capfd, "plot paper-designed part --json")
     assert (code, err) == (0, "")
     assert json.loads(out) == {"figure": "paper-designed-part.png"}
     assert (tmp_path / "paper-designed-part.png").read_bytes().startswith(b"\x89PNG")
@@ -434,12 +422,10 @@ def test_it_is_the_first_figure_of_reports(tmp_path):
     assert (tmp_path / "part.png").exists()
 
 
+CORNERS = [[0, 0], [130, 0], [60, 30], [150, 70]]
+MASS = {"center": {"side": 0, "along": "70 mm", "above": "40 mm"}, "radius_of_gyration": "40 mm"}
 CONCAVE = {
-    "name": "bent",
-    "part": {
-        "vertices": [["0 mm", "0 mm"], ["130 mm", "0 mm"], ["60 mm", "30 mm"], ["150 mm", "70 mm"]],
-        "mass": {"center": {"side": 0, "along": "70 mm", "above": "40 mm"}, "radius_of_gyration": "40 mm"},
-    },
+    "part": {"vertices": [[f"{x} mm", f"{y} mm"] for x, y in CORNERS], "mass": MASS},
     "arm": {"length": "700 mm", "surface_height": "-5 mm"},
     "throw": {"kappa": "640 mm"},
 }
@@ -447,16 +433,15 @@ CONCAVE = {
 
 def test_a_part_that_is_refused_is_drawn_as_it_is_written(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text = ls.dump(ls.load("paper-designed")).replace(
-        '"5.75 in"', '"50 in"'
-    )  # longer than the other two together
+    # longer than the other two together
+    text = ls.dump(ls.load("paper-designed")).replace('"5.75 in"', '"50 in"')
     (tmp_path / "needle.toml").write_text(text, encoding="utf-8")
-    code, out, err = run(capfd, "plot", "needle.toml", "part")
+    code, out, err = run(capfd, "plot needle.toml part")
     assert (code, out) == (2, "figure: paper-designed-part.png\n")
     assert "part.sides" in err
     assert (tmp_path / "paper-designed-part.png").is_file()
     found = sketch(CONCAVE)
-    assert found.vertices.tolist() == [[0, 0], [130, 0], [60, 30], [150, 70]]
+    assert found.vertices.tolist() == CORNERS
     assert found.centre == (70.0, 40.0)
     axes = refused_part(found, "the polygon is not convex").axes[0]
     assert [text.get_text() for text in named(axes, "side")][1] == f"side 1: {np.hypot(150, 70):.5g} mm"

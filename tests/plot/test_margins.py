@@ -63,9 +63,12 @@ def test_bars_are_the_brackets():
     bars = sorted(named(axes, "proved"), key=lambda bar: bar.get_y())
     ends = [bar.get_x() + bar.get_width() for bar in bars]
     height, speed, landing = margins
-    assert ends == pytest.approx(
-        [speed.proved, 100 * landing.proved / 3.6, 100 * height.proved / 0.2]  # of the shortest side; of |h|
-    )
+    shares = [
+        speed.proved,
+        100 * landing.proved / 3.6,
+        100 * height.proved / 0.2,
+    ]  # of the shortest side; of |h|
+    assert ends == pytest.approx(shares)
     assert len(named(axes, "refuted")) == 3
     # the numbers beside them never claim more than is known
     words = {round(text.xy[1]): [] for text in named(axes, "number")}
@@ -113,14 +116,10 @@ def test_strips_are_the_ranges(name):
     rows = found.on("domain")
     figure = drawn(ls.plot.audit(found))
     for side, axes in enumerate(figure.axes):
-        broken = sorted(
-            (round(bar.get_y() + bar.get_height() / 2), bar.get_x(), bar.get_x() + bar.get_width())
-            for bar in named(axes, "broken")
-        )
-        wanted = sorted(
-            (row, lo, hi) for row, each in enumerate(rows) for lo, hi in each.ranges.get(side, ())
-        )
-        assert broken == [pytest.approx(each) for each in wanted]
+        bars = [(bar, bar.get_x()) for bar in named(axes, "broken")]
+        broken = sorted((round(b.get_y() + b.get_height() / 2), x, x + b.get_width()) for b, x in bars)
+        wanted = [(row, lo, hi) for row, each in enumerate(rows) for lo, hi in each.ranges.get(side, ())]
+        assert broken == [pytest.approx(each) for each in sorted(wanted)]
         assert len(named(axes, "cannot tell")) == sum(bool(each.missing) for each in rows)
         assert len(named(axes, "holds")) == sum(not each.missing for each in rows)
         sets = sorted((bar.get_x(), bar.get_x() + bar.get_width()) for bar in named(axes, "limit set"))
@@ -236,11 +235,9 @@ VARY = ("part.mass.center.along", "part.mass.center.above", "throw.speed")
 
 def test_bars_are_the_limit_sets_of_each_scene_on_the_way():
     found = ls.design("paper-initial", critical_points=[10, 10, 20], vary=VARY, stages=2)
-    figure = drawn(ls.plot.design(found))
-    (axes,) = figure.axes
-    bars = sorted(
-        (-bar.get_y(), bar.get_x(), bar.get_x() + bar.get_width()) for bar in named(axes, "limit set")
-    )
+    (axes,) = drawn(ls.plot.design(found)).axes
+    drawn_bars = named(axes, "limit set")
+    bars = sorted((-bar.get_y(), bar.get_x(), bar.get_x() + bar.get_width()) for bar in drawn_bars)
     wanted = []
     for scene in found.path:
         (extents,) = (limit.extents for limit in ls.analyse(scene).limit_sets)
@@ -252,7 +249,7 @@ def test_bars_are_the_limit_sets_of_each_scene_on_the_way():
     assert words == ["start", "step 1", "design"]
     assert "kappa" in named(axes, "words")[0].get_text()
     assert len(named(axes, "goal")) == 1
-    assert len({(bar.get_facecolor(), bar.get_hatch()) for bar in named(axes, "limit set")}) == 3
+    assert len({(bar.get_facecolor(), bar.get_hatch()) for bar in drawn_bars}) == 3
 
 
 def test_a_long_way_is_drawn_in_twelve_scenes():

@@ -59,14 +59,9 @@ def test_arrivals_mark_mean_and_quantile(found, thrown):
 
 
 def test_levels_leave_out_what_is_nothing():
-    numbers = {
-        "wrong beyond": np.array([0.0, 1e-3]),
-        "first beyond is wrong": np.zeros(2),
-        "mean throws": np.array([20.0, 21.0]),
-        "95 % throws": np.array([60.0, 61.0]),
-        "escape": np.zeros(2),
-        "lost": np.zeros(2),
-    }
+    numbers = dict.fromkeys(("first beyond is wrong", "escape", "lost"), np.zeros(2))
+    numbers |= {"wrong beyond": np.array([0.0, 1e-3]), "mean throws": np.array([20.0, 21.0])}
+    numbers["95 % throws"] = np.array([60.0, 61.0])
     figure = drawn(ls.plot.noise_levels(Levels(np.array([0.0, 2.0]), numbers), {"noise [%]": 0.5}))
     assert [len(axes.lines) for axes in figure.axes] == [1, 2, 0]
     assert figure.axes[0].lines[0].get_xdata().tolist() == [1.0]
@@ -87,9 +82,8 @@ def test_every_throw_is_drawn_once():
     assert len(panels) == 3
     marks = [line for axes in panels for line in axes.lines]
     assert sum(line.get_xdata().size for line in marks if line.get_marker() in ("o", "^")) == 50
-    assert sum(line.get_xdata().size for line in marks if line.get_marker() == "s") == len(
-        {row for row, *_ in found.misread}
-    )
+    misread = {row for row, *_ in found.misread}
+    assert sum(line.get_xdata().size for line in marks if line.get_marker() == "s") == len(misread)
     flips = sum(line.get_xdata().size for line in marks if line.get_marker() == "^")
     assert flips == int(found.rows.branch.sum())
 
@@ -111,11 +105,8 @@ def test_each_belief_is_a_row(found_policies):
     figure = ls.plot.policy(found_policies)
     for side, axes in enumerate(figure.axes):
         drawn = sorted((round(b.get_y() + 0.28), b.get_x(), b.get_x() + b.get_width()) for b in bars(axes))
-        wanted = sorted(
-            (k, lo, hi)
-            for k, belief in enumerate(found_policies.beliefs())
-            for lo, hi in belief.get(side, [])
-        )
+        beliefs = enumerate(found_policies.beliefs())
+        wanted = sorted((k, lo, hi) for k, belief in beliefs for lo, hi in belief.get(side, []))
         assert np.allclose(np.array(drawn).reshape(-1, 3), np.array(wanted).reshape(-1, 3))
     labels = [text.get_text() for text in figure.axes[0].get_yticklabels()]
     table = found_policies.found.policy.to_json()["states"]
@@ -128,13 +119,8 @@ def test_each_belief_is_a_row(found_policies):
     for k, face in faces.items():
         assert (matplotlib.colors.to_hex(face) == "#ffffff") == (k in stops)
     words = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-    assert words == [
-        "throw: own",
-        "throw: fast",
-        "stop: the part is there",
-        "goal: side 2 from here on",
-        "sensor",
-    ]
+    throws = ["throw: own", "throw: fast", "stop: the part is there"]
+    assert words == [*throws, "goal: side 2 from here on", "sensor"]
 
 
 def test_many_states_are_drawn_without_names_and_no_policy_is_refused(found_policies):
@@ -187,6 +173,5 @@ def test_many_parts_stand_beside_the_chain():
     assert drawn["4 at once that push each other"] == pytest.approx(pushing.share(pushing.right)[0][1:])
     also = pushing.share(pushing.right + pushing.covered)[0][1:]
     assert drawn["the same, also under others"] == pytest.approx(also)
-    assert drawn["4 at once that pass through each other"] == pytest.approx(
-        passing.share(passing.right)[0][1:]
-    )
+    right = passing.share(passing.right)[0][1:]
+    assert drawn["4 at once that pass through each other"] == pytest.approx(right)

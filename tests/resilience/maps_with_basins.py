@@ -50,12 +50,8 @@ def gaps(params, x, side):
     return rest, side, -1 - which
 
 
-ls.register(
-    Gaps,
-    image=gaps,
-    branches=("one", "two", "three", "four"),
-    exits={"first": -1, "second": -2, "third": -3},
-)
+OPEN = {"branches": ("one", "two", "three", "four"), "exits": {"first": -1, "second": -2, "third": -3}}
+ls.register(Gaps, image=gaps, **OPEN)
 
 
 class Sheet(NamedTuple):
@@ -73,13 +69,7 @@ def sheet(params, z, side):
     return (after, 0.5 * z[1]), side, code
 
 
-ls.register(
-    Sheet,
-    image=sheet,
-    dimension=2,
-    branches=("one", "two", "three", "four"),
-    exits={"first": -1, "second": -2, "third": -3},
-)
+ls.register(Sheet, image=sheet, dimension=2, **OPEN)
 
 
 class Wall(NamedTuple):
@@ -105,9 +95,8 @@ def wall_margin(params, z, side):
     return z[0] - params.at
 
 
-ls.register(
-    Wall, image=wall, image_on=wall_on, margin=wall_margin, dimension=3, branches=("before", "beyond")
-)
+TWO_BASINS = {"dimension": 3, "branches": ("before", "beyond")}
+ls.register(Wall, image=wall, image_on=wall_on, margin=wall_margin, **TWO_BASINS)
 
 
 class Turnstile(NamedTuple):
@@ -133,13 +122,8 @@ def turnstile_margin(params, x, side):
     return x - 0.5
 
 
-ls.register(
-    Turnstile,
-    image=turnstile,
-    image_on=turnstile_on,
-    margin=turnstile_margin,
-    branches=("stays", "changes"),
-)
+TURNSTILE = {"image": turnstile, "image_on": turnstile_on, "margin": turnstile_margin}
+ls.register(Turnstile, **TURNSTILE, branches=("stays", "changes"))
 
 
 class Excursion(NamedTuple):

@@ -65,9 +65,8 @@ def test_the_axis_with_most_uncertain_starts_says_what_saturates():
     """No start is uncertain along x_1: the mean over both axes is half the share along x_0, that saturates."""
     graph, attractors = setting(Sheet(1.0, 1.0), [*UNIT, (-1.0, 1.0)], (601, 60))
     found = ls.resilience.uncertainty_exponent(graph, attractors, starts=20_000, seed=1000)
-    assert (
-        2.0 * found.shares[found.fitted].max() <= 0.5 * 0.75 * 1.05
-    )  # two basins alike: 1 - 2 (1/2)^3 = 3/4
+    # two basins alike: 1 - 2 (1/2)^3 = 3/4
+    assert 2.0 * found.shares[found.fitted].max() <= 0.5 * 0.75 * 1.05
     assert abs(found.exponent - 1.0 + math.log(2) / math.log(3)) <= found.error < 0.2
 
 
@@ -166,10 +165,8 @@ def test_fatal_shocks_keep_the_side(method):
         assert found.into == 1 - found.basin
         assert attractors[found.basin].cells.extents().keys() == {side}
     gone = ls.resilience.minimal_fatal_shock(graph, attractors, 1.6, 0)
-    assert (gone.basin, gone.lo) == (
-        "outside",
-        pytest.approx(0.4, abs=2e-3),
-    )  # beyond the border it is out as well
+    # beyond the border it is out as well
+    assert (gone.basin, gone.lo) == ("outside", pytest.approx(0.4, abs=2e-3))
 
 
 def test_fatal_shocks_in_the_plane_are_euclidean():
@@ -369,10 +366,7 @@ def test_entropies_of_starts_lie_in_their_brackets_in_nineteen_of_twenty_cases()
 def test_orbits_of_starts_come_back():
     """A third of the starts stays, a third leaves and comes back, a third leaves for good."""
     graph, attractors = setting(Excursion(5.0), [(0.0, 3.0)], 300)
-    cells, found = (
-        ROOM.basin_stability(graph, attractors),
-        ROOM.basin_stability(graph, attractors, starts=8000),
-    )
+    cells, found = (ROOM.basin_stability(graph, attractors, starts=starts) for starts in (None, 8000))
     assert cells.attractors[0].share == pytest.approx(1.0 / 3.0, abs=0.01)
     assert cells.cut
     assert "border of the domain" in cells.table().caption
@@ -410,10 +404,8 @@ def test_starts_of_ikeda_come_back_to_the_fixed_point():
     left = np.zeros(x.size, dtype=bool)
     for _ in range(1000):
         angle = 0.4 - 6.0 / (1.0 + x * x + y * y)
-        x, y = (
-            1.0 + 0.9 * (x * np.cos(angle) - y * np.sin(angle)),
-            0.9 * (x * np.sin(angle) + y * np.cos(angle)),
-        )
+        c, s = np.cos(angle), np.sin(angle)
+        x, y = 1.0 + 0.9 * (x * c - y * s), 0.9 * (x * s + y * c)
         left |= (np.abs(x - 2.0) > 4.0) | (np.abs(y - 2.0) > 4.0)
     comes = np.hypot(x - 2.97213, y - 4.14595) < 1e-2
     assert comes.mean() - (comes & ~left).mean() > 0.05

@@ -161,19 +161,13 @@ def test_cells_that_come_back_and_leave_may_do_either():
 
 def test_exits_share_the_starts_of_an_open_map():
     graph, attractors = setting(Gaps(3.0, 0.0), [(0.0, 1.0)], 20_011)
-    for found in (
-        ls.resilience.basin_stability(graph, attractors),
-        ls.resilience.basin_stability(graph, attractors, starts=4000),
-    ):
+    for starts in (None, 4000):
+        found = ls.resilience.basin_stability(graph, attractors, starts=starts)
         for name in ("first", "second", "third"):
             assert found.exits[name].lo <= 1.0 / 3.0 <= found.exits[name].hi
             # more than a tenth of the cells is undecided: there is no best value
-            best = (
-                pytest.approx(1.0 / 3.0, abs=0.02)
-                if found.undecided <= 0.1
-                else pytest.approx(math.nan, nan_ok=True)
-            )
-            assert found.exits[name].share == best
+            best = 1.0 / 3.0 if found.undecided <= 0.1 else math.nan
+            assert found.exits[name].share == pytest.approx(best, abs=0.02, nan_ok=True)
 
 
 def test_orbits_leave_the_domain_by_the_exit_of_its_cells():
@@ -226,9 +220,8 @@ def test_shares_and_entropy_in_space():
     assert found.attractors[0].lo <= 0.65 <= found.attractors[0].hi
     border = ls.resilience.boundary_basin_entropy(graph, attractors, box=20)
     assert border.boxes == 4
-    assert (
-        border.hi <= LN2 + 1e-9
-    )  # the undecided cells lead to one of the two at once: nothing stays elsewhere
+    # the undecided cells lead to one of the two at once: nothing stays elsewhere
+    assert border.hi <= LN2 + 1e-9
     assert border.value == pytest.approx(binary(0.3), abs=0.05)
 
 
@@ -360,9 +353,8 @@ def test_a_shift_passes_through_every_cell_that_it_moves_by_a_fine_one(method, s
     graph = ls.transitions(Contraction(1.0, 0.01 * share), cover, method)
     assert len(graph.recurrent_components()) == 100
     assert passing(graph).all() == (share > 1 / 64)
-    if (
-        share > 1 / 64
-    ):  # an image begins in the fine cell so many further on, and the slowest path goes on from there
+    if share > 1 / 64:
+        # an image begins in the fine cell so many further on, and the slowest path goes on from there
         assert (longest_stays(graph) == np.ceil(64 / np.floor(64 * share))).all()
     else:
         assert not longest_stays(graph).any()

@@ -113,14 +113,8 @@ def cubes(params, z, side):
     size = (x * x + y * y) ** 2
     if size == 0.0:
         return (math.nan, math.nan), side, 0
-    return (
-        (
-            (2.0 * x + params.scale * (x * x - y * y) / size) / 3.0,
-            (2.0 * y - params.scale * 2.0 * x * y / size) / 3.0,
-        ),
-        side,
-        0,
-    )
+    u = (2.0 * x + params.scale * (x * x - y * y) / size) / 3.0
+    return (u, (2.0 * y - params.scale * 2.0 * x * y / size) / 3.0), side, 0
 
 
 class Steep(NamedTuple):
@@ -160,17 +154,9 @@ def nothing(params, x, side):
     return math.nan, side, 0
 
 
-for line, image in (
-    (Root, root),
-    (Logarithm, logarithm),
-    (Log2, log_of_size),
-    (Gap, gap),
-    (Newton, newton),
-    (Reciprocal, reciprocal),
-    (Tangent, tangent),
-    (Arch, arch),
-    (Nothing, nothing),
-):
+LINES = (Root, Logarithm, Log2, Gap, Newton, Reciprocal, Tangent, Arch, Nothing)
+IMAGES = (root, logarithm, log_of_size, gap, newton, reciprocal, tangent, arch, nothing)
+for line, image in zip(LINES, IMAGES, strict=True):
     ls.register(line, image=image)
 for plane, image in ((Means, means), (Quotient, quotient), (Cubes, cubes), (Steep, steep), (Disc, disc)):
     ls.register(plane, image=image, dimension=2)
@@ -239,9 +225,8 @@ def contradicted(params, domain, cells, method=None):
     numbers = np.repeat(np.arange(grid.n_cells), 4 if len(domain) == 1 else 2)
     lo, hi = grid.boxes(numbers, 0)
     starts = lo + rng.random(lo.shape) * (hi - lo)
-    end = outcomes(
-        params, grid, starts[:, 0] if len(domain) == 1 else starts, 1000 if len(domain) == 1 else 150
-    )
+    starts, steps = (starts[:, 0], 1000) if len(domain) == 1 else (starts, 150)
+    end = outcomes(params, grid, starts, steps)
     label = shares.labels[numbers]
     staying = np.array([*(each.cells.mask for each in found), np.zeros(grid.n_cells, bool)])
     kept = staying[np.maximum(label, -1), np.maximum(end, 0)] & (end >= 0)
@@ -283,9 +268,8 @@ def test_a_map_without_numbers_has_no_attractor():
 
 
 def test_undefined_is_the_last_exit_of_every_map():
-    assert list(ls.maps.kind_of(ls.load("paper-designed").map).exits) == [
-        "inward", "outward", "outside-model", "undefined",
-    ]  # fmt: skip
+    exits = ["inward", "outward", "outside-model", "undefined"]
+    assert list(ls.maps.kind_of(ls.load("paper-designed").map).exits) == exits
     assert list(ls.maps.kind_of(ls.maps.Henon(1.4, 0.3)).exits) == ["outside", "undefined"]
 
 
@@ -376,9 +360,10 @@ def test_a_chaotic_repeller_is_named_and_its_remedy_works():
     assert "repeller" not in ls.basins(saddle, ls.attractors(saddle, throws=100)).advice
 
 
-@pytest.mark.parametrize(
-    ("method", "how"), [("boxes", "proved"), (None, "from sampled images of cells, not proved")]
-)
+SAMPLED = "from sampled images of cells, not proved"
+
+
+@pytest.mark.parametrize(("method", "how"), [("boxes", "proved"), (None, SAMPLED)])
 def test_a_table_says_whether_its_cells_are_proved(method, how):
     graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid([(-1.2, 1.2)], cells=101), method)
     found = ls.attractors(graph, throws=100)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import json
 import math
 import sys
 import tomllib
@@ -16,7 +15,7 @@ import pytest
 from scipy.stats import binom
 
 import limitsets as ls
-from tests.studies.test_studies import STUDIES, load_study
+from tests.studies.test_studies import expected_of, load_study, readme_of
 
 # ----------------------------------------------------------------
 # The study of accuracy: errors and exponents, never seconds.
@@ -47,7 +46,7 @@ def answer(modules, tmp_path_factory):
 
 
 def expected():
-    return json.loads((FOLDER / "expected.json").read_text(encoding="utf-8"))
+    return expected_of("03_accuracy")
 
 
 @pytest.mark.sweep
@@ -162,15 +161,12 @@ def test_what_leaving_effects_out_is_worth(answer):
 
 
 FOLDER_FIT_STUDY = Path(__file__).resolve().parents[2] / "studies" / "10_fit"
-EXPECTED = json.loads((FOLDER_FIT_STUDY / "expected.json").read_text(encoding="utf-8"))
+EXPECTED = expected_of("10_fit")
 
 
 @pytest.fixture(scope="module")
 def study():
-    spec = importlib.util.spec_from_file_location("study_10_fit", FOLDER_FIT_STUDY / "study.py")
-    loaded = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(loaded)
-    return loaded
+    return load_study("10_fit")
 
 
 @pytest.mark.sweep  # fits of many machines
@@ -206,7 +202,7 @@ def test_the_figure_and_the_bootstrap(study, tmp_path):
 
 @pytest.fixture(scope="module")
 def recorded():
-    return json.loads((STUDIES / "08_atlas" / "expected.json").read_text(encoding="utf-8"))
+    return expected_of("08_atlas")
 
 
 @pytest.fixture(scope="module")
@@ -249,9 +245,8 @@ def test_tongues_of_the_circle_map(study_atlas_study, recorded, tmp_path):
     assert set(range(1, 20)) <= set(recorded["circle"]["periods"])
     refined = [recorded["circle"]["refined"][step] for step in ("4", "8", "16")]
     assert [each["differ"] for each in refined] == sorted(each["differ"] for each in refined)
-    assert [each["computed"] for each in refined] == sorted(
-        (each["computed"] for each in refined), reverse=True
-    )
+    computed = [each["computed"] for each in refined]
+    assert computed == sorted(computed, reverse=True)
     found = study_atlas_study.circle(40, tmp_path)
     assert found["main tongue differs"] == 0
 
@@ -262,16 +257,14 @@ def test_a_row_of_a_class_is_as_wide_as_its_pixels_without_a_gap(study_atlas_stu
 
 
 def test_the_readme_says_what_was_found(recorded):
-    text = " ".join((STUDIES / "08_atlas" / "README.md").read_text(encoding="utf-8").split())
+    text = " ".join(readme_of("08_atlas").split())
     starts = recorded["feeders"]["starts"]
     for share in (*starts.values(), recorded["feeders"]["refined"]["8"]["computed"]):
         assert f"{100 * share:.1f} %" in text
     for step in ("4", "8", "16"):
         each = recorded["circle"]["refined"][step]
-        assert (
-            f"| {step} | {100 * each['computed']:.1f} % | {100 * each['differ']:.2f} % | {each['widest missed']} |"
-            in text
-        )
+        shares = f"{100 * each['computed']:.1f} % | {100 * each['differ']:.2f} %"
+        assert f"| {step} | {shares} | {each['widest missed']} |" in text
     assert f"({100 * recorded['logistic']['undecided']:.1f} % of all)" in text
     assert f"steps of {recorded['logistic']['step']:.4f}" in text
 

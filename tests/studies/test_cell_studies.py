@@ -7,9 +7,10 @@ import pytest
 from scipy.stats import binomtest
 
 import limitsets as ls
-from tests.studies.test_studies import STUDIES, load_study
+from tests.studies.test_studies import STUDIES, expected_of, load_study, of_study, readme_of
 from tests.trays.scenes import SIZES
 
+pytest.importorskip("pymunk")
 pytestmark = pytest.mark.sweep
 
 
@@ -19,7 +20,6 @@ pytestmark = pytest.mark.sweep
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    pytest.importorskip("pymunk")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(STUDIES / "12_assembly"))
         study = load_study("12_assembly")
@@ -30,7 +30,7 @@ def ran(tmp_path_factory):
 def test_as_expected(ran):
     """Counts of the trials that are kept, and of these: intervals of 99.99 % overlap."""
     _, numbers, out = ran
-    expected = json.loads((STUDIES / "12_assembly" / "expected.json").read_text(encoding="utf-8"))
+    expected = expected_of("12_assembly")
     assert set(numbers["cases"]) == set(expected["counts"])
     for case, wanted in expected["counts"].items():
         found, of = numbers["cases"][case]["counts"], sum(wanted.values())
@@ -81,19 +81,14 @@ def test_the_scenes_have_the_committed_sizes():
 # Study 13: what is known beforehand, of parts alone and of parts that pass through each other.
 
 
-pytest.importorskip("pymunk")
-
-
 @pytest.fixture(scope="module")
 def ran_many_parts_study(tmp_path_factory):
-    study = load_study("13_many_parts")
-    out = tmp_path_factory.mktemp("many")
-    return study, study.main(seed=7, out=out, share=0.05), out
+    return of_study("13_many_parts", tmp_path_factory, seed=7, share=0.05)
 
 
 def test_as_expected_of_many_parts_study(ran_many_parts_study):
     _, numbers, out = ran_many_parts_study
-    expected = json.loads((STUDIES / "13_many_parts" / "expected.json").read_text(encoding="utf-8"))
+    expected = expected_of("13_many_parts")
     share = expected["right of single parts"]
     alone = [numbers["pushing"]["1"], *numbers["passing"].values()]
     for row in alone:
@@ -111,16 +106,15 @@ def test_parts_that_push_each_other_feed_fewer(ran_many_parts_study):
     numbers = ran_many_parts_study[1]
     rows = [numbers["pushing"][parts] for parts in ("2", "3", "5", "10")]
     right = sum(row["counts"]["right"] for row in rows)
-    met = binomtest(right, sum(sum(row["counts"].values()) for row in rows)).proportion_ci(
-        0.99, method="exact"
-    )
+    parts = sum(sum(row["counts"].values()) for row in rows)
+    met = binomtest(right, parts).proportion_ci(0.99, method="exact")
     assert met.high < 0.9
     assert all(row["met"] > 0.0 for row in rows)
     assert numbers["pushing"]["200"]["spilled"] > 150
 
 
 def test_the_readme_names_how_the_corner_was_held(ran_many_parts_study):
-    text = (STUDIES / "13_many_parts" / "README.md").read_text(encoding="utf-8")
+    text = readme_of("13_many_parts")
     assert ran_many_parts_study[0].table(ran_many_parts_study[1]).splitlines()[0] in text
     assert "| 1 | hinge, pushing |" in text
     assert "| 1 | unilateral, pushing |" in text
@@ -130,14 +124,9 @@ def test_the_readme_names_how_the_corner_was_held(ran_many_parts_study):
 # Study 14: what it is expected to say, from counts of other seeds and from the sizes that were fixed before.
 
 
-pytest.importorskip("pymunk")
-
-
 @pytest.fixture(scope="module")
 def ran_tray_study(tmp_path_factory):
-    study = load_study("14_tray")
-    out = tmp_path_factory.mktemp("tray")
-    return study, study.main(seed=7, out=out, drops=1200, histories=40), out
+    return of_study("14_tray", tmp_path_factory, seed=7, drops=1200, histories=40)
 
 
 def interval(count, of):
@@ -153,7 +142,7 @@ def test_the_sizes_are_those_that_were_fixed(ran_tray_study):
 
 def test_counts_agree_with_those_of_another_seed(ran_tray_study):
     _, numbers, out = ran_tray_study
-    expected = json.loads((STUDIES / "14_tray" / "expected.json").read_text(encoding="utf-8"))
+    expected = expected_of("14_tray")
     found = numbers["tray"]
     pairs = [(expected["arrivals"], found["arrivals"])]
     pairs += [(expected["kicks"][state], found["kicks"][state]) for state in expected["kicks"]]
@@ -204,7 +193,7 @@ def test_many_parts_stand_beside_the_chain(tmp_path, monkeypatch):
         assert each["pushing"]["met"] == 1.0
         assert each["pushing"]["right"]["value"] < chain["right"]["interval"][0]
     assert (tmp_path / "many_parts.png").stat().st_size > 20_000
-    text = (STUDIES / "14_tray" / "README.md").read_text(encoding="utf-8")
+    text = readme_of("14_tray")
     assert study.table(numbers).splitlines()[0] in text
 
 
@@ -214,14 +203,12 @@ def test_many_parts_stand_beside_the_chain(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def ran_feeding_study(tmp_path_factory):
-    study = load_study("09_feeding")
-    out = tmp_path_factory.mktemp("feeding")
-    return study, study.main(seed=7, out=out, trials=4000, level=False), out
+    return of_study("09_feeding", tmp_path_factory, seed=7, trials=4000, level=False)
 
 
 def test_as_expected_of_feeding_study(ran_feeding_study):
     _, numbers, out = ran_feeding_study
-    expected = json.loads((STUDIES / "09_feeding" / "expected.json").read_text(encoding="utf-8"))
+    expected = expected_of("09_feeding")
     assert set(numbers) == set(expected)
     for case, wanted in expected.items():
         found = numbers[case]
@@ -241,16 +228,14 @@ def test_nothing_fails_within_the_margin(ran_feeding_study):
     for case in ("robust", "designed"):
         trials = ran_feeding_study[1][f"{case}, starts named"]["trials"]
         assert trials["right"] + trials["edge"] == 4000
-        assert (
-            trials["edge"] > 0
-        )  # assumed not to be fed: nothing is proved of a throw that acts beyond the end
+        # assumed not to be fed: nothing is proved of a throw that acts beyond the end
+        assert trials["edge"] > 0
 
 
 def test_the_readme_has_the_paper_s_counts(ran_feeding_study):
-    text = (STUDIES / "09_feeding" / "README.md").read_text(encoding="utf-8")
-    assert (
-        ran_feeding_study[0].table(ran_feeding_study[1]).splitlines()[2] in text
-    )  # 19 of 20, and its interval
+    text = readme_of("09_feeding")
+    study, numbers, _ = ran_feeding_study
+    assert study.table(numbers).splitlines()[2] in text  # 19 of 20, and its interval
 
 
 # ----------------------------------------------------------------

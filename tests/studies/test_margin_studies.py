@@ -14,7 +14,7 @@ import limitsets as ls
 from limitsets.parameters.design import critical_jacobian
 from limitsets.parameters.margins.deviations import Tolerance
 from limitsets.parameters.margins.estimate import estimated, failing
-from tests.studies.test_studies import STUDIES, load_study
+from tests.studies.test_studies import expected_of, load_study, readme_of
 
 # ----------------------------------------------------------------
 # The study of margins: one scene of it again, and what it says of all.
@@ -22,20 +22,14 @@ from tests.studies.test_studies import STUDIES, load_study
 
 @pytest.fixture(scope="module")
 def recorded():
-    return json.loads((STUDIES / "04_margins" / "expected.json").read_text(encoding="utf-8"))
+    return expected_of("04_margins")
 
 
 @pytest.mark.sweep
 def test_brackets_are_found_again_within_each_other(recorded, tmp_path):
     study = load_study("04_margins")
-    found = study.main(
-        ["paper-designed"],
-        ["throw.speed", "arm.surface_height"],
-        seconds=0.0,
-        places=0,
-        width=0.05,
-        out=tmp_path,
-    )
+    quick = {"seconds": 0.0, "places": 0, "width": 0.05, "out": tmp_path}
+    found = study.main(["paper-designed"], ["throw.speed", "arm.surface_height"], **quick)
     assert (tmp_path / "margins-paper-designed.png").stat().st_size > 10_000
     wanted = {(one["quantity"], one["reading"]): one for one in recorded["paper-designed"]["margins"]}
     for one in found["paper-designed"]["margins"]:
@@ -56,7 +50,7 @@ def test_the_speed_is_that_of_the_table(recorded):
 
 def test_the_readme_shows_what_was_found(recorded):
     study = load_study("04_margins")
-    text = (STUDIES / "04_margins" / "README.md").read_text(encoding="utf-8")
+    text = readme_of("04_margins")
     assert study.table(recorded) in text
     # never more than is proved
     assert f"{math.floor(1e4 * recorded['joint']['proved']) / 1e4:.4f}" in text
@@ -72,7 +66,7 @@ def test_the_readme_shows_what_was_found(recorded):
 
 @pytest.fixture(scope="module")
 def recorded_robust_study():
-    return json.loads((STUDIES / "07_robust_design" / "expected.json").read_text(encoding="utf-8"))
+    return expected_of("07_robust_design")
 
 
 def design_of(recorded_robust_study):
@@ -86,9 +80,8 @@ def test_the_bound_is_a_part_that_rests_and_no_nudge_does_better(recorded_robust
     # three lengths that form no triangle any more: 6.75 (1 + s %) = 9.35 (1 - s %)
     assert bound["largest"] < 100 * (9.35 - 6.75) / (9.35 + 6.75)
     # a raster of centres of mass, one order of the sides
-    best = max(
-        study.largest_at_rest(study.SIDES, 0.25 * i, 0.1 * j) for i in range(1, 27) for j in range(1, 20)
-    )
+    raster = [(0.25 * i, 0.1 * j) for i in range(1, 27) for j in range(1, 20)]
+    best = max(study.largest_at_rest(study.SIDES, *centre) for centre in raster)
     assert best <= bound["by_order"]["5.75, 3.6, 6.75"] + 1e-3
     assert best > 0.9 * bound["by_order"]["5.75, 3.6, 6.75"]
 
@@ -104,14 +97,8 @@ def test_the_design_holds_on_every_corner_of_its_box(recorded_robust_study):
     found = estimated(scene, box, 2)
     kept = recorded_robust_study["sampled"]
     assert found.threshold == pytest.approx(kept["threshold"], abs=1e-9)
-    at = type(found)(
-        kept["margin"],
-        recorded_robust_study["x"],
-        found.threshold,
-        found.reach,
-        found.invariant,
-        found.effects,
-    )
+    rest = found.threshold, found.reach, found.invariant, found.effects
+    at = type(found)(kept["margin"], recorded_robust_study["x"], *rest)
     assert failing(scene, box, 2, at, 0.9995 * kept["margin"]) == []
 
 
@@ -121,14 +108,13 @@ def test_what_is_proved_is_below_what_is_refuted(recorded_robust_study):
             assert one["proved"] > 0
             assert one["refuted"] is None or one["proved"] < one["refuted"]
     # what an orbit refutes agrees with the search by floats, which knows nothing of proofs
-    refuted = [
-        one["refuted"] for one in recorded_robust_study["before_margins"] if one["refuted"] is not None
-    ]
+    before = [one["refuted"] for one in recorded_robust_study["before_margins"]]
+    refuted = [each for each in before if each is not None]
     assert min(refuted) == pytest.approx(recorded_robust_study["before_sampled"]["margin"], rel=0.03)
 
 
 def test_the_readme_says_what_was_found(recorded_robust_study):
-    text = (STUDIES / "07_robust_design" / "README.md").read_text(encoding="utf-8")
+    text = readme_of("07_robust_design")
     for number in (
         recorded_robust_study["bound_of_rest"]["largest"],
         recorded_robust_study["sampled"]["margin"],
@@ -217,24 +203,13 @@ def test_the_search_computes_what_the_package_does(study, model):
     misses = printed.residuals(case, placed, np.array([at]))[0].reshape(2, 3)
     words = ("small-angle", "energy") if model == "small angle" else ("exact", "signed")
     for (u, v, w), targets, miss in zip(printed.PRINTED, printed.TARGETS, misses, strict=True):
+        vertices = [["0 in", "0 in"], [f"{at[3]!r} in", "0 in"], [f"{at[4]!r} in", f"{at[5]!r} in"]]
+        center = {"side": 0, "along": f"{at[3] - u if placed.from_right else u!r} in", "above": f"{v!r} in"}
+        mass = {"center": center, "radius_of_gyration": f"{at[2]!r} in"}
         scene = ls.load(
             {
                 "name": "printed",
-                "part": {
-                    "vertices": [
-                        ["0 in", "0 in"],
-                        [f"{at[3]!r} in", "0 in"],
-                        [f"{at[4]!r} in", f"{at[5]!r} in"],
-                    ],
-                    "mass": {
-                        "center": {
-                            "side": 0,
-                            "along": f"{at[3] - u if placed.from_right else u!r} in",
-                            "above": f"{v!r} in",
-                        },
-                        "radius_of_gyration": f"{at[2]!r} in",
-                    },
-                },
+                "part": {"vertices": vertices, "mass": mass},
                 "arm": {"surface_height": f"{at[1]!r} in", "length": "100 in"},
                 "throw": {"kappa": f"{np.exp(at[0]) * (320.0 / w) ** 2!s} in"},
                 "model": dict(zip(("flight", "flip"), words, strict=True)),
@@ -261,7 +236,7 @@ def ran(tmp_path_factory):
 @pytest.mark.sweep
 def test_as_expected(ran):
     numbers, out = ran
-    expected = json.loads((STUDIES / "05_noise" / "expected.json").read_text(encoding="utf-8"))
+    expected = expected_of("05_noise")
     assert set(numbers["cases"]) == set(expected)
     for case, wanted in expected.items():
         for name, (value, tolerance) in wanted.items():

@@ -25,6 +25,21 @@ def load_study(name, file="study"):
     return module
 
 
+def expected_of(name):
+    return json.loads((STUDIES / name / "expected.json").read_text(encoding="utf-8"))
+
+
+def readme_of(name):
+    return (STUDIES / name / "README.md").read_text(encoding="utf-8")
+
+
+def of_study(name, tmp_path_factory, file="study", **options):
+    """A study, its numbers and the folder of its figures."""
+    study = load_study(name, file)
+    out = tmp_path_factory.mktemp(name)
+    return study, study.main(out=out, **options), out
+
+
 @pytest.mark.parametrize("folder", sorted(path.name for path in STUDIES.iterdir() if path.is_dir()))
 def test_a_study_has_its_parts(folder):
     names = {path.name for path in (STUDIES / folder).iterdir()}
@@ -39,14 +54,12 @@ def test_a_study_has_its_parts(folder):
 
 @pytest.fixture(scope="module")
 def four_scenes(tmp_path_factory):
-    study = load_study("01_four_scenes")
-    out = tmp_path_factory.mktemp("four-scenes")
-    return study, study.main(seed=3, out=out), out
+    return of_study("01_four_scenes", tmp_path_factory, seed=3)
 
 
 def test_four_scenes_as_expected(four_scenes):
     _, numbers, out = four_scenes
-    expected = json.loads((STUDIES / "01_four_scenes" / "expected.json").read_text(encoding="utf-8"))
+    expected = expected_of("01_four_scenes")
     assert set(numbers) == set(expected)
     assert (out / "limit-sets.png").stat().st_size > 20_000
     for name, wanted in expected.items():
@@ -76,7 +89,7 @@ def test_four_scenes_two_ways(four_scenes):
 
 def test_the_table_in_the_readme_is_what_the_study_prints(four_scenes):
     study, numbers, _ = four_scenes
-    text = (STUDIES / "01_four_scenes" / "README.md").read_text(encoding="utf-8")
+    text = readme_of("01_four_scenes")
     printed = study.table(numbers).splitlines()
     intervals = [line.split("|")[3:5] for line in printed[2:]]
     shown = [line.split("|")[3:5] for line in text.splitlines() if line.startswith("| ")][1:]
@@ -86,15 +99,13 @@ def test_the_table_in_the_readme_is_what_the_study_prints(four_scenes):
 @pytest.fixture(scope="module")
 def physics_engine(tmp_path_factory):
     pytest.importorskip("pymunk")
-    study = load_study("02_physics_engine")
-    out = tmp_path_factory.mktemp("physics-engine")
-    return study, study.main(seed=3, out=out, throws=150), out
+    return of_study("02_physics_engine", tmp_path_factory, seed=3, throws=150)
 
 
 @pytest.mark.sweep
 def test_the_engine_agrees_with_the_map(physics_engine):
     study, numbers, out = physics_engine
-    expected = json.loads((STUDIES / "02_physics_engine" / "expected.json").read_text(encoding="utf-8"))
+    expected = expected_of("02_physics_engine")
     assert (out / "engine.png").stat().st_size > 20_000
     for name in study.SCENES:
         found, wanted = numbers[name], expected[name]
@@ -112,14 +123,13 @@ def test_the_engine_agrees_with_the_map(physics_engine):
 @pytest.mark.sweep
 def test_unilateral_contact_in_the_engine(physics_engine):
     study, numbers, _ = physics_engine
-    expected = json.loads((STUDIES / "02_physics_engine" / "expected.json").read_text(encoding="utf-8"))
+    expected = expected_of("02_physics_engine")
     rests = numbers["unilateral"]
     assert rests["hinge"] == pytest.approx(expected["hinge"], abs=6e-4)
     lo, hi = expected["unilateral_without_slip"]
-    assert [lo < rests["by_friction"][mu] < hi for mu in ("0.3", "0.5", "1.0", "2.0", "5.0")] == [
-        False
-    ] * 2 + [True] * 3
-    text = (STUDIES / "02_physics_engine" / "README.md").read_text(encoding="utf-8")
+    inside = [lo < rests["by_friction"][mu] < hi for mu in ("0.3", "0.5", "1.0", "2.0", "5.0")]
+    assert inside == [False] * 2 + [True] * 3
+    text = readme_of("02_physics_engine")
     places = study.table(numbers).split("\n\n", 1)[1]  # what does not depend on the starts drawn
     assert set(places.splitlines()) <= set(text.splitlines())
 
@@ -127,20 +137,15 @@ def test_unilateral_contact_in_the_engine(physics_engine):
 @pytest.fixture(scope="module")
 def effects_in_engine(tmp_path_factory):
     pytest.importorskip("pymunk")
-    study = load_study("02_physics_engine", "effects")
-    out = tmp_path_factory.mktemp("effects")
-    return study, study.main(seed=3, out=out, throws=60), out
+    return of_study("02_physics_engine", tmp_path_factory, "effects", seed=3, throws=60)
 
 
 @pytest.mark.sweep
 def test_the_engine_agrees_with_the_effects(effects_in_engine):
     study, numbers, out = effects_in_engine
     assert (out / "effects.png").stat().st_size > 20_000
-    most = {
-        "hinge": 0.5 * 9.0**2 * 4.4 * 1e-6,
-        "drive": 5e-3,
-        "contact": 0.04,
-    }  # by the order of each, as above
+    # by the order of each, as above
+    most = {"hinge": 0.5 * 9.0**2 * 4.4 * 1e-6, "drive": 5e-3, "contact": 0.04}
     for name, case in study.CASES.items():
         found, kind = numbers[name], name.split(",")[0]
         assert found["throws"] == max(int(60 * case.share), 1)
@@ -155,7 +160,7 @@ def test_the_engine_agrees_with_the_effects(effects_in_engine):
 @pytest.mark.sweep
 def test_the_engine_nears_the_effects_as_its_order_says(effects_in_engine):
     _, numbers, _ = effects_in_engine
-    expected = json.loads((STUDIES / "02_physics_engine" / "expected.json").read_text(encoding="utf-8"))
+    expected = expected_of("02_physics_engine")
     for name, order in expected["effects"]["order"].items():
         assert numbers["convergence"][name]["order"] == pytest.approx(order, abs=0.3), name
 
@@ -219,9 +224,7 @@ def test_stored_as_it_ran(path):
     code = code_of(notebook)
     assert [cell.execution_count for cell in code] == list(range(1, len(code) + 1))
     outputs = [output for cell in code for output in cell.outputs]
-    assert not [
-        output for output in outputs if output.output_type == "error" or output.get("name") == "stderr"
-    ]
+    assert not any(each.output_type == "error" or each.get("name") == "stderr" for each in outputs)
     assert path.stat().st_size < 150_000
 
 

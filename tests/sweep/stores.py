@@ -11,12 +11,11 @@ from tests.sweep.tasks_of_tests import TASK, X, Y
 
 def run(store, **options):
     """Compute the atlas of these tests, by threads where nothing else is said."""
-    if not options.keys() & {"workers", "executor", "cluster"}:
-        with ThreadPoolExecutor(2) as pool:
-            return atlas(
-                "paper-designed", X, Y, task=TASK, chunk=(3, 3), store=store, executor=pool, **options
-            )
-    return atlas("paper-designed", X, Y, task=TASK, chunk=(3, 3), store=store, **options)
+    given = {"task": TASK, "chunk": (3, 3), "store": store, **options}
+    if options.keys() & {"workers", "executor", "cluster"}:
+        return atlas("paper-designed", X, Y, **given)
+    with ThreadPoolExecutor(2) as pool:
+        return atlas("paper-designed", X, Y, executor=pool, **given)
 
 
 def bytes_of(store):

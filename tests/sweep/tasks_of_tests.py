@@ -24,12 +24,8 @@ def numbers(scene, seed, pause=0.002):
         raise AnswerError("the scene", scene.kappa, "a faster one", "throw faster")
     drawn = np.random.default_rng(seed).random()
     height = None if scene.surface_height > 0 else scene.surface_height
-    return {
-        "kappa": scene.kappa,
-        "feet": scene.sides.a + scene.surface_height,
-        "drawn": drawn,
-        "height": height,
-    }
+    feet = scene.sides.a + scene.surface_height
+    return {"kappa": scene.kappa, "feet": feet, "drawn": drawn, "height": height}
 
 
 def deadly(scene):

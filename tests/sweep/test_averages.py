@@ -69,9 +69,8 @@ def logistic_entropy(r, bands):
 
 def test_entropy_is_that_of_the_attractor_alone():
     # both lie in the window of period three: between the bands there is a Cantor set of entropy 0.4812
-    found = ls.atlas(
-        maps.Logistic(3.8), "r=3.84:3.8536:2", domain=UNIT, variables=["entropy", "period", "bands"]
-    )
+    wanted = ["entropy", "period", "bands"]
+    found = ls.atlas(maps.Logistic(3.8), "r=3.84:3.8536:2", domain=UNIT, variables=wanted)
     entropy = found.dataset["entropy"].values[:, 0]
     assert found.dataset["period"].values[:, 0].tolist() == [3, 0]
     assert entropy[0] == 0.0
@@ -103,9 +102,8 @@ def test_the_error_of_the_flips_is_honest():
     at = {"throw.speed": "178.784 deg/s", "arm.surface_height": "-0.0754 in"}
     axes = ("throw.speed=178.784:178.785:2", "arm.surface_height=-0.0754:-0.0753:2")
     wanted = ["flips_per_throw", "flips_per_throw_error", "lowest", "reach"]
-    found = ls.atlas("paper-designed", *axes, variables=wanted).dataset.isel(
-        {"throw.speed": 0, "arm.surface_height": 0, "attractor": 0}
-    )
+    first = {"throw.speed": 0, "arm.surface_height": 0, "attractor": 0}
+    found = ls.atlas("paper-designed", *axes, variables=wanted).dataset.isel(first)
     mean, error = (float(found[name]) for name in wanted[:2])
     lo, hi = (float(found[name][2]) for name in wanted[2:])
     others = flips_of(ls.load("paper-designed").with_values(at), lo, hi, 10_000, 200)
@@ -116,12 +114,8 @@ def test_the_error_of_the_flips_is_honest():
 def test_errors_of_means_cover_the_mean():
     """Points of a small window have means that hardly differ: each scatters about them as its error says."""
     wanted = ["flips_per_throw", "flips_per_throw_error", "lyapunov", "lyapunov_error", "attractors"]
-    found = ls.atlas(
-        "paper-designed",
-        "throw.speed=178.784:178.7841:10",
-        "arm.surface_height=-0.07541:-0.0754:10",
-        variables=wanted,
-    ).dataset
+    axes = ("throw.speed=178.784:178.7841:10", "arm.surface_height=-0.07541:-0.0754:10")
+    found = ls.atlas("paper-designed", *axes, variables=wanted).dataset
     for name in ("flips_per_throw", "lyapunov"):
         mean, error = found[name].values[..., 0].ravel(), found[f"{name}_error"].values[..., 0].ravel()
         off = np.abs(mean - np.nanmean(mean)) / error
@@ -133,12 +127,8 @@ def test_the_page_explains_every_number_of_the_topology():
     """docs/json.md sends to this table for the names of an atlas."""
     page = (Path(__file__).parents[2] / "docs" / "atlas.md").read_text(encoding="utf-8")
     section = page.split("## What is said of each point\n", 1)[1].split("\n## ", 1)[0]
-    explained = {
-        name
-        for line in section.splitlines()
-        if line.startswith("| `")
-        for name in re.findall(r"`(\w+)`", line.split("|")[1])
-    }
+    rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
+    explained = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
     subject = SceneSubject(ls.load("paper-designed"))
     assert explained == {*registered(topology).variables(subject, margin="throw.speed")}
 
@@ -217,15 +207,11 @@ def test_a_margin_does_not_depend_on_the_points_beside_it():
     assert np.array_equal(together, alone)
 
 
-def test_a_goal_that_has_no_threshold_is_refused():
+def test_a_goal_that_has_no_threshold_is_refused_and_a_scene_without_one_told_to_have_one():
     tree = ls.load("paper-designed").as_dict()
     scene = ls.load({**tree, "goal": {"stays_on_arm": True}})
     with pytest.raises(AnswerError, match="oriented_beyond or reaches"):
         margins(scene, {"arm.surface_height": -0.2}, "throw.speed")
-
-
-def test_a_scene_without_a_goal_is_told_to_have_one():
-    tree = ls.load("paper-designed").as_dict()
     del tree["goal"]
     with pytest.raises(AnswerError, match=r"missing.*add \[goal\] to the scene"):
         margins(ls.load(tree), {"arm.surface_height": -0.2}, "throw.speed")

@@ -96,12 +96,10 @@ def test_shares_of_rounding_are_none_and_all():
     assert ways == {("none", "none"), ("none", "all"), ("some", "some")}
 
 
-@pytest.mark.parametrize(
-    "name", ["", "undecided", "bands:1;leaves:none;collapses:none", "bands:x,order:0,period:0;a;b"]
-)
-def test_what_names_no_class(name):
-    with pytest.raises(AnswerError, match="the name of a class"):
-        named_class(name)
+def test_what_names_no_class():
+    for name in ("", "undecided", "bands:1;leaves:none;collapses:none", "bands:x,order:0,period:0;a;b"):
+        with pytest.raises(AnswerError, match="the name of a class"):
+            named_class(name)
 
 
 def test_a_field_that_is_missing_is_named():
@@ -111,10 +109,13 @@ def test_a_field_that_is_missing_is_named():
         classes(fields)
 
 
+FEEDERS = "throw.speed=130:180:12", "arm.surface_height=-1:0.2:9"
+
+
 @pytest.fixture(scope="module")
 def feeders():
     """The scene at 12 x 9 points in one chunk."""
-    return atlas("paper-designed", "throw.speed=130:180:12", "arm.surface_height=-1:0.2:9", chunk=(9, 12))
+    return atlas("paper-designed", *FEEDERS, chunk=(9, 12))
 
 
 def test_an_atlas_stores_what_its_fields_say(feeders):
@@ -133,10 +134,8 @@ def test_chunks_and_their_order_leave_no_trace(feeders, tmp_path):
     stores = []
     for seed in range(2):
         store = tmp_path / f"{seed}.zarr"
-        found = atlas(
-            "paper-designed", "throw.speed=130:180:12", "arm.surface_height=-1:0.2:9", chunk=(4, 5),
-            variables=["class"], store=store, executor=Shuffled(seed),
-        )  # fmt: skip
+        given = {"chunk": (4, 5), "variables": ["class"], "store": store, "executor": Shuffled(seed)}
+        found = atlas("paper-designed", *FEEDERS, **given)
         assert np.array_equal(found.dataset["class"].values, feeders.dataset["class"].values)
         assert found.dataset["class"].attrs == feeders.dataset["class"].attrs
         stores.append(bytes_of(store))
@@ -178,9 +177,8 @@ def test_the_legend_of_a_map_names_the_ends_of_the_domain():
     # x -> 1.5 x - x^3: the cubic's starts beyond +-sqrt(2.5) leave, over either end; at 3.2 all but a null set do
     data = ls.atlas(maps.Cubic(1.5), "r=1.5:3.2:2", domain=[(-2.1, 2.1)]).dataset
     first, last = sorted(legend(data), key=lambda entry: entry.name)
-    assert first.words.endswith(
-        "some starts leave over the upper end and some starts leave over the lower end"
-    )
+    ways = "some starts leave over the upper end and some starts leave over the lower end"
+    assert first.words.endswith(ways)
     assert last.words == "no attractors; all starts leave, some over either end"
 
 
@@ -269,10 +267,8 @@ def test_grids_of_every_shape_end(shape):
 @pytest.fixture(scope="module")
 def tongue():
     """The main tongue of the circle map, refined: fixed points where omega <= coupling / (2 pi)."""
-    return atlas(
-        maps.Circle(), "omega=0.01:0.15:57", "coupling=0.05:0.95:41", domain=[(0, 1)], chunk=(41, 57), refine=True,
-        variables=["period"],
-    )  # fmt: skip
+    given = {"domain": [(0, 1)], "chunk": (41, 57), "refine": True, "variables": ["period"]}
+    return atlas(maps.Circle(), "omega=0.01:0.15:57", "coupling=0.05:0.95:41", **given)
 
 
 def test_the_main_tongue_of_the_circle_map(tongue):
@@ -286,69 +282,43 @@ def test_the_main_tongue_of_the_circle_map(tongue):
 
 
 def test_a_refined_store_is_that_of_its_plan_alone(tmp_path):
-    stores = []
+    stores, axes = [], ("omega=0.01:0.15:20", "coupling=0.05:0.95:20")
+    given = {"domain": [(0, 1)], "chunk": (9, 9), "refine": True, "coarse": 4, "variables": ["period"]}
     for seed in range(2):
         store = tmp_path / f"{seed}.zarr"
-        given = {"domain": [(0, 1)], "chunk": (9, 9), "refine": True, "coarse": 4, "variables": ["period"]}
-        atlas(
-            maps.Circle(),
-            "omega=0.01:0.15:20",
-            "coupling=0.05:0.95:20",
-            store=store,
-            executor=Shuffled(seed),
-            **given,
-        )
+        atlas(maps.Circle(), *axes, store=store, executor=Shuffled(seed), **given)
         stores.append(bytes_of(store))
     assert stores[0] == stores[1]
     with pytest.raises(LimitsetsError, match="refine"):
-        atlas(
-            maps.Circle(),
-            "omega=0.01:0.15:20",
-            "coupling=0.05:0.95:20",
-            store=store,
-            **(given | {"refine": False}),
-        )
+        atlas(maps.Circle(), *axes, store=store, **(given | {"refine": False}))
+
+
+FAST = "tests.sweep.tasks_of_tests:side_of_150"
 
 
 def test_any_variable_of_any_task_may_be_refined_by():
-    found = atlas(
-        "paper-designed", "throw.speed=-10:200:71", task="tests.sweep.tasks_of_tests:side_of_150", refine="fast",
-    ).dataset  # fmt: skip
+    found = atlas("paper-designed", "throw.speed=-10:200:71", task=FAST, refine="fast").dataset
     speed = found["throw.speed"].values
     assert np.array_equal(found.status.values == 1, speed <= 0)  # where there is no scene is a boundary too
     assert np.array_equal(found.fast.values[speed > 0], (speed > 150)[speed > 0])
     assert (found.level.values >= 0).sum() < 40
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
+def test_what_cannot_be_refined():
+    for given, words in (
         ({"refine": "nothing"}, "the variable is 'nothing'"),
         ({"refine": True, "coarse": 1}, "the step of the coarse grid is 1"),
-    ],
-)
-def test_what_cannot_be_refined(given, words):
-    with pytest.raises(LimitsetsError) as told:
-        atlas("paper-designed", "throw.speed=150:160:9", **given)
-    assert words in str(told.value)
-
-
-def test_a_task_without_the_variable_is_told_so():
-    with pytest.raises(LimitsetsError, match="the variable by which the atlas is refined"):
-        atlas(
-            "paper-designed",
-            "throw.speed=150:160:9",
-            task="tests.sweep.tasks_of_tests:side_of_150",
-            refine="slow",
-        )
+        ({"refine": "slow", "task": FAST}, "the variable by which the atlas is refined"),
+    ):
+        with pytest.raises(LimitsetsError, match=words):
+            atlas("paper-designed", "throw.speed=150:160:9", **given)
 
 
 def test_checks_count_once():
     given = {"domain": [(0, 1)], "chunk": (64, 64), "variables": ["checked"]}
     found = atlas(maps.Circle(), "omega=0.2:0.24:64", "coupling=0.05:0.15:64", refine=True, **given).dataset
-    none = dict(
-        zip(found.checked.attrs["flag_meanings"].split(), found.checked.attrs["flag_values"], strict=True)
-    )["not_checked"]
+    flags = found.checked.attrs
+    none = dict(zip(flags["flag_meanings"].split(), flags["flag_values"], strict=True))["not_checked"]
     filled = found.level.values < 0
     assert filled.mean() > 0.8
     assert (found.checked.values[filled] == none).all()

@@ -221,9 +221,8 @@ def test_a_second_process_is_refused_as_long_as_the_first_writes(tmp_path, whole
     command = [sys.executable, "-m", "tests.sweep.tasks_of_tests", str(store)]
     driver = subprocess.Popen(command, cwd=ROOT, start_new_session=True)
     wait_for_work(driver, store)
-    with pytest.raises(
-        LimitsetsError, match=rf"written by process {driver.pid} on .*wait until that process ends"
-    ):
+    said = rf"written by process {driver.pid} on .*wait until that process ends"
+    with pytest.raises(LimitsetsError, match=said):
         run(store)
     driver.kill()
     driver.wait()
@@ -286,31 +285,14 @@ def refused(store):
 )
 def test_units_codes_and_attributes_are_compared(name, old, new, tmp_path):
     store = tmp_path / "s.zarr"
-    atlas("paper-designed", X, Y, task=f"{TASK.partition(':')[0]}:in_blocks", store=store)
+    given = {"task": f"{TASK.partition(':')[0]}:in_blocks", "store": store}
+    atlas("paper-designed", X, Y, **given)
     file = store / name / "zarr.json"
     text = file.read_text()
     assert old in text
     file.write_text(text.replace(old, new))
     with pytest.raises(LimitsetsError, match=rf"damaged.*{name}.*name another store"):
-        atlas("paper-designed", X, Y, task=f"{TASK.partition(':')[0]}:in_blocks", store=store)
-
-
-def test_other_code_of_the_same_version_does_not_continue_a_store(tmp_path, monkeypatch):
-    store = tmp_path / "s.zarr"
-    run(store)
-    monkeypatch.setattr("limitsets.parameters.atlas.plan.code_digest", lambda: "0" * 64)
-    with pytest.raises(LimitsetsError, match="the code of limitsets is not the code that began it"):
-        run(store)
-
-
-def test_a_worker_of_other_code_is_refused(tmp_path, monkeypatch):
-    from limitsets.parameters.atlas.parameter_atlas import plan_of
-    from limitsets.parameters.atlas.work import answer
-
-    plan = plan_of("paper-designed", X, Y, task=TASK)
-    monkeypatch.setattr("limitsets.parameters.atlas.plan.code_digest", lambda: "0" * 64)
-    with pytest.raises(LimitsetsError, match=r"sources\.limitsets of a worker"):
-        answer(plan, 0)
+        atlas("paper-designed", X, Y, **given)
 
 
 def test_chunks_that_were_damaged_are_computed_again(tmp_path, whole):
@@ -326,12 +308,11 @@ def test_chunks_that_were_damaged_are_computed_again(tmp_path, whole):
 def test_a_chunk_that_always_kills_its_worker_is_named(tmp_path):
     axes = ("throw.speed=150:160:4", "arm.surface_height=-1:0:5")
     task = "tests.sweep.tasks_of_tests:deadly"
-    with pytest.raises(
-        LimitsetsError, match=r"killed 3 times by one chunk.*arm\.surface_height -0\.5 in, throw\.speed 150"
-    ):
-        atlas("paper-designed", *axes, task=task, chunk=(1, 4), store=tmp_path / "s.zarr", workers=2)
-    with pytest.raises(LimitsetsError, match="killed 3 times"):
-        atlas("paper-designed", *axes, task=task, chunk=(1, 4), store=tmp_path / "s.zarr", workers=2)
+    given = {"task": task, "chunk": (1, 4), "store": tmp_path / "s.zarr", "workers": 2}
+    place = r".*arm\.surface_height -0\.5 in, throw\.speed 150"
+    for said in (rf"killed 3 times by one chunk{place}", "killed 3 times"):
+        with pytest.raises(LimitsetsError, match=said):
+            atlas("paper-designed", *axes, **given)
 
 
 @pytest.mark.sweep

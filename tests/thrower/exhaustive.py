@@ -35,17 +35,10 @@ class Part(NamedTuple):
 
     def numbers(self, arm_length: float = 1e6) -> dict[str, Any]:
         """Arguments of `throw_map`: a part of three sides, of which side 0 is this one."""
-        return {
-            "a": [self.a, self.a_after, self.a_after],
-            "d": [self.d, 1.0, 1.0],
-            "length": [2.0 * self.a, self.length_after, self.length_after],
-            "corner": [2.0, 2.0, 2.0],
-            "radius_of_gyration": self.rho,
-            "kappa": self.kappa,
-            "surface_height": self.h,
-            "arm_length": arm_length,
-            "flip": self.flip,
-        }
+        length = [2.0 * self.a, self.length_after, self.length_after]
+        sides = {"a": [self.a, self.a_after, self.a_after], "d": [self.d, 1.0, 1.0], "length": length}
+        throw = {"radius_of_gyration": self.rho, "kappa": self.kappa, "surface_height": self.h}
+        return {**sides, **throw, "corner": [2.0, 2.0, 2.0], "arm_length": arm_length, "flip": self.flip}
 
 
 class Root(NamedTuple):
@@ -64,12 +57,8 @@ class Height:
         self.bend = self.kappa + (self.a**2 + self.d**2).sqrt()
 
     def terms(self, phi: arb) -> tuple[arb, arb, arb, arb]:
-        return (
-            self.reach * phi,
-            self.a * (phi - phi.sin()),
-            2 * self.d * (phi / 2).sin() ** 2,
-            -self.kappa / 2 * phi**2,
-        )
+        rise = self.a * (phi - phi.sin()), 2 * self.d * (phi / 2).sin() ** 2
+        return (self.reach * phi, *rise, -self.kappa / 2 * phi**2)
 
     def value(self, phi: arb) -> arb:
         one, two, three, four = self.terms(phi)

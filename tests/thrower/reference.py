@@ -7,6 +7,7 @@ and landing places are the plain formulas, whose cancellations 50 digits do not 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -64,15 +65,12 @@ def impact(facts: Facts, side: int, x: float) -> mpf | None:
     below = np.flatnonzero(values <= 0.0)
     end = int(below[0]) if below.size else values.size
     # A dip between two points of the scan may touch the arm before that.
-    dips = (
-        np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:]) & (values[1:-1] < 1e-5))
-        + 1
-    )
+    inner = values[1:-1]
+    dips = np.flatnonzero((inner < values[:-2]) & (inner <= values[2:]) & (inner < 1e-5)) + 1
     for k in dips[(dips < end) & (SCAN[dips] > 2e-3)]:
         lo, hi = mpf(SCAN[k - 1]), mpf(SCAN[k + 1])
-        lowest = mp.findroot(
-            lambda phi: mp.diff(lambda p: height(a, d, kappa, at, p) / p, phi), (lo + hi) / 2
-        )
+        over = partial(mp.diff, lambda p: height(a, d, kappa, at, p) / p)
+        lowest = mp.findroot(over, (lo + hi) / 2)
         if height(a, d, kappa, at, lowest) <= 0:
             return refine(a, d, kappa, at, lo, lowest)
     if end == values.size:
@@ -202,16 +200,6 @@ def paper(name: str, **changes: Any) -> Facts:
         # The side that ends in this left vertex is the next one in flip order.
         arriving = right_ends[(k + 1) % 3] - left_ends[(k + 1) % 3]
         corner.append(float(mp.arg(along_side / arriving)))
-    numbers = {
-        "a": a,
-        "d": d,
-        "length": length,
-        "corner": corner,
-        "radius_of_gyration": 1.25,
-        "kappa": kappa,
-        "surface_height": h,
-        "arm_length": arm,
-        "flight": flight,
-        "flip": flip,
-    }
+    numbers = {"a": a, "d": d, "length": length, "corner": corner, "radius_of_gyration": 1.25, "kappa": kappa}
+    numbers |= {"surface_height": h, "arm_length": arm, "flight": flight, "flip": flip}
     return Facts({**numbers, **changes})

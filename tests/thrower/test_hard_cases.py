@@ -13,6 +13,7 @@ from limitsets.feeder.thrower import fly, throw_map, trace
 from limitsets.systems.cells import Domain
 from limitsets.systems.maps import drivers
 from limitsets.systems.maps.critical import margins
+from tests.test_paper import LIMIT_SETS
 
 flint = pytest.importorskip("flint", reason="the balls of python-flint are the reference")
 from tests.thrower import exhaustive  # noqa: E402  # needs flint
@@ -120,9 +121,8 @@ def test_the_barrier_keeps_its_digits_at_the_top() -> None:
             above = arb(a) * exact.phi.sin() + arb(d) * exact.phi.cos()
             barrier = part.kappa * right * abs(right) / ((arb(a) ** 2 + arb(d) ** 2).sqrt() + above)
             # A relative error of phi moves X by H phi, and B goes with the square of X.
-            condition = 1.0 + 2.0 * float(
-                (abs(above) * exact.phi * exact.phi_condition + 2 * arb(max(a, d))) / abs(right)
-            )
+            moved = abs(above) * exact.phi * exact.phi_condition + 2 * arb(max(a, d))
+            condition = 1.0 + 2.0 * float(moved / abs(right))
             assert ulps(barrier, fly(params, x, 0).barrier) <= ULPS * condition, (a, d, off)
 
 
@@ -227,17 +227,9 @@ def critical_point(part: Part, near: float) -> arb:
 def sides_of(params: object, flip: str) -> list[Part]:
     p = params
     after = [(k + 1) % p.a.size for k in range(p.a.size)]
+    own = [p.kappa, p.surface_height, p.radius_of_gyration, flip]
     return [
-        Part(
-            float(p.a[k]),
-            float(p.d[k]),
-            p.kappa,
-            p.surface_height,
-            p.radius_of_gyration,
-            flip,
-            float(p.length[j]),
-            float(p.a[j]),
-        )
+        Part(float(p.a[k]), float(p.d[k]), *own, float(p.length[j]), float(p.a[j]))
         for k, j in enumerate(after)
     ]
 
@@ -249,9 +241,8 @@ def decided() -> list[tuple[str, object, Domain, int, Part]]:
     rows = []
     for name in ("paper-initial", "paper-designed"):
         scene = ls.load(name)
-        rows += [
-            (name, scene.map, scene.domain, k, part) for k, part in enumerate(sides_of(scene.map, "signed"))
-        ]
+        parts = enumerate(sides_of(scene.map, "signed"))
+        rows += [(name, scene.map, scene.domain, k, part) for k, part in parts]
     params = throw_map(**THREE.numbers(40.0))
     rows.append(("three on one side", params, Domain([[1.374]], [[40.0]], [1.373]), 0, THREE))
     return rows
@@ -278,15 +269,15 @@ def test_decisions_around_critical_points(row: tuple[str, object, Domain, int, P
         landed = maps.images(params, within, side)
         for branch in (maps.JOG, maps.FLIP):
             taken = landed.code == branch
-            np.testing.assert_array_equal(
-                landed.x[taken], maps.images_on(params, within[taken], side, branch)[0]
-            )
+            there = maps.images_on(params, within[taken], side, branch)[0]
+            np.testing.assert_array_equal(landed.x[taken], there)
 
 
 def test_the_three_critical_points_of_the_energy_model() -> None:
     params = throw_map(**THREE.numbers(40.0))
     points = ls.critical_points(params, Domain([[1.374]], [[40.0]], [1.373]))[0]
     assert [point.x for point in points] == pytest.approx([14.17, 18.24, 20.00], abs=0.005)
+    assert [point.kind for point in points] == ["jog->flip", "flip->jog", "jog->flip"]
     # None is skipped: the margin at 90 digits has just these signs.
     signs = [bool(exhaustive.throw(THREE, x).flips) for x in np.arange(1.5, 40.0, 0.1)]
     changes = np.flatnonzero(np.diff(signs))
@@ -302,17 +293,10 @@ def test_the_three_critical_points_of_the_energy_model() -> None:
 def test_regular_polygons_do_the_same_on_every_side(n: int) -> None:
     """From vertices, side by side, through the scene: a and d differ by rounding, and so may the images."""
     angle = 2.0 * math.pi * (np.arange(n) + 0.3) / n
-    scene = ls.load(
-        {
-            "name": "regular",
-            "part": {
-                "vertices": [[f"{math.cos(t)!r} in", f"{math.sin(t)!r} in"] for t in angle],
-                "mass": {"plate_density": "1 kg/m^2"},
-            },
-            "arm": {"surface_height": "-0.1 in", "length": "20 in"},
-            "throw": {"kappa": "6 in"},
-        }
-    )
+    corners = [[f"{math.cos(t)!r} in", f"{math.sin(t)!r} in"] for t in angle]
+    part = {"vertices": corners, "mass": {"plate_density": "1 kg/m^2"}}
+    arm = {"surface_height": "-0.1 in", "length": "20 in"}
+    scene = ls.load({"name": "regular", "part": part, "arm": arm, "throw": {"kappa": "6 in"}})
     # By geometry: circumradius 1.
     np.testing.assert_allclose(scene.sides.a, math.sin(math.pi / n), rtol=1e-13)
     np.testing.assert_allclose(scene.sides.d, math.cos(math.pi / n), rtol=1e-13)
@@ -342,9 +326,7 @@ LENGTHS = ("kappa", "surface_height", "arm_length", "radius_of_gyration", "a", "
 
 
 @pytest.mark.parametrize("power", [-1000 // 4, -40, -15, -1, 5, 15, 40, 1000 // 4])
-@pytest.mark.parametrize(
-    "name", [*([name for name in ls.scenes() if ls.load(name).cavity is None]), "several roots"]
-)
+@pytest.mark.parametrize("name", [*(n for n in ls.scenes() if ls.load(n).cavity is None), "several roots"])
 def test_a_power_of_two_scales_to_the_bit(name: str, power: int) -> None:
     scene = ls.load("paper-designed" if name == "several roots" else name)
     if name == "several roots":
@@ -368,17 +350,12 @@ def test_a_power_of_two_scales_to_the_bit(name: str, power: int) -> None:
 
 def test_ten_million_throws_stay_on_the_limit_set() -> None:
     """End points at 40 digits, from the model's page; an orbit may miss them by what rounding does in a throw."""
-    extents = {
-        0: (15.205338825681, 19.75268801485),
-        1: (12.637023572659, 17.439819281769),
-        2: (8.9140259080455, 23.383151921158),
-    }
     params, x, side = ls.load("paper-designed").map, 15.0, 2
     for _ in range(20):
         path = ls.orbit(params, x, side, 500_000)
         assert path.stopped is None
         assert path.code.size == 500_000
-        for s, (lo, hi) in extents.items():
+        for s, ((lo, hi),) in LIMIT_SETS["paper-designed"].items():
             here = path.x[path.side == s]
             assert lo - 1e-11 < here.min()
             assert here.max() < hi + 1e-11

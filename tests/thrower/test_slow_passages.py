@@ -47,16 +47,8 @@ ARM = 40.0
 
 def part(h: float, kappa: float = KAPPA) -> Throw:
     """Three equal sides that are like no triangle's: only side 0 is asked."""
-    return throw_map(
-        a=[A] * 3,
-        d=[D] * 3,
-        length=[2.0 * A] * 3,
-        corner=[2.0] * 3,
-        radius_of_gyration=RHO,
-        kappa=kappa,
-        surface_height=h,
-        arm_length=ARM,
-    )
+    sides = {"a": [A] * 3, "d": [D] * 3, "length": [2.0 * A] * 3, "corner": [2.0] * 3}
+    return throw_map(**sides, radius_of_gyration=RHO, kappa=kappa, surface_height=h, arm_length=ARM)
 
 
 def x_of(phi: mpf, kappa: float = KAPPA) -> mpf:
@@ -280,9 +272,8 @@ def test_enclosures_hold_whatever_the_number_of_roots(kappa, side):
             slack = 1e-13 * (np.abs(x) + np.abs(got.x))
             inside |= (got.side == to) & (got.x >= lo - slack) & (got.x <= hi + slack)
         assert not (flown & ~inside).any()
-        beyond = (
-            got.code == OUTSIDE_MODEL
-        )  # but for the cell in which a full turn is reached, nothing is proved there
+        # but for the cell in which a full turn is reached, nothing is proved there
+        beyond = got.code == OUTSIDE_MODEL
         assert not beyond.any() or found.lost[beyond].mean() > 0.9
 
 

@@ -41,21 +41,20 @@ def differences(t: Topologies, i: int, r: Reference, starts: int, scale: float) 
         if not same:
             found[name] = (theirs, ours)
 
+    def slack_of(share: float) -> float:
+        return SHARE + 4.0 * math.sqrt(max(share * (1.0 - share), 1.0 / starts) / starts) + r.remain
+
     k = int(t.attractors[i])
     note("attractors", len(r.attractors), k, len(r.attractors) == k)
     for name, share in (("leaves", r.leaves), ("collapses", r.collapses)):
         ours = float(getattr(t, name)[i])
-        slack = SHARE + 4.0 * math.sqrt(max(share * (1.0 - share), 1.0 / starts) / starts) + r.remain
-        note(name, share, ours, abs(share - ours) <= slack)
+        note(name, share, ours, abs(share - ours) <= slack_of(share))
         word = r.some[name]
         note(name + " in words", word, ours, word in ("?", in_words(ours)))
     for a in range(k if len(r.attractors) == k else 0):
         each = r.attractors[a]
-        slack = (
-            SHARE + 4.0 * math.sqrt(max(each.share * (1.0 - each.share), 1.0 / starts) / starts) + r.remain
-        )
         ours = float(t.share[i, a])
-        note(f"share {a}", each.share, ours, abs(each.share - ours) <= slack)
+        note(f"share {a}", each.share, ours, abs(each.share - ours) <= slack_of(each.share))
         order = tuple(int(s) for s in t.flip_order[i, a] if s != -1)
         theirs = (-2,) * len(order) if each.flip_order is None else each.flip_order
         note(f"flip_order {a}", theirs, order, theirs == order)
@@ -66,12 +65,8 @@ def differences(t: Topologies, i: int, r: Reference, starts: int, scale: float) 
             if bands and t.bands[i, a, side]:
                 ends = np.array([bands[0][0], bands[-1][1]])
                 mine = np.array([t.lowest[i, a, side], t.reach[i, a, side]])
-                note(
-                    f"extents {a} {side}",
-                    ends,
-                    mine,
-                    bool(np.all(np.abs(ends - mine) <= EXTENT * max(scale, 1.0))),
-                )
+                same = bool(np.all(np.abs(ends - mine) <= EXTENT * max(scale, 1.0)))
+                note(f"extents {a} {side}", ends, mine, same)
             jogs = each.jogs.get(side, (-1, -1))
             mine_jogs = (int(t.jogs_min[i, a, side]), int(t.jogs_max[i, a, side]))
             note(f"jogs {a} {side}", (jogs, each.seen_jogs.get(side)), mine_jogs, jogs == mine_jogs)

@@ -58,15 +58,7 @@ def settled(scan: Scan, union: list[Interval]) -> list[Interval]:
     for _ in range(MOST_IMAGES):
         after = scan.image(union)
         same = len(after) == len(union) and [s for s, *_ in after] == [s for s, *_ in union]
-        if (
-            same
-            and max(
-                abs(p - q)
-                for a, b in zip(after, union, strict=True)
-                for p, q in zip(a[1:], b[1:], strict=True)
-            )
-            <= REST * scan.scale
-        ):
+        if same and np.abs(np.subtract(after, union)).max() <= REST * scan.scale:
             return after
         union = after
     raise ArithmeticError("the images do not come to rest")

@@ -166,15 +166,9 @@ class Scan:
         for side in range(self.sides):
             k = slice(self.begin[side], self.begin[side + 1])
             rise = self.y_right[k] > self.y_left[k]
-            new = np.concatenate(
-                [
-                    [True],
-                    (np.diff(self.code[k]) != 0)
-                    | (np.diff(self.to[k]) != 0)
-                    | (rise[1:] != rise[:-1])
-                    | (np.abs(self.y_left[k][1:] - self.y_right[k][:-1]) > 1e-6 * self.scale),
-                ]
-            )
+            jumps = np.abs(self.y_left[k][1:] - self.y_right[k][:-1]) > 1e-6 * self.scale
+            differ = (np.diff(self.code[k]) != 0) | (np.diff(self.to[k]) != 0) | (rise[1:] != rise[:-1])
+            new = np.concatenate([[True], differ | jumps])
             start = np.flatnonzero(new)
             end = np.append(start[1:], new.size)
             self.breaks.append(np.append(self.left[k][start], self.hi[side]))

@@ -53,9 +53,8 @@ def test_a_wrong_part_that_no_kick_moves_takes_all_that_it_can():
     assert chain.at_last() == pytest.approx([0.0, 2 / 3, 1 / 3], abs=1e-9)
     # and where right ones leave, wrong ones have all in the end
     kicked = np.array([[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.0, 1.0]])
-    assert Chain(np.array([0.7, 0.2, 0.1]), kicked, RIGHT).at_last() == pytest.approx(
-        [0.0, 0.0, 1.0], abs=1e-9
-    )
+    chain = Chain(np.array([0.7, 0.2, 0.1]), kicked, RIGHT)
+    assert chain.at_last() == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
 
 
 def test_the_watched_chain_has_the_shares_of_the_whole_one():
@@ -84,9 +83,8 @@ def test_a_pass_by_hand():
 def test_intervals_cover_as_often_as_they_say():
     random = np.random.default_rng(2)
     captured, right, wrong = [0.6, 0.25, 0.15], [0.1, 0.85, 0.05], [0.3, 0.1, 0.6]
-    truth = Chain(np.array(captured), np.array([[1.0, 0.0, 0.0], right, wrong]), RIGHT).occupied(12)[
-        -1, RIGHT
-    ]
+    chain = Chain(np.array(captured), np.array([[1.0, 0.0, 0.0], right, wrong]), RIGHT)
+    truth = chain.occupied(12)[-1, RIGHT]
     inside, repeats = 0, 300
     for _ in range(repeats):
         rows = [np.zeros(3, int), random.multinomial(100, right), random.multinomial(100, wrong)]
@@ -252,14 +250,8 @@ def test_only_what_missed_and_lies_flat_comes_by_again():
     played = Played((0, 2), (0, -1), (3, -1), (0, 1), (0, 1), (0, 1))
     rows = _history(played, 5, 0, True, 0)
     assert rows == [(0, 0), (0, 0), (0, 3), (0, 0), (0, 0)]
-    assert played.asked == [
-        ("new", "new"),
-        ("again", "place 1"),
-        ("new", "new"),
-        ("kick", "place 3"),
-        ("new", "new"),
-        ("again", "place 5"),
-    ]
+    new, kick = ("new", "new"), ("kick", "place 3")
+    assert played.asked == [new, ("again", "place 1"), new, kick, new, ("again", "place 5")]
 
 
 def test_histories_begin_empty_and_repeat():
@@ -270,21 +262,18 @@ def test_histories_begin_empty_and_repeat():
     assert not (histories(passes, 3, 8, 5, returning=True).after_pass == some.after_pass).all()
 
 
-@pytest.mark.parametrize(
-    ("scene", "key"),
-    [
+def test_what_lacks_is_named():
+    for scene, key in (
         (lambda: ls.load("paper-designed"), "tray"),
         (lambda: with_tray(contact=False), "effects.contact"),
         (lambda: with_tray(world={"restitution": 0.3}), "world.friction"),
         (lambda: with_tray(world={"friction": 0.3}), "world.restitution"),
         (lambda: ls.load({k: v for k, v in with_tray().as_dict().items() if k != "goal"}), "goal"),
-    ],
-)
-def test_what_lacks_is_named(scene, key):
-    with pytest.raises(AnswerError) as caught:
-        ls.tray(scene(), drops=1)
-    assert caught.value.key == key
-    assert key in str(caught.value)
+    ):
+        with pytest.raises(AnswerError) as caught:
+            ls.tray(scene(), drops=1)
+        assert caught.value.key == key
+        assert key in str(caught.value)
 
 
 def test_without_contact_the_engine_is_not_even_loaded():
@@ -298,13 +287,8 @@ try:
 except AnswerError:
     print("pymunk" in sys.modules)
 """
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    how = {"cwd": Path(__file__).parents[2], "capture_output": True, "text": True, "check": True}
+    done = subprocess.run([sys.executable, "-c", code], **how)
     assert done.stdout.strip() == "False"
 
 
