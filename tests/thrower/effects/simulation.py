@@ -67,9 +67,8 @@ def random_body(rng: np.random.Generator) -> Body:
     while True:
         n = int(rng.integers(3, 6))
         angles = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
-        corners = rng.uniform(1.5, 3.0) * np.stack(
-            [np.cos(angles), rng.uniform(0.5, 1.0) * np.sin(angles)], 1
-        )
+        size, flat = rng.uniform(1.5, 3.0), rng.uniform(0.5, 1.0)
+        corners = size * np.stack([np.cos(angles), flat * np.sin(angles)], 1)
         corners -= rng.uniform(-0.4, 0.4, 2)
         body = Body(corners, rng.uniform(0.5, 0.9) * float(np.hypot(*corners.T).mean()))
         facts = body.numbers()
@@ -138,25 +137,15 @@ class Simulation:
         end = (y[4] + np.sqrt(y[4] ** 2 + 2 * self.kappa * max(y[1] + radius, 0))) / self.kappa
 
         def at(t: float) -> np.ndarray:
-            return np.array(
-                [
-                    y[0] + y[3] * t,
-                    y[1] + y[4] * t - 0.5 * self.kappa * t**2,
-                    y[2] + y[5] * t,
-                    y[3],
-                    y[4] - self.kappa * t,
-                    y[5],
-                ]
-            )
+            there = y[:3] + y[3:6] * t - (0.0, 0.5 * self.kappa * t**2, 0.0)
+            return np.append(there, y[3:6] - (0.0, self.kappa * t, 0.0))
 
         for corner in np.flatnonzero(self.heights(y) < 1e-9):
             if (self.lever(y, corner) @ y[3:6])[1] < -1e-9:
                 return y, int(corner)
         times = np.concatenate([np.geomspace(1e-5, 1e-3, 200)[:-1], np.linspace(1e-3, 1.0, 20_000)]) * end
         theta = y[2] + y[5] * times
-        tall = np.outer(np.sin(theta), self.body.corners[:, 0]) + np.outer(
-            np.cos(theta), self.body.corners[:, 1]
-        )
+        tall = np.stack([np.sin(theta), np.cos(theta)], 1) @ self.body.corners.T
         over = (y[1] + y[4] * times - 0.5 * self.kappa * times**2)[:, None] + tall
         if (over[0] < -1e-12).any():
             raise OutsideError
@@ -280,11 +269,8 @@ class Simulation:
         free = -(y[5] ** 2) * self.body.reach(y[2])[corner]
         allowed = []
         for name, pull in forces.items():
-            change = (
-                free
-                + np.array([0.0, -self.kappa])
-                + (self.lever(y, corner) @ self.inverse @ self.lever(y, corner).T @ pull)
-            )
+            lever = self.lever(y, corner)
+            change = free + np.array([0.0, -self.kappa]) + (lever @ self.inverse @ lever.T @ pull)
             fits = {
                 # just past the edge of the cone counts as past it: the event has been found there
                 "stick": pull[1] > 0 and abs(pull[0]) <= mu * pull[1] * (1 - 1e-11),

@@ -14,7 +14,6 @@ import pytest
 
 from limitsets.feeder.thrower import impact_angles
 from limitsets.feeder.thrower.contact import fly_on
-from limitsets.feeder.thrower.effects import EFFECTS
 from limitsets.feeder.thrower.effects.bounce import Bounce, struck
 from limitsets.feeder.thrower.effects.landing import Landing, first_arrival
 from limitsets.feeder.thrower.effects.pivot import Pivot, turned_down
@@ -83,11 +82,6 @@ ROWS = [
 ]
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.effect)
-def test_it_is_built(row: Row) -> None:
-    assert row.effect in EFFECTS
-
-
 def test_absent_effects_are_the_bare_map() -> None:
     for case in cases(20, 20):
         xs = np.linspace(case.x, 2 * case.x, 50)
@@ -126,12 +120,8 @@ def ledger(params: Any, x: float, side: int, book: Any) -> int:
     """Fill a book with the steps of a throw: kind, X and H, then height, velocities and rate before and after."""
     part = gather_full(params, side)
     on = part.effects
-    roll, bounce, pivot, slip = (
-        entry_of(on, Roll),
-        entry_of(on, Bounce),
-        entry_of(on, Pivot),
-        entry_of(on, Slip),
-    )
+    roll, bounce = entry_of(on, Roll), entry_of(on, Bounce)
+    pivot, slip = entry_of(on, Pivot), entry_of(on, Slip)
     hit, moving = first_arrival(entry_of(on, Landing), part, x)
     line = 0
     while moving and line + 3 < book.shape[0]:

@@ -251,9 +251,8 @@ def in_the_room(case: Scene, stroke: float, x: float, side: int) -> tuple[float,
     velocity = turn((-(h + d), x), stroke)  # omega = 1 about the joint
 
     def centre(phi: Any) -> np.ndarray:
-        return np.array(
-            [start[0] + velocity[0] * phi, start[1] + velocity[1] * phi - 0.5 * kappa * phi * phi]
-        )
+        fallen = 0.5 * kappa * phi * phi
+        return np.array([start[0] + velocity[0] * phi, start[1] + velocity[1] * phi - fallen])
 
     def vertex(phi: Any) -> np.ndarray:
         return centre(phi) + turn((-a, -d), stroke + phi)
@@ -316,12 +315,8 @@ def test_the_stroke_needs_a_force_that_pushes_within_the_side_and_within_frictio
         a, d, right = case.sides.a[side], case.sides.d[side], case.sides.right[side]
         for x in np.linspace(a + 0.1, 27.9, 60):
             height = h + d
-            force = np.array(
-                [
-                    -acceleration * height - rate2 * x + kappa * np.sin(theta),
-                    acceleration * x - rate2 * height + kappa * np.cos(theta),
-                ]
-            )
+            along = -acceleration * height - rate2 * x + kappa * np.sin(theta)
+            force = np.array([along, acceleration * x - rate2 * height + kappa * np.cos(theta)])
             # the moment about the centre of mass turns the part: c N + d T = rho^2 alpha
             place = (rho2 * acceleration - d * force[0]) / force[1]
             room = np.minimum.reduce([force[1], right - place, place + a])

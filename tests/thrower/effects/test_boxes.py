@@ -45,19 +45,12 @@ def random_part(random):
         along = corners[1] - corners[0]
         along /= np.linalg.norm(along)
         x, y = centre - corners[0]
+        foot, above = along[0] * x + along[1] * y, along[0] * y - along[1] * x
+        center = {"side": 0, "along": f"{float(foot)!r} in", "above": f"{float(above)!r} in"}
+        mass = {"center": center, "radius_of_gyration": f"{random.uniform(0.5, 2.0)!r} in"}
         tree = {
             "name": "random",
-            "part": {
-                "vertices": [[f"{x!r} in", f"{y!r} in"] for x, y in corners.tolist()],
-                "mass": {
-                    "center": {
-                        "side": 0,
-                        "along": f"{float(along[0] * x + along[1] * y)!r} in",
-                        "above": f"{float(along[0] * y - along[1] * x)!r} in",
-                    },
-                    "radius_of_gyration": f"{random.uniform(0.5, 2.0)!r} in",
-                },
-            },
+            "part": {"vertices": [[f"{x!r} in", f"{y!r} in"] for x, y in corners.tolist()], "mass": mass},
             "arm": {"length": "30 in", "surface_height": f"{random.uniform(-1.0, 0.3)!r} in"},
             "throw": {"kappa": f"{random.uniform(9.0, 40.0)!r} in"},
             "model": {"flight": "exact", "flip": "signed"},
@@ -122,9 +115,8 @@ def test_hold_random_parts_with_a_known_speed_and_an_unknown_one():
                 got = images(with_kappa(case.map, 1.0 + width * random.uniform(-1, 1)), x, side)
                 assert not outside(found, x, got).any()
                 points += x.size
-                seen.update(
-                    zip(got.code.tolist(), ((got.side - side) % len(case.sides)).tolist(), strict=True)
-                )
+                turned = (got.side - side) % len(case.sides)
+                seen.update(zip(got.code.tolist(), turned.tolist(), strict=True))
     assert points > 1e5
     assert lost < 0.01 * cells
     # rolls forward by two, three ... sides, and back by one or more
@@ -195,12 +187,11 @@ def test_nothing_is_proved_of_an_effect_that_no_box_kernel_names(k):
 def test_no_orbit_is_proved_with_an_effect_that_no_box_kernel_names():
     given = scene("paper-designed")
     box = parameter_box(given)
-    known = replay(box, (9.0, 9.0), 2, np.tile([[box.lo.kappa], [box.hi.kappa]], 3), np.zeros(3))
+    throws = np.tile([[box.lo.kappa], [box.hi.kappa]], 3), np.zeros(3)
+    known = replay(box, (9.0, 9.0), 2, *throws)
     assert known[0].size == 4
     lo, hi = (each._replace(effects=(*each.effects, Wind(1.0))) for each in (box.lo, box.hi))
-    other = replay(
-        replace(box, lo=lo, hi=hi), (9.0, 9.0), 2, np.tile([[box.lo.kappa], [box.hi.kappa]], 3), np.zeros(3)
-    )
+    other = replay(replace(box, lo=lo, hi=hi), (9.0, 9.0), 2, *throws)
     assert other[0].size == 1
 
 
