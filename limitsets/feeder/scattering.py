@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.base.errors import MapError, SceneError
+from limitsets.base import MapError, SceneError
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene

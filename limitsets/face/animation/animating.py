@@ -7,10 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import replaced
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base import AnswerError, arguments_checked, replaced, shown_in_notebooks
 from limitsets.face.animation.film import Asked
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.cell.feeding.falling import rate_about_end
 from limitsets.face.animation.film import Asked, Film, Leg, Mark, Pace, cut, labels_of, require_length
 from limitsets.face.animation.legs import (

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.face.animation.film import Lanes, Leg, Pace
 from limitsets.face.plot.style import stretch
 from limitsets.face.plot.throwing import Throw, angle_on_side, motion, stroke_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.face.animation.film import Asked, Film, Lanes, Pace, cut, require_length
 from limitsets.face.animation.legs import (
     RESTS,

@@ -18,7 +18,7 @@ from matplotlib.patches import Circle, Polygon
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from limitsets.base.files import as_plain
+from limitsets.base import as_plain
 from limitsets.face.animation.film import Film
 from limitsets.face.animation.picture import (
     ARM,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import limitsets as ls
-from limitsets.base.tables import Table
+from limitsets.base import Table
 from limitsets.face import report
 from limitsets.face.cli.arguments import number
 from limitsets.face.cli.commands import Answer, Run, Scene, command, limits

@@ -17,8 +17,7 @@ from typing import Annotated, Any
 
 import typer
 
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.progress import InterruptedRun
+from limitsets.base import InterruptedRun, LimitsetsError
 from limitsets.face.cli import analyse, cell, certify, design, feedback, margin, scenes, throw
 from limitsets.face.cli.commands import COMMANDS
 

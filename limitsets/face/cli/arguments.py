@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile, ZipFile
 
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.proposals import proposed
+from limitsets.base import LimitsetsError, proposed
 from limitsets.face.cli.output import refuse_other, saved, say_other, stem_of
 
 if TYPE_CHECKING:

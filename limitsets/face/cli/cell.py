@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import limitsets as ls
-from limitsets.base.tables import Table
+from limitsets.base import Table
 from limitsets.face import report
 from limitsets.face.cli.arguments import certified, deviations, laid_ranges, said_of, scattering_of
 from limitsets.face.cli.commands import Answer, Run, Scene, Seed, Words, command, limits

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import limitsets as ls
-from limitsets.base.errors import AnswerError
-from limitsets.base.tables import Table
+from limitsets.base import AnswerError, Table
 from limitsets.face import report
 from limitsets.face.cli.arguments import certified, deviations, laid_ranges, own_file, said_of, with_ending
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command

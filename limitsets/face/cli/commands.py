@@ -22,9 +22,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_args, get_origi
 import typer
 
 import limitsets as ls
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import as_json, as_plain
-from limitsets.base.tables import Table
+from limitsets.base import LimitsetsError, Table, as_json, as_plain
 from limitsets.face import report
 from limitsets.face.cli.output import place_for, progress, saved, show, stem_of
 

@@ -9,10 +9,7 @@ from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import as_json, picked
-from limitsets.base.proposals import proposed
-from limitsets.base.tables import Column, Table
+from limitsets.base import Column, LimitsetsError, Table, as_json, picked, proposed
 from limitsets.face import report
 from limitsets.face.cli.arguments import bounds_of, laid_ranges, number
 from limitsets.face.cli.commands import About, Answer, Run, Scene, Words, command, limits

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.tables import Table
+from limitsets.base import LimitsetsError, Table
 from limitsets.face import report
 from limitsets.face.cli.arguments import certified, deviations, goal_at, named, place, places_of, said_of
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import limitsets as ls
-from limitsets.base.tables import Table, joined
+from limitsets.base import Table, joined
 from limitsets.face import report
 from limitsets.face.cli.arguments import deviations, goal_at, laid_ranges, scattering_of
 from limitsets.face.cli.commands import About, Answer, Run, Scene, Words, command, limits

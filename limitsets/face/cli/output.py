@@ -13,10 +13,7 @@ from json import loads
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import locked, replaced
-from limitsets.base.progress import InterruptedRun, bar
-from limitsets.base.tables import aligned
+from limitsets.base import InterruptedRun, LimitsetsError, aligned, bar, locked, replaced
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -13,10 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import picked
-from limitsets.base.proposals import proposed
-from limitsets.base.tables import Column, Table
+from limitsets.base import Column, LimitsetsError, Table, picked, proposed
 from limitsets.face.cli.commands import Answer, Run, Scene, command, limits
 
 if TYPE_CHECKING:

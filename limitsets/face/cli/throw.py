@@ -8,9 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import as_table
-from limitsets.base.tables import Column, Table
+from limitsets.base import Column, LimitsetsError, Table, as_table
 from limitsets.face import report
 from limitsets.face.cli.arguments import place, position
 from limitsets.face.cli.commands import Answer, Form, Run, Scene, Seed, command, limits

@@ -9,7 +9,7 @@ from typing import Any
 
 import panel as pn
 
-from limitsets.base.errors import SceneError
+from limitsets.base import SceneError
 from limitsets.face.explorer.canvas import SLIDER, said, swatch
 from limitsets.face.explorer.estimates import CELLS, Estimate, Knob, Points
 from limitsets.face.explorer.pictures import look_of

@@ -19,7 +19,7 @@ import panel as pn
 import param
 from panel.custom import JSComponent
 
-from limitsets.base.errors import LimitsetsError
+from limitsets.base import LimitsetsError
 from limitsets.face.explorer.estimates import Knob
 
 HERE = Path(__file__).parent

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import LimitsetsError, shown
+from limitsets.base import LimitsetsError, shown
 from limitsets.face.plot.basin import strips_of
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.geometry.polygon import above_side

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError, LimitsetsError
+from limitsets.base import AnswerError, LimitsetsError, arguments_checked
 from limitsets.feeder.scene import load
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import Any
 
 import panel as pn
 
-from limitsets.base.errors import LimitsetsError
+from limitsets.base import LimitsetsError
 from limitsets.face.animation.film import Film, Pace
 from limitsets.face.animation.legs import require_start
 from limitsets.face.animation.thrown_scenes import film_of_throws

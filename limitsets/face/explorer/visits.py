@@ -14,8 +14,7 @@ from jinja2 import Template
 from panel.io.callbacks import PeriodicCallback
 from tornado.websocket import WebSocketClosedError
 
-from limitsets.base.errors import AnswerError, LimitsetsError, MapError
-from limitsets.base.progress import Progress, bar, in_notebook
+from limitsets.base import AnswerError, LimitsetsError, MapError, Progress, bar, in_notebook
 from limitsets.face.explorer.canvas import PAGE, Canvas
 from limitsets.face.explorer.page import MapPage, ScenePage
 from limitsets.face.explorer.work import within_reach

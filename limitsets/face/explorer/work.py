@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import LimitsetsError, SceneError
+from limitsets.base import LimitsetsError, SceneError
 from limitsets.feeder.geometry import convex_polygon
 from limitsets.feeder.geometry.polygon import above_side, plate_with_points
 from limitsets.feeder.scene import Scene, load

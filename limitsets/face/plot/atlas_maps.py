@@ -20,8 +20,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import Normal, Stroke, withTickedStroke
 from scipy.ndimage import distance_transform_edt, label
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import load

@@ -11,8 +11,7 @@ import numpy.typing as npt
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Patch
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.face.plot.atlas_maps import frame, hatched, mark, pixels, title_of
 from limitsets.feeder.scene import load

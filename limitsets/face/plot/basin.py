@@ -12,8 +12,7 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import FancyArrowPatch, Patch
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.feeder.scene import Scene
 from limitsets.systems.cells import CellSet, Grid

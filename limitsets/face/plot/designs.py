@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.face.plot.style import Extents
 from limitsets.parameters.margins.margin_result import bound

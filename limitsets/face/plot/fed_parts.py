@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Patch, Polygon
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import arguments_checked
 from limitsets.cell.assembly.assembly_run import OUTCOMES, rate_of
 from limitsets.cell.feeding.falling import FATES, tipping_times
 from limitsets.face.plot import style

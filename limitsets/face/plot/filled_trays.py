@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Polygon
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import arguments_checked
 from limitsets.face.plot import style
 from limitsets.face.plot.throwing import about_centre, turned
 from limitsets.parameters.noise.sampling import binomial_interval

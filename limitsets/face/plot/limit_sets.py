@@ -10,7 +10,7 @@ from matplotlib.patches import FancyArrowPatch, Patch, Polygon
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import arguments_checked
 from limitsets.face.plot import style
 from limitsets.face.plot.style import Extents, Subject, subject_of
 from limitsets.feeder.goals import OrientedBeyond

@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches
 from limitsets.feeder.scene.quantities import parsed_deviation

@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.face.plot.throwing import angle_on_side, motion, outline, throws_of, turned
 from limitsets.feeder.geometry import side_ends

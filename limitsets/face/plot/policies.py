@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.patches import Patch
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.feeder.scene.surroundings import BeyondSensor
 

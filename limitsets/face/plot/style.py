@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.analysis import other_vertex_first

@@ -16,8 +16,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.proposals import proposed
+from limitsets.base import AnswerError, proposed
 from limitsets.feeder.goals import (
     Goal,
     OrientedBeyond,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limitsets.base.files import as_json
+from limitsets.base import as_json
 from limitsets.face import plot
 from limitsets.face.report.pages import in_time, words
 from limitsets.face.report.writing import laid

@@ -9,9 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from limitsets.base.errors import AnswerError, LimitsetsError
-from limitsets.base.files import as_json, replaced
-from limitsets.base.progress import Progress
+from limitsets.base import AnswerError, LimitsetsError, Progress, as_json, replaced
 from limitsets.face import plot
 from limitsets.face.plot.style import stretch
 from limitsets.face.report.pages import as_html, as_uri, page, percent, words

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.feeder.engine.member import (
     FLYING,
     HINGED,

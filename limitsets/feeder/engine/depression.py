@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, arguments_checked
 from limitsets.feeder.engine.member import ground_of
 from limitsets.feeder.engine.stage import IDLE, LEANING, Stage, nearest, pymunk_module, set_up
 from limitsets.feeder.geometry import side_ends

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.feeder.engine.stage import LEANING, faces_about, nearest, pymunk_module, set_up
 from limitsets.feeder.geometry import side_ends
 

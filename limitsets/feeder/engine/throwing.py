@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError, MapError
+from limitsets.base import AnswerError, MapError, arguments_checked
 from limitsets.feeder.engine.stage import (
     INSTANT,
     OVERLAP,

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import GeometryError, TipsError
+from limitsets.base import GeometryError, TipsError
 
 Scalar: TypeAlias = Any
 """A float, or anything with ``+ - * /``: an mpmath number, a ball of python-flint, an interval."""

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, TypeAlias, get_type_hin
 
 import numpy as np
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 
 # ----------------------------------------------------------------
 # What a goal says of itself, and the table of those that a scene can name.

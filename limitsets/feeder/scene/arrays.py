@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import SceneError
+from limitsets.base import SceneError
 from limitsets.feeder.geometry import Mass, OnSide, heights_inside, is_convex, is_triangle, triangle_of
 from limitsets.feeder.geometry.polygon import Scalar, Vector
 from limitsets.feeder.scene.numbers import SIGNED, SIGNED_POINT, Unchecked

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from limitsets.base.errors import SceneError, TipsError
+from limitsets.base import SceneError, TipsError
 from limitsets.feeder.geometry.polygon import mass_of
 from limitsets.feeder.scene.facts import TIPPING, Scatter
 from limitsets.feeder.scene.numbers import hull_of

@@ -11,7 +11,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from limitsets.base.errors import AnswerError, shown
+from limitsets.base import AnswerError, shown
 from limitsets.feeder.goals import Goal, Laid
 from limitsets.feeder.scene.units import exact_factor, parse
 

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from limitsets.base.files import as_table, picked
-from limitsets.base.proposals import proposed
+from limitsets.base import as_table, picked, proposed
 from limitsets.feeder.scene.facts import FACTS, SCATTERED
 
 if TYPE_CHECKING:

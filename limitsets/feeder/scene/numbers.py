@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import GeometryError
+from limitsets.base import GeometryError
 from limitsets.feeder.geometry import (
     Mass,
     OnSide,

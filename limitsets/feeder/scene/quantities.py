@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
-from limitsets.base.errors import GeometryError, SceneError, shown
+from limitsets.base import GeometryError, SceneError, shown
 from limitsets.feeder.scene.facts import Deviation
 from limitsets.feeder.scene.units import Quantity, convert, parse, written
 from limitsets.feeder.scene.validation import Tree

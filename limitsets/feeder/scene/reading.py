@@ -15,9 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import SceneError, TipsError, shown
-from limitsets.base.files import replaced
+from limitsets.base import SceneError, TipsError, arguments_checked, replaced, shown
 from limitsets.feeder.scene.facts import TIPPING
 from limitsets.feeder.scene.numbers import Unchecked
 from limitsets.feeder.scene.quantities import text_at

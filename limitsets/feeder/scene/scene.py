@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import AnswerError, SceneError
-from limitsets.base.tables import Column, Table, Tabled, facts
+from limitsets.base import AnswerError, Column, SceneError, Table, Tabled, facts
 from limitsets.feeder.geometry import RestingSides
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scene.facts import WITHOUT_EDGE, Deviation, Effects, World

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import MISSING
 from typing import Any, NamedTuple, TypeAlias
 
-from limitsets.base.errors import SceneError, shown
+from limitsets.base import SceneError, shown
 from limitsets.feeder.goals import GOALS, Goal, words_of
 from limitsets.feeder.scene.facts import FACTS, Fact
 from limitsets.feeder.scene.units import density_dimension, parse

@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from limitsets.base.errors import LONGEST, SceneError, shown
+from limitsets.base import LONGEST, SceneError, shown
 
 UNITS: dict[str, tuple[str, ...]] = {
     "length": ("m", "cm", "mm", "in", "ft", "um"),

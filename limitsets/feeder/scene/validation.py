@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple, TypeAlias
 
-from limitsets.base.errors import SceneError, shown
+from limitsets.base import SceneError, shown
 from limitsets.feeder.scene.schema import ByName, Section, Several, schema
 from limitsets.feeder.scene.units import UNITS
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from limitsets.base.errors import MapError
+from limitsets.base import MapError
 from limitsets.feeder.thrower.contact import fly_on
 from limitsets.feeder.thrower.effects import EFFECTS
 from limitsets.feeder.thrower.effects.bounce import Bounce, struck

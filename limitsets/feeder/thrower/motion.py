@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import MapError
+from limitsets.base import MapError
 from limitsets.feeder.thrower import motion
 from limitsets.feeder.thrower import motion as motion_box
 from limitsets.feeder.thrower.flight import Turned

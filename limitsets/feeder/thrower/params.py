@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.base.errors import MapError
+from limitsets.base import MapError
 from limitsets.numbers.interval import Interval
 from limitsets.numbers.interval.number import square_root
 from limitsets.numbers.jit import generic, proof_kernel

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.base.errors import MapError
+from limitsets.base import MapError
 from limitsets.feeder.thrower.impact import strike
 from limitsets.feeder.thrower.motion import FullThrow
 from limitsets.feeder.thrower.params import Throw, gather

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.numbers.jit import proof_kernel
 
 RELATIVE = 3.0 * 2.0**-52

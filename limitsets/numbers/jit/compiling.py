@@ -14,7 +14,7 @@ from numba.core import codegen, config
 from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
 
-from limitsets.base.errors import LimitsetsError, MapError
+from limitsets.base import LimitsetsError, MapError
 from limitsets.numbers.jit.cache import CACHE, COMPILED, FOREIGN, PACKAGE, classes_in, names_in
 
 # ----------------------------------------------------------------

@@ -9,7 +9,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar, overload
 import numpy as np
 from numba import extending, types
 
-from limitsets.base.errors import MapError
+from limitsets.base import MapError
 from limitsets.numbers.jit.compiling import ESTIMATE, OVERLOAD, PROOF, with_helpers
 
 P = ParamSpec("P")

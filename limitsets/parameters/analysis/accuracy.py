@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError, LimitsetsError
-from limitsets.base.files import as_table, picked
+from limitsets.base import AnswerError, LimitsetsError, as_table, picked
 from limitsets.feeder.scene import Scene
 from limitsets.systems.cells import grid
 from limitsets.systems.graph import TransitionGraph, transitions

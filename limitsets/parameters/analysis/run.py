@@ -9,11 +9,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress, shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled, bands_of, facts
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    bands_of,
+    facts,
+    picked,
+    shown_in_notebooks,
+)
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scene import Scene, load_to_analyse
 from limitsets.parameters.analysis.accuracy import (

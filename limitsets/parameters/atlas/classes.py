@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.parameters.atlas.plan import codes_of
 
 if TYPE_CHECKING:

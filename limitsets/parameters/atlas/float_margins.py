@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.arrays import ThrowStack, throw_stack

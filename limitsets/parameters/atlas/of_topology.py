@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import AnswerError, LimitsetsError
+from limitsets.base import AnswerError, LimitsetsError
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.parameters.atlas.classes import classes
 from limitsets.parameters.atlas.float_margins import float_margins, threshold_of, unit_of_margin

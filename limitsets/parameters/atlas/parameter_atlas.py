@@ -13,12 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import (
+    Column,
+    LimitsetsError,
+    MapError,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_plain,
+    locked,
+    shown_in_notebooks,
+)
 from limitsets.base.campaign import Work, chosen_pool, drive, imported
-from limitsets.base.errors import LimitsetsError, MapError
-from limitsets.base.files import as_plain, locked
-from limitsets.base.progress import Progress, shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
 from limitsets.parameters.atlas.classes import UNDECIDED_NAME

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import code_digest
+from limitsets.base import LimitsetsError, code_digest
 from limitsets.parameters.atlas.subjects import Axis, Points, Subject, source_of
 
 # ----------------------------------------------------------------

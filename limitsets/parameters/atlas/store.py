@@ -20,9 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from limitsets.base import LimitsetsError, replaced
 from limitsets.base.campaign import imported
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import replaced
 from limitsets.parameters.atlas.plan import Plan, all_are, codes_of, differences, digest_of
 from limitsets.parameters.atlas.subjects import SceneSubject
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import AnswerError, LimitsetsError, MapError, SceneError
+from limitsets.base import AnswerError, LimitsetsError, MapError, SceneError
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import base_unit, find, unit_read
 from limitsets.feeder.scene.units import Quantity, convert, parse

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base.errors import LimitsetsError
+from limitsets.base import LimitsetsError
 from limitsets.parameters.atlas.plan import (
     Block,
     BlockTask,

@@ -10,9 +10,7 @@ from typing import Any, NamedTuple
 import networkx as nx
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.progress import shown_in_notebooks
+from limitsets.base import AnswerError, arguments_checked, shown_in_notebooks
 from limitsets.feeder.scene import load
 from limitsets.parameters.continuation.collisions import Approach, approaches, crossing, nearest
 from limitsets.parameters.continuation.path import Curve, Path, between, read_path

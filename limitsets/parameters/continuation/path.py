@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import in_units
 from limitsets.feeder.scene.scene import in_unit_of, unit_of

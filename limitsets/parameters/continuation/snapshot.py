@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.files import as_table, picked
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import Column, Table, Tabled, as_table, picked
 from limitsets.parameters.continuation.growth import (
     MOST_PERIOD,
     Recorded,

@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from limitsets.base.errors import AnswerError, SceneError
+from limitsets.base import AnswerError, SceneError
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.facts import Deviation
 from limitsets.feeder.scene.quantities import base_unit, deviation, find, parsed_deviation, text_at, texts

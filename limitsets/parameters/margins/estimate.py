@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from limitsets.base import as_table, picked
 from limitsets.base.arrays import Array, Ints
-from limitsets.base.files import as_table, picked
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.thrower import Throw
 from limitsets.parameters.margins.deviations import Signs, Tolerance, corners, worst_corner

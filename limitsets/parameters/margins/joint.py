@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Mask
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.margins.brackets import Bracket, Ray, Tell

@@ -9,9 +9,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import Any
 
-from limitsets.base.errors import AnswerError, LimitsetsError
-from limitsets.base.files import as_table, picked
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import AnswerError, Column, LimitsetsError, Table, Tabled, as_table, picked
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, as_written, by_side
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.left_out import Model

@@ -16,12 +16,18 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    picked,
+    shown_in_notebooks,
+)
 from limitsets.base.arrays import Array
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress, shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, unknown_goal
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.laid import LaidLike, laid_goal, read_laid

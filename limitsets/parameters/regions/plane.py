@@ -13,10 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base import AnswerError, Column, Progress, Table, Tabled
 from limitsets.base.arrays import Array, Arrays, Ints
-from limitsets.base.errors import AnswerError
-from limitsets.base.progress import Progress
-from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
 from limitsets.feeder.scene.quantities import find

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Arrays
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import NOISE_ONLY, find
 from limitsets.feeder.scene.units import parse

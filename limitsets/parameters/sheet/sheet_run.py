@@ -11,10 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_json, replaced
-from limitsets.base.progress import Progress, shown_in_notebooks
+from limitsets.base import AnswerError, Progress, arguments_checked, as_json, replaced, shown_in_notebooks
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, by_side
 from limitsets.feeder.scattering import Scattering
 from limitsets.feeder.scene import Scene, load

@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.tables import Table, Tabled, joined
+from limitsets.base import AnswerError, Table, Tabled, as_table, joined, picked
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scattering import LAWS, Scattering, scattering_of
 from limitsets.feeder.scene import Scene, load

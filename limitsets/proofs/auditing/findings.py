@@ -15,11 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import Column, LimitsetsError, Table, Tabled, arguments_checked, as_table, picked
 from limitsets.base.arrays import Array, Mask
-from limitsets.base.errors import LimitsetsError
-from limitsets.base.files import as_table, picked
-from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scene.facts import NOT_TIPPING, TIPPING
 from limitsets.feeder.scene.left_out import Model
 from limitsets.proofs.auditing.assumptions import ASSUMPTIONS, Assumption

@@ -17,11 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from limitsets.base import AnswerError, Column, Table, Tabled, as_table, picked, shown_in_notebooks
 from limitsets.base.arrays import Array
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled
 from limitsets.feeder.scattering import Scattering, scattering_of, starts_from
 from limitsets.numbers.interval import guard
 from limitsets.proofs.chances.averages import Nodes, mean_matrix, rounding_of

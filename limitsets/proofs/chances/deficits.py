@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.scattering import Gaussian, Uniform
 from limitsets.proofs.chances.averages import (
     Average,

@@ -8,8 +8,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Mask
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.scene import require_rests

@@ -16,8 +16,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Ints, Mask
-from limitsets.base.errors import AnswerError
 from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.ranges import expand
 

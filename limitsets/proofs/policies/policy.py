@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import Table, Tabled
 from limitsets.base.arrays import Ints, Mask
-from limitsets.base.tables import Table, Tabled
 from limitsets.proofs.policies.game import Bits, Game, Kept, cells_of
 
 NONE = -1

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError, Progress, silent
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.errors import AnswerError
-from limitsets.base.progress import Progress, silent
 from limitsets.feeder.scattering import uniform_starts
 from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
 from limitsets.proofs.policies.policy import NONE

@@ -9,12 +9,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import (
+    AnswerError,
+    Table,
+    Tabled,
+    arguments_checked,
+    as_table,
+    facts,
+    picked,
+    shown_in_notebooks,
+)
 from limitsets.base.arrays import Arrays
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import shown_in_notebooks
-from limitsets.base.tables import Table, Tabled, facts
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.left_out import Model
 from limitsets.feeder.scene.surroundings import BeyondSensor, Sensor, exact_text

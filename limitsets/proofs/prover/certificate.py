@@ -21,11 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
+from limitsets.base import AnswerError, arguments_checked, bar, in_notebook, replaced
 from limitsets.base.arrays import Array, Arrays
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import replaced
-from limitsets.base.progress import bar, in_notebook
 from limitsets.feeder.scene.units import spelled_plainly
 from limitsets.feeder.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
 from limitsets.proofs.prover.attraction import Attraction

@@ -10,9 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, overload
 
-from limitsets.base.arguments import arguments_checked_as
-from limitsets.base.errors import AnswerError, shown
-from limitsets.base.progress import Progress, shown_in_notebooks
+from limitsets.base import AnswerError, Progress, arguments_checked_as, shown, shown_in_notebooks
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.laid import LaidLike, laid_goals
 from limitsets.feeder.scene.quantities import deviation, find

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.thrower import Exact
 from limitsets.feeder.thrower.flight_box import bracket, exact_turn, turn_box, turn_point
 from limitsets.feeder.thrower.impact import margin, strike

@@ -29,12 +29,19 @@ from typing import Any, NoReturn, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked_as
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    arguments_checked_as,
+    as_table,
+    bands_of,
+    picked,
+    shown_in_notebooks,
+)
 from limitsets.base.arrays import Array, Ints
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.progress import Progress, shown_in_notebooks
-from limitsets.base.tables import Column, Table, Tabled, bands_of
 from limitsets.numbers.interval import guard
 from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.numbers import Intervals

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.thrower.effects.landing import Landing
 from limitsets.feeder.thrower.effects.roll import Roll
 from limitsets.feeder.thrower.full_box import landed, rested_one_way

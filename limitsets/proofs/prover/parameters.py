@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Mask
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.geometry.polygon import above_side
 from limitsets.feeder.scene import Scene

@@ -10,9 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.tables import Column, Table, Tabled, bands_of
+from limitsets.base import AnswerError, Column, Table, Tabled, as_table, bands_of, picked
 from limitsets.feeder.goals import Goal, Laid, by_side
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.left_out import Model

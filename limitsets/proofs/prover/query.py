@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import Goal, Reaches
 from limitsets.feeder.scene import Scene, load
 from limitsets.proofs.prover.attraction import Attraction, attraction

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.base.errors import GridError, shown
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import Column, GridError, Table, Tabled, shown
 
 # ----------------------------------------------------------------
 # Where states may lie: a box of x for each side, or none.

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import MapError
+from limitsets.base import MapError
 from limitsets.numbers.interval import rounding_is_sound
 from limitsets.systems.cells import Domain
 from limitsets.systems.graph.images.enclosed import BOTH, NOTHING, BoxImages

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.systems.graph.components import attracting_of, descend, reach
 from limitsets.systems.graph.graph import TransitionGraph
 

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError, arguments_checked
 from limitsets.systems.cells import Grid
 from limitsets.systems.graph.agreement import require_agreement
 from limitsets.systems.graph.graph import TransitionGraph

@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.tables import Table, Tabled, facts
+from limitsets.base import AnswerError, Table, Tabled, arguments_checked, facts
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph.components import Components, Condensation, strong_components
 from limitsets.systems.graph.ranges import Ranges, cells_of, count_edges, expand

@@ -42,7 +42,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError, MapError, shown
+from limitsets.base import AnswerError, MapError, shown
 from limitsets.numbers.jit import cover_foreign_class
 from limitsets.systems.maps import codes, derived, kernels
 

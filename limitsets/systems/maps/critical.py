@@ -13,8 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError, shown
+from limitsets.base import AnswerError, arguments_checked, shown
 from limitsets.numbers.jit import kernel
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.contract import kind_of, require_sides

@@ -13,9 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import MapError, shown
-from limitsets.base.tables import Table, Tabled
+from limitsets.base import MapError, Table, Tabled, arguments_checked, shown
 from limitsets.numbers.jit import generic, kernel
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.contract import has_slope, kind_of, or_register, require_codes, require_sides

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError, MapError
+from limitsets.base import AnswerError, MapError, arguments_checked
 from limitsets.numbers.jit import kernel, row_of
 from limitsets.systems.maps.contract import coerce, has_slope, kind_of, require_sides
 from limitsets.systems.maps.critical import (

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.components import reach

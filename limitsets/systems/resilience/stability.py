@@ -12,10 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.tables import Column, Table, Tabled, how_found
+from limitsets.base import AnswerError, Column, Table, Tabled, arguments_checked, as_table, how_found, picked
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.components import ranks

@@ -25,10 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.files import as_table, picked
-from limitsets.base.tables import Column, Table, Tabled, how_found
+from limitsets.base import AnswerError, Column, Table, Tabled, arguments_checked, as_table, how_found, picked
 from limitsets.systems.cells import Grid
 from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.maps import codes

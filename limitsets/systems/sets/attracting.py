@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.tables import Column, Table, Tabled, facts, how_found
+from limitsets.base import AnswerError, Column, Table, Tabled, arguments_checked, facts, how_found
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph, transitions
 from limitsets.systems.maps import has_slope, orbit

@@ -10,9 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError
-from limitsets.base.tables import Column, Table, Tabled, how_found
+from limitsets.base import AnswerError, Column, Table, Tabled, arguments_checked, how_found
 from limitsets.numbers.jit import kernel
 from limitsets.systems.cells import Grid
 from limitsets.systems.graph import TransitionGraph

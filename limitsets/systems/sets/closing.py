@@ -23,8 +23,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
-from limitsets.base.tables import Column, Table, Tabled
+from limitsets.base import AnswerError, Column, Table, Tabled
 from limitsets.systems.maps.drivers import images
 from limitsets.systems.sets.end_points import EPS
 

@@ -18,9 +18,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError, shown
-from limitsets.base.tables import Column, Table, Tabled, bands_of
+from limitsets.base import AnswerError, Column, Table, Tabled, arguments_checked, bands_of, shown
 from limitsets.systems.graph.graph import TransitionGraph, morse_graph
 from limitsets.systems.maps.contract import kind_of
 from limitsets.systems.maps.critical import SAMPLES, Sides, margins

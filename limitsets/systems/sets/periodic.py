@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from limitsets.base.arguments import arguments_checked
-from limitsets.base.errors import AnswerError, shown
+from limitsets.base import AnswerError, arguments_checked, shown
 from limitsets.numbers.jit import kernel
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph.graph import TransitionGraph

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.numbers.jit import kernel, row_of
 from limitsets.systems.maps.contract import has_slope, kind_of
 from limitsets.systems.maps.kernels import image_on, on_side

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from limitsets.base.errors import MapError
+from limitsets.base import MapError
 from limitsets.feeder.thrower.motion import (
     Effect,
     Face,

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Mask
-from limitsets.base.errors import AnswerError
 from limitsets.feeder.goals import Predicate
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.numbers.interval import guard
 from limitsets.numbers.jit import proof_kernel, take_mark
 from limitsets.systems.cells import Grid

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.numbers.jit import kernel
 from limitsets.systems.cells import Grid
 from limitsets.systems.graph.images.undecided import SamplePoints, every_branch, mark_bends, split

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base.errors import AnswerError
+from limitsets.base import AnswerError
 from limitsets.numbers.jit import kernel
 from limitsets.systems.graph.target import Target, TargetBoxes, leaving, place, placed
 from limitsets.systems.maps import codes, images, images_on, kind_of

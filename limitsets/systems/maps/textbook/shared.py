@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from limitsets.base.errors import MapError
+from limitsets.base import MapError
 from limitsets.numbers.interval import Interval
 from limitsets.numbers.jit import kernel, proof_kernel
 from limitsets.systems.maps.derived import NO_WITNESS
