@@ -135,7 +135,7 @@ class Scene(Tabled):
         SceneError
             For the first thing wrong, with file, key, value, what is allowed and what to do.
         """
-        from limitsets.feeder.scene.build import resolved  # lazily: it loads pydantic
+        from limitsets.feeder.scene.build import resolved  # lazily: a `Scene` may be all that is needed
 
         return cls(**resolved(structure, file))
 
