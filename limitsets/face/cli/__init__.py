@@ -1,4 +1,4 @@
-"""The command line: commands in the files that `app` lists, what all of them share in `commands`, and `main` around them.
+"""The command line: commands in the files that `app` lists, on what they share in `commands`, and `main` around them.
 
 Commands import their rooms when they run, so `limitsets --help` loads none of them.  Answers go to stdout, all other
 output to stderr.  Exit codes: 0 done, 2 bad input or a place that cannot be written, 130 interrupted; 1 is reserved for
