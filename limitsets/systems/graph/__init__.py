@@ -1,4 +1,4 @@
-"""The transition graph and its algorithms: components, their order, reachability, all on ranges of cells."""
+"""The transition graph: images of cells, and on their ranges the components, their order, what reaches what."""
 
 from limitsets.systems.graph.building import transitions
 from limitsets.systems.graph.components import Components, Condensation

@@ -1,4 +1,4 @@
-"""Discrete-time maps on (x, side): the contract, the drivers, and textbook maps with answers on paper.
+"""Discrete-time maps on (x, side): their contract, orbits, critical points, and textbook maps with answers on paper.
 
 The throw map (`limitsets.thrower`) is one such map; a user's own map becomes another by `register`.
 """

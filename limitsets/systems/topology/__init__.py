@@ -1,4 +1,4 @@
-"""The topology of attractors at one parameter point after another: how many, of how many bands, in which order."""
+"""The topology of attractors at many parameters, on cells of its own: how many, of how many bands, in which order."""
 
 from limitsets.systems.topology.points import reaches, region_of, topologies
 from limitsets.systems.topology.work import DOUBTS, Topologies
