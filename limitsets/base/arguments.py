@@ -22,6 +22,7 @@ R = TypeVar("R")
 
 # Class -> the call that gives one.  A class is known by its name: the rooms are above this file.
 GIVEN_BY = {
+    "Analysis": "limitsets.analyse(scene)",
     "Assembly": "limitsets.assemble(scene, scene2)",
     "Atlas": "limitsets.atlas(scene, x, y)",
     "Attractor": "limitsets.attractors(graph)",

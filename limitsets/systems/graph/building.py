@@ -95,9 +95,10 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
         A map (`scene.map`, `limitsets.maps`, or your own after `limitsets.register`).
     grid : Grid
         Cells to go between.
-    method : {"end-points", "corners", "corners-padded", "boxes"}, optional
-        How the image of a cell is found.  Default: the end points in one dimension, padded corners in more.  "boxes"
-        proves that no image of any point is missed, for a map with `image_box`; the others sample.
+    method : str, optional
+        How the image of a cell is found, a word of docs/choosing.md.  Default: "end-points" in one dimension,
+        "corners-padded" in more.  "boxes" proves that no image of any point is missed, for a map with `image_box`; the
+        others sample.
     **options
         For "boxes": upper, the upper corner of a box of parameters.
 

@@ -1,7 +1,7 @@
 """Image methods: from a cell to the cells its image meets.
 
-A method is a function ``(map, grid, side, target, **options) -> Boxes``.  Most sample: they are a function
-``(grid, side, **options) -> Samples`` in `sampled`.  To add one, write its file and name it here.
+A method is a function ``(map, grid, side, target, **options) -> TargetBoxes``.  Most sample: they are a function
+``(grid, side, **options) -> SamplePoints`` in `sampled`.  To add one, write its file and name it here.
 """
 
 from limitsets.systems.graph.images.enclosed import enclosed
