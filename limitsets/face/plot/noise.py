@@ -52,6 +52,11 @@ def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = Non
     -------
     matplotlib.figure.Figure
         One panel per side.
+
+    Raises
+    ------
+    AnswerError
+        Every part leaves: there is no density.
     """
     if not found.classes:
         remedy = "nothing stays: nothing to draw"
