@@ -103,10 +103,10 @@ def test_the_command_says_undecided_and_exits_with_1(capfd, tmp_path, monkeypatc
 def test_a_margin_that_is_denied_is_undecided(tmp_path, wrong):
     (speed,) = ls.margin("paper-designed", "throw.speed", reading="fixed", width=0.5)
     assert speed.proved > 0
-    left, files = settled(speed, tmp_path)
+    left = settled(speed, tmp_path)
     # the file of the orbit that refutes rests on its throws, and not on the cells that are wrong here
     assert (left.proved, left.refuted, left.closed) == (0.0, speed.refuted, False)
-    assert [file.name.split(".", 1)[1] for file in files] == ["refuted.zip"]
+    assert [name.split(".", 1)[1] for name in left.files] == ["refuted.zip"]
     assert "denied" in left.reason
     assert {path.name.split(".", 1)[1] for path in tmp_path.iterdir()} == {"denied.zip", "refuted.zip"}
 

@@ -10,7 +10,7 @@ import limitsets as ls
 from limitsets.feeder.scene.numbers import Numbers
 from limitsets.feeder.scene.quantities import base_unit, find, text_at
 from limitsets.feeder.scene.units import exact_factor, parse, share_of_pi
-from limitsets.parameters.design.derivatives import numbers_of
+from limitsets.parameters.design.derivatives import sides_of
 from limitsets.proofs.prover.parameters import parameter_box
 
 POINTS = [{"x": "1.5 in", "y": "1 in", "mass": "50 g"}, {"x": "2 in", "y": "1.5 in", "mass": "0.1 lb"}]
@@ -64,7 +64,7 @@ def test_every_kind_of_number_says_the_same(name):
     scalars["arm_length"] = exact.number("arm.length")
     radius = exact.shape.radius_of_gyration
     sides = dict(zip(("a", "d", "length"), columns, strict=False))
-    floats, box, duals = given.bare_map, parameter_box(given), numbers_of(given, [])
+    floats, box, duals = given.bare_map, parameter_box(given), sides_of(given, [])
     assert given.radius_of_gyration == pytest.approx(float(radius), rel=1e-14)
     assert given.sides.corner == pytest.approx([float(x) for x in columns[4]], rel=1e-14)
     for word, value in scalars.items():
@@ -74,9 +74,11 @@ def test_every_kind_of_number_says_the_same(name):
         assert getattr(given.sides, word) == pytest.approx([float(x) for x in values], rel=1e-13)
         lo, hi = (getattr(end, word).tolist() for end in (box.lo, box.hi))
         assert all(a < x < b for a, x, b in zip(lo, values, hi, strict=True))
-        assert [x.value for x in getattr(duals, word)] == pytest.approx(getattr(given.sides, word), rel=1e-13)
-    assert duals.kappa.value == pytest.approx(float(scalars["kappa"]), rel=1e-14)
-    assert duals.rho.value == pytest.approx(float(radius), rel=1e-14)
+        assert [getattr(side, word).value for side in duals] == pytest.approx(
+            getattr(given.sides, word), rel=1e-13
+        )
+    assert duals[0].kappa.value == pytest.approx(float(scalars["kappa"]), rel=1e-14)
+    assert duals[0].rho.value == pytest.approx(float(radius), rel=1e-14)
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -210,7 +210,7 @@ def certified(
         except DeniedError as error:
             kept = str(file.with_name(Path(error.file or "").name))
             answer = answer.denied(error.claims if claim is None else error.claims[claim])
-            return answer, written | {"file": kept, "denied": True}
+            return answer, written | {"file": kept, "denied": True, "recheck": time.perf_counter() - begin}
         say_replaced(file, draft)
     return answer, written | {"file": str(file), "recheck": time.perf_counter() - begin if recheck else None}
 
