@@ -7,9 +7,9 @@ an undecided cell) are values of the answers, never exceptions.
 
 from __future__ import annotations
 
+import functools
 import math
 import numbers
-from functools import partial
 
 # Letters of a text that an error shows.
 LONGEST = 64
@@ -57,7 +57,7 @@ class LimitsetsError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Rebuild from the parts, so that an error crosses process borders whole."""
-        kind = partial(type(self), key=self.key, file=self.file)
+        kind = functools.partial(type(self), key=self.key, file=self.file)
         return kind, (self.thing, self.value, self.allowed, self.remedy)
 
 
