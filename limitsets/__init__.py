@@ -198,9 +198,8 @@ class _Rooms:
 
 
 if not any(type(finder).__name__ == _Rooms.__name__ for finder in sys.meta_path):
-    sys.meta_path.insert(
-        0, _Rooms()
-    )  # before the finder of files, which would read a file in a room a second time
+    # before the finder of files, which would read a file in a room a second time
+    sys.meta_path.insert(0, _Rooms())
 
 
 if not TYPE_CHECKING:  # a checker of types has the imports above, and finds a name that is not there

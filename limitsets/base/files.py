@@ -112,9 +112,8 @@ def replaced(folder: str | Path) -> Iterator[Path]:
         drafts = sorted(draft.iterdir())
         for file in drafts:
             target = place / file.name
-            if (
-                target.exists() and not target.is_file()
-            ):  # a folder, a pipe, a device: not ours to rename over
+            # a folder, a pipe, a device: not ours to rename over
+            if target.exists() and not target.is_file():
                 raise FileExistsError(errno.EEXIST, "not a regular file", str(target))
         for file in drafts:
             file.replace(place / file.name)

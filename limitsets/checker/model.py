@@ -197,9 +197,8 @@ def guess_root(floats: tuple[float, ...], is_exact: bool, x: float, kappa: float
     if not is_exact:
         return 2.0 * (x - first_a) / (kappa - small)
     last = math.inf
-    for k in range(
-        100
-    ):  # next to the joint the root is far smaller than p, and the first steps only halve the guess
+    # next to the joint the root is far smaller than p, and the first steps only halve the guess
+    for k in range(100):
         sin, cos = math.sin(p), math.cos(p)
         a = first_a if sin > 0 else a_past
         slope = x - a * cos + d * sin - kappa * p

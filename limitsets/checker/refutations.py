@@ -155,11 +155,12 @@ def orbits_statement(section: dict[str, Any]) -> str:
 
 
 MOST_THROWS = 100_000  # throws of an orbit that refutes
+# an orbit refutes because it is periodic, closes with noise, or once is enough
 RECURS = (
     "cycle",
     "closed",
     "once",
-)  # an orbit refutes because it is periodic, closes with noise, or once is enough
+)
 BROKEN = {  # the goals that an orbit may refute: their keys besides from_anywhere, and words for the orbit
     "oriented_beyond": ("kind x side", "comes to lie beyond x = {text} on another side than {side}"),
     "reaches": ("kind x side every_orbit", "never comes to rest on side {side} at x >= {text}"),
@@ -275,9 +276,8 @@ def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
     try:
         states = periodic(scene, section["orbit"]) if why == "cycle" else thrown_again(scene, section)
         if section["laid"] is not None:
-            begins = (
-                states[:1] if why == "once" else states
-            )  # an orbit that comes back begins with each of its states
+            # an orbit that comes back begins with each of its states
+            begins = states[:1] if why == "once" else states
             laid = any(lies_within(section["laid"], state) for state in begins)
             prove(laid, "no state of the orbit is proved to be one in which a part is laid down")
         if why == "once":

@@ -406,9 +406,8 @@ def test_the_error_asked_for_is_met_and_known(name, error):
     assert plans == [reached.plan]
     assert reached.plan.expected
     assert reached.met
-    assert (
-        _distance(found.extents[0], LIMIT_SETS[name]) <= reached.reached + 1e-12
-    )  # the ends above have twelve digits
+    # the ends above have twelve digits
+    assert _distance(found.extents[0], LIMIT_SETS[name]) <= reached.reached + 1e-12
     assert found.extents_from == (reached.plan.chosen.method,)
     assert found.graph.grid.shape[0, 0] == reached.plan.chosen.cells
     assert reached.plan.chosen.error <= error

@@ -180,9 +180,8 @@ def test_a_certificate_that_was_changed_or_is_not_true_is_not_accepted(capfd):
     """Beyond 15 in parts lie on side 0 too (limit set up to 19.75), whatever the header says."""
     run(capfd, "certify paper-designed -o good.zip")
     packed = Path("good.zip").read_bytes()
-    Path("bad.zip").write_bytes(
-        packed.replace(b'"x": "20 in"', b'"x": "19 in"')
-    )  # the header's checksum tells
+    # the header's checksum tells
+    Path("bad.zip").write_bytes(packed.replace(b'"x": "20 in"', b'"x": "19 in"'))
     assert "checksum" in refusal(capfd, "recheck bad.zip")
     Path("cut.zip").write_bytes(packed[:-1000])
     refusal(capfd, "recheck cut.zip")

@@ -15,9 +15,8 @@ def _of(name: str, **tables: Any) -> dict[str, Any]:
         key: (tree.get(key, {}) | value) if isinstance(value, dict) else value
         for key, value in tables.items()
     }
-    return (
-        tree | joined | {key: tables[key] for key in ("goal", "throw", "gravity") if key in tables}
-    )  # each says one thing
+    # each says one thing
+    return tree | joined | {key: tables[key] for key in ("goal", "throw", "gravity") if key in tables}
 
 
 def _goal(x: str, side: int, **more: Any) -> dict[str, Any]:

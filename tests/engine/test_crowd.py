@@ -150,9 +150,8 @@ def test_an_impact_off_the_centre(e):
     impulse = (1 + e) * 3.0 / compliance
     expected = [(3.0 - impulse, 0.0), (impulse / masses[1], -lift * impulse / (inertia * masses[1]))]
     for number, (across, rate) in enumerate(expected):
-        assert after[number, 0] == pytest.approx(
-            across, abs=1e-3
-        )  # the corner has turned by no more than that
+        # the corner has turned by no more than that
+        assert after[number, 0] == pytest.approx(across, abs=1e-3)
         assert after[number, 2] == pytest.approx(rate, abs=2e-3)
 
     lost = 0.5 * (1 - e * e) * 9.0 / compliance

@@ -104,9 +104,8 @@ def test_almost_every_orbit_violates_what_is_refuted_so(x, side, starts):
     (claim,) = proof.claims
     assert (claim.verdict, claim.starts) == ("refuted", starts)
     assert "cycle" in claim.recurs  # which the checker confirms: it refutes "every start"
-    if (
-        starts == "every"
-    ):  # parts may pass x on another side rarely: no cells where that is proved of almost all
+    # parts may pass x on another side rarely: no cells where that is proved of almost all
+    if starts == "every":
         assert "thinning" not in claim.recurs
         return
     numbers = facts.read(tree).floats()

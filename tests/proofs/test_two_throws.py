@@ -293,9 +293,8 @@ def test_one_throw_is_bounded_at_every_place(speed, landing, strata, count, tmp_
     x = random.uniform(scene.sides.a[side] + 1e-3, np.where(side == 2, X, 24.0))
     x[:60] = scene.sides.a[side[:60]] + 10.0 ** random.uniform(-9.0, -3.0, 60)  # cells at the joint
     x[60:160], side[60:160] = random.uniform(14.9, 15.6, 100), 1
-    some = ~(
-        (side == 1) & np.any([(a <= x) & (x <= b) for a, b in WALLS], axis=0)
-    )  # throws are made from there
+    # throws are made from there
+    some = ~((side == 1) & np.any([(a <= x) & (x <= b) for a, b in WALLS], axis=0))
     for share in np.linspace(-1.0, 1.0, 41):  # a mean of throws that end on the arm
         some &= advance(thrown(scene.map)(1.0 / (1.0 + share * speed) ** 2), x, side, 1)[2] >= 0
     x, side = x[some], side[some]

@@ -505,9 +505,8 @@ def test_assembly(capfd, tmp_path, contact):
         pytest.importorskip("pymunk")
     one, two = both_own(contact=contact)
     found = ls.assemble(one, two, NOISE, trials=3)
-    assert (
-        json.loads(as_json(found))["carried"] is contact
-    )  # the cavity is part of the arm unless asked otherwise
+    # the cavity is part of the arm unless asked otherwise
+    assert json.loads(as_json(found))["carried"] is contact
     clean(" ".join([as_json(found), said_by(ls.plot.assembly(found)), str(found.table())]))
     for name, each in (("one", one), ("two", two)):
         ls.dump(each, tmp_path / f"{name}.toml")

@@ -267,9 +267,8 @@ class Paths:
         for each in range(grid.sides):
             marks[outward[each] & ~fed] |= np.uint8(1 << each)
         near, before = np.zeros(grid.sides, np.uint8), None
-        while (
-            before is None or (before != near).any()
-        ):  # what lands before the first cells goes on from there
+        # what lands before the first cells goes on from there
+        while before is None or (before != near).any():
             for each in range(grid.sides):
                 marks[inward[each] & ~fed] |= near[each]
             spread = reach(ranges, parts, marks)

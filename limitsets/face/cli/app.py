@@ -79,14 +79,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     >>> main(["scenes", "--json", "--out", "/dev/null/x"])  # the reason goes to stderr
     2
     """
-    if (
-        arguments is None
-    ):  # a command ends before its garbage matters, and is 5 to 8 % faster without collection
+    # a command ends before its garbage matters, and is 5 to 8 % faster without collection
+    if arguments is None:
         gc.disable()
-        for name in (
-            "SIGTERM",
-            "SIGHUP",
-        ):  # a signal ends the command as Ctrl-C does: unfinished files are removed
+        # a signal ends the command as Ctrl-C does: unfinished files are removed
+        for name in ("SIGTERM", "SIGHUP"):
             if number := getattr(signal, name, None):
                 signal.signal(number, _ended)
     try:

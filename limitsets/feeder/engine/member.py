@@ -497,9 +497,8 @@ class Film:
         self.frame(time)
         inside = set()
         for rest in rests:
-            still = (
-                rest.where == "unfinished" and rest.number in self.inside
-            )  # in motion: it has not come out
+            # in motion: it has not come out
+            still = rest.where == "unfinished" and rest.number in self.inside
             if rest.where == "cavity" or still:
                 inside.add(rest.number)
             elif rest.number in self.inside and rest.where != "out":

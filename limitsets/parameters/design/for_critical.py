@@ -233,9 +233,8 @@ def design(
             "the quantities to vary", ", ".join(map(str, names)), "one or more, each once", "name them"
         )
     unknowns = unknowns_of(chosen, names, bounds)
-    with_present(
-        chosen, dict(zip(unknowns.names, unknowns.start.tolist(), strict=True))
-    )  # refuses what cannot be set
+    # refuses what cannot be set
+    with_present(chosen, dict(zip(unknowns.names, unknowns.start.tolist(), strict=True)))
     search = TrialLog(chosen, unknowns, targets, progress)
     outcome, how = _searched(search, unknowns, starts, stages, seed)
     return _answer(search, targets, outcome, how)

@@ -174,9 +174,8 @@ class _GoalSearch:
         if scene is None or why:
             return room, room, why
         slack = 0.0 if self.laid else least_slack(scene.bare_map)
-        if (
-            slack < 0.0
-        ):  # after all designs that no start leaves, and before all designs that do not meet the goal
+        # after all designs that no start leaves, and before all designs that do not meet the goal
+        if slack < 0.0:
             return end + max(slack, -end), room, LEAVES
         return end + room, room, ""
 

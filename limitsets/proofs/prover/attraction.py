@@ -105,9 +105,8 @@ class Attraction:
 def components_of(graph: TransitionGraph) -> tuple[NDArray[np.int32], list[NDArray[np.int32]]]:
     """Return the number of each cell's attracting component, -1 off them; and recurrent cells that do not attract."""
     sets = graph.recurrent_components()
-    good = attracting_of(
-        graph.ranges, graph.components(), sets
-    )  # a survey's order is quadratic in their number
+    # a survey's order is quadratic in their number
+    good = attracting_of(graph.ranges, graph.components(), sets)
     component = np.full(graph.n_cells, -1, dtype=np.int32)
     for number, cells in enumerate(each for each, attracts in zip(sets, good, strict=True) if attracts):
         component[cells] = number

@@ -89,9 +89,8 @@ def normal_pair(seed: int, a: int, b: int) -> tuple[float, float]:
 @kernel
 def judged(x: Any, code: Any) -> Any:
     """Code of a step to x: `UNDEFINED` where a coordinate is nan, for no comparison with it is true."""
-    float(
-        entries_of(x)[0]
-    )  # of an array or a list this does not compile, and a comparison would fail as it runs
+    # of an array or a list this does not compile, and a comparison would fail as it runs
+    float(entries_of(x)[0])
     return codes.UNDEFINED if (x != x) & (code != codes.UNSETTLED) else code
 
 

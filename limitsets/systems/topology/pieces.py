@@ -80,9 +80,8 @@ def _change(
 def _bottom(here: Any, side: int, branch: int, what: int, a: float, m: float, b: float, f_m: float) -> float:
     """Return a place between a and b where the other sign is met, nan where the dip about m does not come to zero."""
     sign = 1.0 if f_m > 0.0 else -1.0
-    for _ in range(
-        40
-    ):  # golden section about m: 0.618^40 = 4e-9 of the bracket, where a parabola is flat to rounding
+    # golden section about m: 0.618^40 = 4e-9 of the bracket, where a parabola is flat to rounding
+    for _ in range(40):
         x = m + 0.382 * (b - m) if b - m > m - a else m - 0.382 * (m - a)
         f = _followed(here, x, side, branch, what)
         if (f > 0.0) != (f_m > 0.0):

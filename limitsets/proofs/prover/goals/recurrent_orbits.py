@@ -208,9 +208,8 @@ def _paths(attraction: Attraction, box: ParameterBox) -> Iterator[Orbit]:
             if last is None:
                 continue
             met.add(_component(attraction, *last))
-            met.discard(
-                -1
-            )  # two starts whose orbits end off the attracting cells may end in different places
+            # two starts whose orbits end off the attracting cells may end in different places
+            met.discard(-1)
             yield _lasting(map_now, *last, SHORT)
 
 
