@@ -247,7 +247,7 @@ class Tabled:
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        raise NotImplementedError
+        raise NotImplementedError  # each answer has its own
 
     def table(self) -> Table:
         """Give the table that it is saved as."""

@@ -252,14 +252,10 @@ class _Batch:
             deviation = _drawn(self.random, scatter.speed, 1)[0]
             shifts = _drawn(self.random, scatter.landing, parts)
             self.throws += 1
-            for (
-                rest
-            ) in crowd.rests():  # what a throw does that acts beyond the end of the arm is not simulated
-                if (
-                    rest.number not in self.fate
-                    and rest.where == "arm"
-                    and self.end.at_edge(rest.x, rest.side)
-                ):
+            # what a throw does that acts beyond the end of the arm is not simulated
+            for rest in crowd.rests():
+                on_arm = rest.where == "arm" and rest.number not in self.fate
+                if on_arm and self.end.at_edge(rest.x, rest.side):
                     self._take(rest.number, "edge")
             self._take_out(crowd.throw(float(deviation), shifts.tolist()))
         return thrown

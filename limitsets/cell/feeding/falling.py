@@ -365,7 +365,8 @@ class ArmEnd:
         clears = np.zeros(np.shape(x), dtype=bool)
         for lo, hi in self.clear:
             clears |= (beyond >= lo) & (beyond <= hi)
-        return np.where(beyond >= 0.0, np.where(side == self.side, np.where(clears, 0, 2), 1), -1)
+        fed = np.where(side == self.side, np.where(clears, 0, 2), 1)
+        return np.where(beyond >= 0.0, fed, -1)
 
     def at_edge(self, x: Any, side: Any) -> Any:
         """Say of which parts at rest before the end the next throw acts beyond it: their fate is "edge"."""

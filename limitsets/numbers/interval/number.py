@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -82,30 +81,40 @@ def ends_of(x: Any) -> Any:
     return (x.lo, x.hi) if isinstance(x, Interval) else (float(x), float(x))
 
 
-def _of_one(kernel: Callable[[Any], Any]) -> Callable[[Any], Interval]:
-    """Make the method of intervals and plain numbers of a kernel of one pair."""
-
-    def method(a: Any) -> Interval:
-        lo, hi = kernel(ends_of(a))
-        return Interval(lo, hi)
-
-    return method
+def _neg(a: Any) -> Interval:
+    return Interval(*arithmetic.neg(ends_of(a)))
 
 
-def _of_two(kernel: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Interval]:
-    """Likewise of a kernel of two pairs."""
-
-    def method(a: Any, b: Any) -> Interval:
-        lo, hi = kernel(ends_of(a), ends_of(b))
-        return Interval(lo, hi)
-
-    return method
+def _abs(a: Any) -> Interval:
+    return Interval(*arithmetic.absolute(ends_of(a)))
 
 
-_neg, _abs, _sqrt = _of_one(arithmetic.neg), _of_one(arithmetic.absolute), _of_one(arithmetic.sqrt)
-_add, _sub = _of_two(arithmetic.add), _of_two(arithmetic.sub)
-_mul, _div = _of_two(arithmetic.mul), _of_two(arithmetic.div)
-_min, _max = _of_two(arithmetic.minimum), _of_two(arithmetic.maximum)
+def _sqrt(a: Any) -> Interval:
+    return Interval(*arithmetic.sqrt(ends_of(a)))
+
+
+def _add(a: Any, b: Any) -> Interval:
+    return Interval(*arithmetic.add(ends_of(a), ends_of(b)))
+
+
+def _sub(a: Any, b: Any) -> Interval:
+    return Interval(*arithmetic.sub(ends_of(a), ends_of(b)))
+
+
+def _mul(a: Any, b: Any) -> Interval:
+    return Interval(*arithmetic.mul(ends_of(a), ends_of(b)))
+
+
+def _div(a: Any, b: Any) -> Interval:
+    return Interval(*arithmetic.div(ends_of(a), ends_of(b)))
+
+
+def _min(a: Any, b: Any) -> Interval:
+    return Interval(*arithmetic.minimum(ends_of(a), ends_of(b)))
+
+
+def _max(a: Any, b: Any) -> Interval:
+    return Interval(*arithmetic.maximum(ends_of(a), ends_of(b)))
 
 
 def _pow(a: Any, count: Any) -> Interval:
@@ -132,14 +141,14 @@ for _stubs, _method in (
     ((min, np.minimum), _min),
     ((max, np.maximum), _max),
     ((math.sqrt, np.sqrt), _sqrt),
-    ((math.floor, np.floor), _of_one(arithmetic.floor)),
-    ((math.exp, np.exp), _of_one(exponential.exp)),
-    ((math.log, np.log), _of_one(exponential.log)),
-    ((math.sin, np.sin), _of_one(elementary.sin)),
-    ((math.cos, np.cos), _of_one(elementary.cos)),
+    ((math.floor, np.floor), lambda a: Interval(*arithmetic.floor(ends_of(a)))),
+    ((math.exp, np.exp), lambda a: Interval(*exponential.exp(ends_of(a)))),
+    ((math.log, np.log), lambda a: Interval(*exponential.log(ends_of(a)))),
+    ((math.sin, np.sin), lambda a: Interval(*elementary.sin(ends_of(a)))),
+    ((math.cos, np.cos), lambda a: Interval(*elementary.cos(ends_of(a)))),
     ((math.tan, np.tan), _tan),
-    ((math.tanh, np.tanh), _of_one(exponential.tanh)),
-    ((math.atan2, np.arctan2), _of_two(elementary.atan2)),
+    ((math.tanh, np.tanh), lambda a: Interval(*exponential.tanh(ends_of(a)))),
+    ((math.atan2, np.arctan2), lambda a, b: Interval(*elementary.atan2(ends_of(a), ends_of(b)))),
 ):
     for _stub in _stubs:
         operation(_stub, Interval, _method)
@@ -216,8 +225,9 @@ def where_positive(x: Number, yes: Number, no: Number) -> Number:
     return yes if x > 0.0 else no
 
 
-hull_of = _of_two(arithmetic.hull)
-"""Return the smallest interval that holds both."""
+def hull_of(a: Any, b: Any) -> Any:
+    """Return the smallest interval that holds both."""
+    return Interval(*arithmetic.hull(ends_of(a), ends_of(b)))
 
 
 def _with_sign_of(x: Any, size: Any) -> Interval:

@@ -212,7 +212,7 @@ def operation(
         The class of the number; the other arguments may be plain numbers.  `float` stands for plain numbers alone:
         their methods may be contracted, all others are not.
     method : callable
-        A module-level function.
+        A function that closes over nothing: a lambda, or one of a module.
     left, right : callable, optional
         The methods where only the first of two arguments is of the class, and where only the second is; as `method`.
     beside : tuple of type
