@@ -28,15 +28,12 @@ if TYPE_CHECKING:
     from limitsets.face.animation import animate as animate
     from limitsets.face.explorer import explore as explore
     from limitsets.feeder import engine as engine
-    from limitsets.feeder.scene import dump as dump
-    from limitsets.feeder.scene import load as load
-    from limitsets.feeder.scene import scenes as scenes
+    from limitsets.feeder.scene import dump as dump, load as load, scenes as scenes
     from limitsets.numbers import interval as interval
     from limitsets.parameters.analysis import analyse as analyse
     from limitsets.parameters.atlas import atlas as atlas
     from limitsets.parameters.continuation import continuation as continuation
-    from limitsets.parameters.design import design as design
-    from limitsets.parameters.design import robust_design as robust_design
+    from limitsets.parameters.design import design as design, robust_design as robust_design
     from limitsets.parameters.fitting import fit as fit
     from limitsets.parameters.margins.single import margin as margin
     from limitsets.parameters.noise import noise_statistics as noise_statistics
@@ -45,18 +42,20 @@ if TYPE_CHECKING:
     from limitsets.proofs.policies import feedback as feedback
     from limitsets.proofs.prover import certify as certify
     from limitsets.proofs.prover.certificate import recheck as recheck
-    from limitsets.systems import maps as maps
-    from limitsets.systems import resilience as resilience
+    from limitsets.systems import maps as maps, resilience as resilience
     from limitsets.systems.cells import grid as grid
-    from limitsets.systems.graph import morse_graph as morse_graph
-    from limitsets.systems.graph import transitions as transitions
-    from limitsets.systems.maps import critical_points as critical_points
-    from limitsets.systems.maps import orbit as orbit
-    from limitsets.systems.maps import register as register
-    from limitsets.systems.sets import attractors as attractors
-    from limitsets.systems.sets import basins as basins
-    from limitsets.systems.sets import cycles as cycles
-    from limitsets.systems.sets import limit_set as limit_set
+    from limitsets.systems.graph import morse_graph as morse_graph, transitions as transitions
+    from limitsets.systems.maps import (
+        critical_points as critical_points,
+        orbit as orbit,
+        register as register,
+    )
+    from limitsets.systems.sets import (
+        attractors as attractors,
+        basins as basins,
+        cycles as cycles,
+        limit_set as limit_set,
+    )
 
 __version__ = "0.1.0"
 
@@ -212,7 +211,7 @@ if not TYPE_CHECKING:  # a checker of types has the imports above, and finds a n
             raise AttributeError(f"module 'limitsets' has no attribute {name!r}", name=name, obj=own)
         room, _, function = place.partition(":")
         module = import_module(f"{__name__}.{room}")
-        return getattr(module, function) if function else module
+        return getattr(module, function) if function else globals().setdefault(name, module)
 
 
 def __dir__() -> list[str]:

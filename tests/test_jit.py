@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 
 import limitsets
-from limitsets.numbers.jit import cache as jit_cache
-from limitsets.numbers.jit import compiling, generic, kernel, proof_kernel
+from limitsets.numbers.jit import cache as jit_cache, compiling, generic, kernel, proof_kernel
 from limitsets.systems.maps import drivers
 
 FUSED = re.compile(r"\bv?fn?m(?:add|sub|la|ls)\w*")

@@ -12,7 +12,6 @@ import numbers
 import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
-from itertools import chain, zip_longest
 from typing import Any, NamedTuple, NoReturn, ParamSpec, TypeVar
 
 from limitsets.base.errors import AnswerError, shown
@@ -163,14 +162,12 @@ def arguments_checked(function: Callable[P, R], public: str = "") -> Callable[P,
     limitsets.base.errors.AnswerError: the argument count of twice is 'many'; allowed: a whole number; pass count=3
     """
     parameters = inspect.signature(function).parameters
-    kinds = {
-        name: kind
-        for name, each in parameters.items()
-        if isinstance(each.annotation, str) and (kind := _asked_of(each.annotation)) is not None
-    }
-    named = [name for name, each in parameters.items() if each.kind is each.POSITIONAL_OR_KEYWORD]
-    rest = next((name for name, each in parameters.items() if each.kind is each.VAR_POSITIONAL), "")
-
+    ends: dict[Any, int | None] = {inspect.Parameter.VAR_POSITIONAL: None, inspect.Parameter.KEYWORD_ONLY: 0}
+    asked = []  # the slice: where its values stand among the arguments that are given without names
+    for place, (name, each) in enumerate(parameters.items()):
+        kind = _asked_of(each.annotation) if isinstance(each.annotation, str) else None
+        if kind is not None:
+            asked.append((name, kind, slice(place, ends.get(each.kind, place + 1))))
     called = public or function.__name__
 
     def refuse(name: str, value: object, kind: _Kind) -> NoReturn:
@@ -185,10 +182,10 @@ def arguments_checked(function: Callable[P, R], public: str = "") -> Callable[P,
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
         # one too many or too few Python refuses itself, by the function's name
-        for name, value in chain(zip_longest(named[: len(args)], args, fillvalue=rest), kwargs.items()):
-            kind = kinds.get(name)
-            if kind is not None and not kind.fits(value):
-                refuse(name, value, kind)
+        for name, kind, place in asked:
+            for value in (kwargs[name],) if name in kwargs else args[place]:
+                if not kind.fits(value):
+                    refuse(name, value, kind)
         return function(*args, **kwargs)
 
     return checked

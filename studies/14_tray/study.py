@@ -15,8 +15,7 @@ import numpy as np
 
 import limitsets as ls
 from limitsets.cell.trays import TrayFill
-from limitsets.cell.trays.passing import Histories, passes_of, random_of
-from limitsets.cell.trays.passing import histories as follow
+from limitsets.cell.trays.passing import Histories, histories as follow, passes_of, random_of
 from limitsets.feeder.engine.depression import UNFINISHED
 from limitsets.parameters.noise.sampling import binomial_interval
 

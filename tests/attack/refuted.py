@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from mpmath import mp, mpf
 
-from tests.attack import digits
-from tests.attack import facts as model
+from tests.attack import digits, facts as model
 from tests.attack.generate import Case
 from tests.attack.goals import Range, Verdict
 from tests.attack.proved import move, wrong

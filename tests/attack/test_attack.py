@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from mpmath import mpf
 
-from tests.attack import digits, goals, judge, proved
-from tests.attack import facts as model
+from tests.attack import digits, facts as model, goals, judge, proved
 from tests.attack.generate import Case, case
 from tests.attack.throws import Orbits, changes, throw
 

@@ -33,7 +33,7 @@ REPEATS = 5  # per round: what the others left in the cache matters for the firs
 
 PER = COUNT * REPEATS
 VECTORISED, LIBM = "C, vectorised, contraction", "C, libm and Newton"
-UNCONTRACTED = "C, vectorised, no contraction"
+UNCONTRACTED, OWN = "C, vectorised, no contraction", "our kernel on arrays made beforehand"
 
 
 def repeated(run):
@@ -89,6 +89,8 @@ def test_kernel(benchmark, throws, table):
 @pytest.mark.skipif(compiler() is None, reason="no C compiler: cc is the rival")
 def test_public(benchmark, throws, table):
     params, x, rivals = throws
+    made = (np.empty(COUNT),), np.empty(COUNT, np.int64), np.empty(COUNT, np.int64)
+    rivals |= {OWN: repeated(lambda: drivers.fill_images(params, SIDE, (x,), *made))}
     turns = take_turns(benchmark, repeated(lambda: ls.maps.images(params, x, SIDE)), rivals, ROUNDS)
     x_c, side_c, code_c = turns.answers[VECTORISED]
     np.testing.assert_allclose(turns.answer.x, x_c, rtol=0, atol=1e-13)
@@ -97,6 +99,7 @@ def test_public(benchmark, throws, table):
     assert turns.answer.second_pass == 0.0
     what = "a throw, limitsets.maps.images"
     table += [
+        versus(what, turns, OWN, unit="ns", per=PER, within=1.25),
         versus(what, turns, VECTORISED, unit="ns", per=PER, within=1.5),
         versus(what, turns, LIBM, unit="ns", per=PER, faster=10),
     ]

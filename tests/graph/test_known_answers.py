@@ -7,16 +7,14 @@ from dataclasses import replace
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy import sparse
 from scipy.sparse import csgraph
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.systems.cells import CellSet, Grid
-from limitsets.systems.graph import components as walk
-from limitsets.systems.graph import segment_tree
+from limitsets.systems.graph import components as walk, segment_tree
 from limitsets.systems.graph.components import descend, reach, strong_components
 from limitsets.systems.graph.graph import TransitionGraph
 from limitsets.systems.graph.ranges import RUN, START, build, count_edges, expand

@@ -12,8 +12,7 @@ from fractions import Fraction
 
 import flint
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from limitsets import interval
 from limitsets.numbers.interval import exponential as logarithm

@@ -8,14 +8,11 @@ import flint
 import gmpy2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import limitsets.numbers.interval as iv
 from limitsets import interval
-from limitsets.numbers.interval import Interval
-from limitsets.numbers.interval import elementary as e_of_sine_bound
-from limitsets.numbers.interval import exponential as e
+from limitsets.numbers.interval import Interval, elementary as e_of_sine_bound, exponential as e
 from limitsets.numbers.interval.number import (
     larger,
     signed_square,

@@ -9,8 +9,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import AnswerError, LimitsetsError, SceneError
 from limitsets.feeder.thrower import impact_angles
-from limitsets.parameters.design import critical_jacobian, limit_sets_along
-from limitsets.parameters.design import solving as trials
+from limitsets.parameters.design import critical_jacobian, limit_sets_along, solving as trials
 from tests.inverse import exact
 
 # ----------------------------------------------------------------

@@ -15,8 +15,7 @@ from limitsets.systems.graph.images.enclosed import BoxImages
 from limitsets.systems.maps.kernels import image_box, pick
 from limitsets.systems.maps.textbook.shared import DOMAINS as PUBLIC
 from tests.interval.exact import arb
-from tests.maps_of_tests import DOMAINS as OWN
-from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState
+from tests.maps_of_tests import DOMAINS as OWN, Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 POINTS = 6000
 DOMAINS = PUBLIC | OWN

@@ -14,8 +14,7 @@ from limitsets import maps
 from limitsets.base.errors import LimitsetsError
 from limitsets.numbers.jit import kernel
 from limitsets.systems.maps import kernels
-from limitsets.systems.maps.textbook.shared import DOMAINS as PUBLIC
-from limitsets.systems.maps.textbook.shared import exponential
+from limitsets.systems.maps.textbook.shared import DOMAINS as PUBLIC, exponential
 from tests.maps_of_tests import DOMAINS, Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 LOCKED = math.asin(-0.2 * math.pi / 0.7) / (2 * math.pi)

@@ -10,8 +10,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
-from limitsets.proofs.policies import broken, game_of, image_of, places, search
-from limitsets.proofs.policies import game as beliefs
+from limitsets.proofs.policies import broken, game as beliefs, game_of, image_of, places, search
 from limitsets.proofs.policies.game import cells_of
 from limitsets.proofs.policies.simulation import not_within, simulate
 from limitsets.systems.cells import Grid

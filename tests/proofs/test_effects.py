@@ -18,8 +18,7 @@ from limitsets.proofs.prover.numbers import RationalInterval, angle
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.systems.maps import images
 from limitsets.systems.maps.drivers import advance
-from tests.scene.test_load import BOTH as BOTH_CHAMFER
-from tests.scene.test_load import CHAMFER, chamfered
+from tests.scene.test_load import BOTH as BOTH_CHAMFER, CHAMFER, chamfered
 
 # ----------------------------------------------------------------
 # Proofs about throws with effects: what the tables say of them, what is refuted, and what has no certificate.

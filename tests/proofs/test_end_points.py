@@ -12,8 +12,7 @@ from scipy.optimize import brentq
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from limitsets.proofs.prover import cover as covers
-from limitsets.proofs.prover import goals
+from limitsets.proofs.prover import cover as covers, goals
 from limitsets.proofs.prover.attraction import attraction, trapping
 from limitsets.proofs.prover.certifying import certify
 from limitsets.proofs.prover.cover import Cover, cover

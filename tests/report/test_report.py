@@ -17,8 +17,7 @@ import limitsets as ls
 from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.base.files import as_json, as_table, replaced
 from limitsets.face.report.pages import as_html, bands, page, starts_words, verdict_of, void_of, words
-from limitsets.face.report.writing import FIGURES, audit_page, write
-from limitsets.face.report.writing import write as write_report
+from limitsets.face.report.writing import FIGURES, audit_page, write, write as write_report
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scattering import Gaussian, Scattering
 from limitsets.parameters.analysis import GoalOutcome

@@ -16,8 +16,7 @@ from limitsets.face.cli.app import main
 from limitsets.face.report.robust_pages import robustness_page
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.parameters.design import robust_design
-from limitsets.parameters.margins import brackets
-from limitsets.parameters.margins import single as finding
+from limitsets.parameters.margins import brackets, single as finding
 from limitsets.parameters.margins.deviations import Tolerance, corners, deviation_scale, worst_corner
 from limitsets.parameters.margins.joint import joint_margin, sensitivity_of
 from limitsets.parameters.margins.margin_result import Margin

@@ -23,11 +23,9 @@ from limitsets.face.report.robust_pages import robustness_page, tightest, write_
 from limitsets.feeder.scattering import Gaussian, Scattering
 from limitsets.parameters.margins.margin_result import bound, in_unit_of, percent_of
 from limitsets.parameters.margins.single import MarginsBeyond
-from limitsets.parameters.noise import statistics
-from limitsets.parameters.noise import statistics as chain_solution
+from limitsets.parameters.noise import statistics, statistics as chain_solution
 from limitsets.parameters.noise.ulam import STRATA
-from limitsets.parameters.sheet import sheet_run
-from limitsets.parameters.sheet import summary as margin_curve
+from limitsets.parameters.sheet import sheet_run, summary as margin_curve
 from limitsets.parameters.sheet.summary import noise_of, scattering_from, still
 from tests.thrower import reference
 

@@ -22,8 +22,7 @@ from limitsets.feeder.thrower.effects import EFFECTS
 from limitsets.parameters.design import robust_design
 from limitsets.parameters.design.for_goal import design_for_goal
 from tests import plates
-from tests.scene.test_load import BOTH as BOTH_REMEDIES
-from tests.scene.test_load import chamfered
+from tests.scene.test_load import BOTH as BOTH_REMEDIES, chamfered
 
 # ----------------------------------------------------------------
 # Scenes that cannot be: each is one SceneError that names file, key, value, what is allowed and what to do.

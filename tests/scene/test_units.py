@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pint
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from limitsets.base.errors import SceneError
 from limitsets.feeder.scene import NAMES, Deviation, deviation, load

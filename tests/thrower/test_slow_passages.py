@@ -17,8 +17,7 @@ from mpmath import mp, mpf
 
 import limitsets as ls
 from limitsets import maps
-from limitsets.feeder.thrower import Throw, throw_map
-from limitsets.feeder.thrower import flight_box as boxes
+from limitsets.feeder.thrower import Throw, flight_box as boxes, throw_map
 from limitsets.feeder.thrower.flight import V0, V1, V2, V3, V4, V5, V6, V7, W0, W1, W2, W3, W4, W5, W6, W7
 from limitsets.feeder.thrower.traced import impact_angles
 from limitsets.numbers.interval import Interval

@@ -5,5 +5,4 @@ parts that pass through each other, as the paper assumes, or parts in contact, i
 finished trials (`limitsets.assemble`).
 """
 
-from limitsets.cell.assembly.assembly_run import Assembly as Assembly
-from limitsets.cell.assembly.assembly_run import assemble as assemble
+from limitsets.cell.assembly.assembly_run import Assembly as Assembly, assemble as assemble

@@ -17,8 +17,7 @@ from limitsets.feeder.engine.crowd import depth_of_overlap
 from limitsets.feeder.engine.depression import seat_of
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.scattering import Gaussian, Law, Scattering, Uniform, scattering_of
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.scene import require_rests
+from limitsets.feeder.scene import Scene, load, require_rests
 from limitsets.feeder.thrower import impact_angles
 from limitsets.parameters.sheet.summary import still
 

@@ -20,9 +20,7 @@ from limitsets.base.arrays import Array, Ints
 from limitsets.feeder.geometry.polygon import above_side, side_ends
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
 from limitsets.feeder.scattering import starts_from, uniform_starts
-from limitsets.feeder.scene import Cavity, Scene
-from limitsets.feeder.scene.laid import LaidLike, read_laid
-from limitsets.feeder.scene.scene import require_rests
+from limitsets.feeder.scene import Cavity, LaidLike, Scene, read_laid, require_rests
 from limitsets.feeder.thrower import fly
 from limitsets.systems.maps import codes, images
 

@@ -37,9 +37,7 @@ from limitsets.cell.feeding.trials import (
 )
 from limitsets.feeder.goals import by_side
 from limitsets.feeder.scattering import Scattering, scattering_of
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.laid import LaidLike
-from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene import LaidLike, Model, Scene, load
 from limitsets.parameters.noise.sampling import require_seed
 from limitsets.parameters.sheet.summary import still
 from limitsets.proofs.chances.absorption import AbsorptionBrackets

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from limitsets.base import as_table, picked
 from limitsets.base.arrays import Mask
 from limitsets.cell.feeding.falling import ArmEnd
-from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
+from limitsets.feeder.scene import WITHOUT_SCATTER
 from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.basin import ROUNDING, SCATTERED
 from limitsets.proofs.prover.cover import everywhere

@@ -30,10 +30,10 @@ from limitsets.cell.trays.passing import (
     Histories,
     Passes,
     count,
+    histories as histories_of,
     passes_of,
     random_of,
 )
-from limitsets.cell.trays.passing import histories as histories_of
 from limitsets.cell.trays.pouring import Pouring, TrayCrowd, crowds_of
 from limitsets.feeder.scene import Scene, load
 from limitsets.parameters.noise.sampling import require_seed

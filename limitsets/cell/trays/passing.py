@@ -18,9 +18,7 @@ from limitsets.base.arrays import Array, Ints
 from limitsets.base.campaign import in_order
 from limitsets.feeder.engine.depression import EMPTY, UNFINISHED, Motion, Plate, Pose, Rest, fall_speed
 from limitsets.feeder.engine.member import Mark, Recording
-from limitsets.feeder.scene import Scene, Tray
-from limitsets.feeder.scene.scene import require_rests
-from limitsets.feeder.scene.surroundings import heights_over_sides
+from limitsets.feeder.scene import Scene, Tray, heights_over_sides, require_rests
 from limitsets.parameters.noise.sampling import binomial_interval
 
 

@@ -42,8 +42,7 @@ def analyse(
     out : DIR
         Folder of the report, ./NAME-analysis by default.
     """
-    from limitsets.feeder.scene import load_to_analyse
-    from limitsets.feeder.scene.checking import doubts
+    from limitsets.feeder.scene import doubts, load_to_analyse
 
     run.opened(scene, "analysis", lambda source: load_to_analyse(source)[0])
 

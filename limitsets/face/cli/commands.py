@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limitsets.base.progress import Progress
-    from limitsets.feeder.scene import Scene as SceneOf
-    from limitsets.feeder.scene.left_out import Model
+    from limitsets.feeder.scene import Model, Scene as SceneOf
 
 
 # ----------------------------------------------------------------

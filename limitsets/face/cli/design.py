@@ -18,8 +18,7 @@ from limitsets.face.cli.output import saved
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from limitsets.feeder.scene import Scene as SceneOf
-    from limitsets.feeder.scene.laid import LaidLike
+    from limitsets.feeder.scene import LaidLike, Scene as SceneOf
     from limitsets.parameters.design import Design, RobustDesign
     from limitsets.parameters.design.for_goal import GoalDesign
     from limitsets.parameters.design.for_margin import NoDesignError
@@ -313,7 +312,7 @@ def _kept(best: SceneOf, file: Path) -> None:
 
 def _missed(run: Run, none: NoDesignError, scene: SceneOf, miss: SceneOf) -> Answer:
     """Give the nearest miss, and the reasons for which designs were ruled out."""
-    from limitsets.feeder.scene.scene import in_unit_of, unit_of
+    from limitsets.feeder.scene import in_unit_of, unit_of
 
     rows = [
         (name, *(in_unit_of(scene, name, one.value(name)) for one in (scene, miss)), unit_of(scene, name))

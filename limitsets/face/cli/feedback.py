@@ -128,7 +128,7 @@ def feedback(
 
 
 def _sensor(scene: Any, beyond: str | None, error: str, side: int | None, *, blind: bool) -> Any:
-    from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
+    from limitsets.feeder.scene import BeyondSensor, SideSensor
 
     if (beyond is not None) + (side is not None) + blind > 1:
         raise LimitsetsError("the sensor", "several", "one question", "give one of --beyond, --side, --blind")

@@ -89,7 +89,7 @@ def _write(run: Run, given: tuple[Margin, ...], about: About, *, recheck: bool) 
 
 
 def _text(given: SceneOf, margins: tuple[Margin, ...]) -> Iterator[str | Table]:
-    from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
+    from limitsets.feeder.scene import WITHOUT_SCATTER
     from limitsets.parameters.margins.margin_result import bound, failing, reach_of, void_of
 
     scene, goals = margins[0].scene, margins[0].goals

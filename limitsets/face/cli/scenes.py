@@ -63,7 +63,7 @@ def new(run: Run, file: Path, *, unit: str = "in") -> Answer:
     unit : UNIT
         Of its lengths: mm, cm, m, in, ...
     """
-    from limitsets.feeder.scene.checking import new_scene
+    from limitsets.feeder.scene import new_scene
 
     written = new_scene(file, unit)
     next_words = f"next: edit it, then {proposed('check', written)} and {proposed('analyse', written)}"
@@ -83,7 +83,7 @@ def check(run: Run, scene: Scene) -> Answer:
 
     A line each; exit 2 where anything is wrong.
     """
-    from limitsets.feeder.scene.checking import examined
+    from limitsets.feeder.scene import examined
 
     errors, doubts = examined(scene)
     records = [{"improbable": False, **picked(error, *WORDS, "file")} for error in errors]

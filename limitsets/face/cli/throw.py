@@ -168,7 +168,7 @@ def plot(
 def _part(scene: str) -> tuple[str, Figure, LimitsetsError | None]:
     """Draw the part, which needs no analysis; if it is refused, draw its readable corners and return the error."""
     from limitsets.face.plot.parts import refused_part
-    from limitsets.feeder.scene.reading import sketch
+    from limitsets.feeder.scene import sketch
 
     try:
         chosen = ls.load(scene)

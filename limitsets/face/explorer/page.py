@@ -39,8 +39,7 @@ from limitsets.face.explorer.estimates import (
 )
 from limitsets.face.explorer.pictures import ArmPicture, LanesPicture, PartPicture, PointsPicture
 from limitsets.face.explorer.work import within_reach
-from limitsets.feeder.scene import Scene, dump
-from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene import Model, Scene, dump
 from limitsets.systems.cells import Domain
 
 WORDS = 0.25

@@ -141,7 +141,7 @@ def answers(question: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _proofs(scene: Scene, margins: list[str]) -> Iterator[dict[str, Any]]:
     """Prove what `certify` proves, then the goal's margin in each quantity."""
-    from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
+    from limitsets.feeder.scene import WITHOUT_SCATTER
     from limitsets.parameters.margins.margin_result import bound
     from limitsets.parameters.margins.single import margin
     from limitsets.proofs.prover.certifying import certify

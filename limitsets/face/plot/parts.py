@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limitsets.face.plot.throwing import Motion, Throw
-    from limitsets.feeder.scene import Scene
-    from limitsets.feeder.scene.reading import Sketch
+    from limitsets.feeder.scene import Scene, Sketch
 
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from matplotlib.patches import Patch
 
 from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
-from limitsets.feeder.scene.surroundings import BeyondSensor
+from limitsets.feeder.scene import BeyondSensor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,9 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from limitsets.face.report import pages as pages
-    from limitsets.face.report import robust_pages as robust_pages
-    from limitsets.face.report import writing as writing
+    from limitsets.face.report import pages as pages, robust_pages as robust_pages, writing as writing
 else:
 
     def __getattr__(name: str) -> Any:

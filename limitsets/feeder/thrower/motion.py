@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base import MapError
-from limitsets.feeder.thrower import motion
-from limitsets.feeder.thrower import motion as motion_box
+from limitsets.feeder.thrower import motion, motion as motion_box
 from limitsets.feeder.thrower.flight import Turned
 from limitsets.feeder.thrower.params import Side, SideBox, Throw, gather_box, with_kappa
 from limitsets.numbers.interval import Interval

@@ -26,8 +26,6 @@ from limitsets.feeder.goals import Goal
 from limitsets.feeder.scene import Scene, load_to_analyse
 from limitsets.parameters.analysis.accuracy import (
     CELLS as BY_CELLS,
-)
-from limitsets.parameters.analysis.accuracy import (
     Accuracy,
     Plan,
     best_extents,
@@ -48,8 +46,16 @@ from limitsets.systems.cells import CellSet, Grid, grid
 from limitsets.systems.graph import TransitionGraph, morse_graph, transitions
 from limitsets.systems.maps import critical_points
 from limitsets.systems.maps.critical import CriticalPoint
-from limitsets.systems.sets import Attractor, Basins, Cycle, LimitSet, attractors, basins, spurious
-from limitsets.systems.sets import cycles as cycles_of
+from limitsets.systems.sets import (
+    Attractor,
+    Basins,
+    Cycle,
+    LimitSet,
+    attractors,
+    basins,
+    cycles as cycles_of,
+    spurious,
+)
 
 if TYPE_CHECKING:
     import networkx as nx

@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 
 from limitsets.base import AnswerError
 from limitsets.feeder.goals import OrientedBeyond, Reaches
-from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.arrays import ThrowStack, throw_stack
-from limitsets.feeder.scene.facts import Deviation
+from limitsets.feeder.scene import Deviation, Scene, ThrowStack, throw_stack
 from limitsets.parameters.margins.deviations import deviation_scale
 from limitsets.systems.topology import Topologies, reaches, region_of
 from limitsets.systems.topology.work import DECIDED, Floats, Ints

@@ -26,8 +26,7 @@ from limitsets.base import (
     shown_in_notebooks,
 )
 from limitsets.base.campaign import Work, chosen_pool, drive, imported
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene import Model, Scene, load
 from limitsets.parameters.atlas.classes import UNDECIDED_NAME
 from limitsets.parameters.atlas.plan import Plan, chunk_shape, code_of, codes_of, named, resolved
 from limitsets.parameters.atlas.store import CHECKSUM, SEAL, Store

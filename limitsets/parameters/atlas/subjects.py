@@ -195,7 +195,7 @@ class SceneSubject:
 
     def points(self, values: Mapping[str, Array]) -> Points:
         """Return the throw maps at many points."""
-        from limitsets.feeder.scene.arrays import throw_stack
+        from limitsets.feeder.scene import throw_stack
 
         return Points(*throw_stack(self.scene, values))
 
@@ -277,7 +277,7 @@ class MapSubject:
 
     def points(self, values: Mapping[str, Array]) -> Points:
         """Return the maps at many points, on one domain."""
-        from limitsets.feeder.scene.arrays import repeated
+        from limitsets.feeder.scene import repeated
 
         count = next(iter(values.values())).size
         stack = repeated(self.params, count)

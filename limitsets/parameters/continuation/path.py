@@ -12,9 +12,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from limitsets.base import AnswerError
-from limitsets.feeder.scene import Scene
+from limitsets.feeder.scene import Scene, in_unit_of, unit_of
 from limitsets.feeder.scene.quantities import in_units
-from limitsets.feeder.scene.scene import in_unit_of, unit_of
 from limitsets.systems.cells import Domain, as_domain
 from limitsets.systems.maps import coerce, domain_of, has_slope, kind_of
 from limitsets.systems.maps.contract import require_dimension

@@ -15,8 +15,7 @@ import numpy as np
 
 from limitsets.base import AnswerError, as_table, picked
 from limitsets.base.arrays import Array
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.numbers import Numbers
+from limitsets.feeder.scene import Numbers, Scene, load
 from limitsets.feeder.scene.quantities import base_unit
 from limitsets.feeder.scene.units import convert, parse
 from limitsets.feeder.thrower import impact_angles

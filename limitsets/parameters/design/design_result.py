@@ -11,9 +11,7 @@ import numpy as np
 
 from limitsets.base import Column, Progress, Table, Tabled, as_json, as_table, joined, one_by_one, picked
 from limitsets.feeder.goals import Goal
-from limitsets.feeder.scene import Scene, dump
-from limitsets.feeder.scene.left_out import Model
-from limitsets.feeder.scene.scene import in_unit_of, unit_of
+from limitsets.feeder.scene import Model, Scene, dump, in_unit_of, unit_of
 from limitsets.parameters.design.search import Candidate, Counterweight, DesignSearch
 from limitsets.parameters.margins.estimate import Estimate, on_all_corners
 from limitsets.parameters.margins.margin_result import Margin, settled

@@ -20,10 +20,8 @@ from limitsets.base import (
     picked,
     shown_in_notebooks,
 )
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene import Model, Scene, in_unit_of, in_units_of, load, unit_of
 from limitsets.feeder.scene.quantities import text_at, texts
-from limitsets.feeder.scene.scene import in_unit_of, in_units_of, unit_of
 from limitsets.feeder.scene.units import convert, parse
 from limitsets.parameters.design.derivatives import (
     CriticalJacobian,

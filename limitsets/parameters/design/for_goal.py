@@ -21,10 +21,18 @@ import numpy as np
 from limitsets.base import AnswerError, Column, Progress, Table, Tabled, as_table, picked, silent
 from limitsets.feeder.goals import Laid, OrientedBeyond, Reaches
 from limitsets.feeder.scattering import uniform_starts
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.laid import LaidLike, laid_goal, laid_goals
-from limitsets.feeder.scene.left_out import Model
-from limitsets.feeder.scene.scene import in_unit_of, in_units_of, require_rests, unit_of
+from limitsets.feeder.scene import (
+    LaidLike,
+    Model,
+    Scene,
+    in_unit_of,
+    in_units_of,
+    laid_goal,
+    laid_goals,
+    load,
+    require_rests,
+    unit_of,
+)
 from limitsets.parameters.design.search import (
     ASSUMPTION,
     LEAVES,

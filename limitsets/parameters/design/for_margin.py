@@ -22,9 +22,7 @@ from limitsets.base import AnswerError, Progress, arguments_checked, shown_in_no
 from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import triangle
 from limitsets.feeder.goals import Goal, Laid, OrientedBeyond, Reaches
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.laid import LaidLike, read_laid
-from limitsets.feeder.scene.scene import require_rests
+from limitsets.feeder.scene import LaidLike, Scene, load, read_laid, require_rests
 from limitsets.parameters.design.design_result import Option, RobustDesign, front_of, throws_to_feed
 from limitsets.parameters.design.search import (
     POINT,

@@ -21,9 +21,8 @@ from limitsets.base import AnswerError, Progress, SceneError
 from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import plate_with_points, side_ends
 from limitsets.feeder.geometry.polygon import above_side
-from limitsets.feeder.scene import Scene
+from limitsets.feeder.scene import Scene, in_units_of
 from limitsets.feeder.scene.quantities import find
-from limitsets.feeder.scene.scene import in_units_of
 from limitsets.feeder.thrower.assumed_box import assumed
 from limitsets.parameters.margins.deviations import Signs, Tolerance
 from limitsets.parameters.margins.estimate import (

@@ -12,8 +12,7 @@ import numpy as np
 from limitsets.base import AnswerError, Column, Progress, Table, Tabled, as_table, picked
 from limitsets.base.arrays import Array
 from limitsets.feeder.goals import OrientedBeyond
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.scene import in_unit_of, in_units_of, unit_of
+from limitsets.feeder.scene import Scene, in_unit_of, in_units_of, load, unit_of
 from limitsets.parameters.fitting.likelihood import Further, Likelihood, Rows
 from limitsets.parameters.fitting.misfit import Misfit
 from limitsets.parameters.fitting.searching import Maximum, maximised

@@ -20,8 +20,7 @@ from limitsets.base import (
     silent,
 )
 from limitsets.base.arrays import Array
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.arrays import throw_stack
+from limitsets.feeder.scene import Scene, load, throw_stack
 from limitsets.feeder.scene.quantities import base_unit, find
 from limitsets.parameters.fitting.fit_result import Fit, Fitted, Scatter, fitted_scene
 from limitsets.parameters.fitting.likelihood import (

@@ -20,8 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.arrays import throw_stack
+from limitsets.feeder.scene import Scene, throw_stack
 from limitsets.parameters.fitting.throws import Throws
 from limitsets.systems.maps.pieces import at_points
 

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from limitsets.base import AnswerError, SceneError
-from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.facts import Deviation
+from limitsets.feeder.scene import Deviation, Scene
 from limitsets.feeder.scene.quantities import base_unit, deviation, find, parsed_deviation, text_at, texts
 from limitsets.feeder.scene.units import Quantity, exact_factor, parse
 from limitsets.proofs.prover.numbers import RationalInterval

@@ -11,8 +11,7 @@ from typing import Any
 
 from limitsets.base import AnswerError, Column, LimitsetsError, Table, Tabled, as_table, picked
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, as_written, by_side
-from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene import Model, Scene
 from limitsets.feeder.scene.units import exact_factor
 from limitsets.parameters.margins.deviations import nominal_of
 from limitsets.proofs.prover.certificate import DeniedError

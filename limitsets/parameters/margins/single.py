@@ -29,8 +29,7 @@ from limitsets.base import (
 )
 from limitsets.base.arrays import Array
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, unknown_goal
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.laid import LaidLike, laid_goal, read_laid
+from limitsets.feeder.scene import LaidLike, Scene, laid_goal, load, read_laid
 from limitsets.parameters.margins.brackets import Bracket, bracket_fixed, bracket_per_throw
 from limitsets.parameters.margins.deviations import (
     DeviationScale,

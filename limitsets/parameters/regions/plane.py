@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from limitsets.base import AnswerError, Column, Progress, Table, Tabled
 from limitsets.base.arrays import Array, Arrays, Ints
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene import Model, Scene, load
 from limitsets.feeder.scene.quantities import find
 from limitsets.feeder.scene.units import exact_factor, parse
 from limitsets.parameters.margins.joint import joint_margin

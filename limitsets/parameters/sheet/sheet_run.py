@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, Any
 from limitsets.base import AnswerError, Progress, arguments_checked, as_json, replaced, shown_in_notebooks
 from limitsets.feeder.goals import Goal, OrientedBeyond, Predicate, Reaches, by_side
 from limitsets.feeder.scattering import Scattering
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.laid import LaidLike
-from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
+from limitsets.feeder.scene import WITHOUT_SCATTER, LaidLike, Scene, load
 from limitsets.parameters.margins.deviations import (
     DeviationScale,
     Tolerance,

@@ -14,9 +14,7 @@ import numpy as np
 from limitsets.base import AnswerError, Table, Tabled, as_table, joined, picked
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scattering import LAWS, Scattering, scattering_of
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.laid import LaidLike
-from limitsets.feeder.scene.left_out import WITHOUT_SCATTER, Model
+from limitsets.feeder.scene import WITHOUT_SCATTER, LaidLike, Model, Scene, load
 from limitsets.feeder.scene.quantities import deviation, find
 from limitsets.parameters.margins.margin_result import NOT_FOUND, REFUTED, Margin, void_of
 from limitsets.parameters.margins.single import MarginsBeyond, margins_beyond, places_beyond

@@ -17,8 +17,7 @@ import numpy as np
 
 from limitsets.base import Column, LimitsetsError, Table, Tabled, arguments_checked, as_table, picked
 from limitsets.base.arrays import Array, Mask
-from limitsets.feeder.scene.facts import NOT_TIPPING, TIPPING
-from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene import NOT_TIPPING, TIPPING, Model
 from limitsets.proofs.auditing.assumptions import ASSUMPTIONS, Assumption
 from limitsets.proofs.auditing.judging import Cells, Places, Row, Sample, all_hold, enclosed_at, places, where
 

@@ -19,8 +19,7 @@ import numpy as np
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.thrower import Exact, SmallAngle2
 from limitsets.proofs.prover.numbers import Intervals, Jet
-from limitsets.proofs.prover.two_throws import Formulas, ThrowNumbers, angle, variable
-from limitsets.proofs.prover.two_throws import OneSide as Part
+from limitsets.proofs.prover.two_throws import Formulas, OneSide as Part, ThrowNumbers, angle, variable
 
 # ----------------------------------------------------------------
 # Moments of sine and cosine: what the flight's formulas depend on, without cancellation and with a bound.

@@ -11,8 +11,7 @@ import numpy as np
 from limitsets.base import AnswerError
 from limitsets.base.arrays import Mask
 from limitsets.feeder.goals import OrientedBeyond, Reaches
-from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.scene import require_rests
+from limitsets.feeder.scene import Scene, require_rests
 from limitsets.proofs.policies.game import Game, game_of, image_of
 from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.certifying import spelled_deviations

@@ -12,7 +12,7 @@ import numpy as np
 from limitsets.base import AnswerError, Progress, silent
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.scattering import uniform_starts
-from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
+from limitsets.feeder.scene import BeyondSensor, SideSensor
 from limitsets.proofs.policies.policy import NONE
 from limitsets.proofs.policies.synthesis import Synthesis
 from limitsets.proofs.prover.parameters import ParameterBox, parameter_box

@@ -20,9 +20,7 @@ from limitsets.base import (
     shown_in_notebooks,
 )
 from limitsets.base.arrays import Arrays
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.left_out import Model
-from limitsets.feeder.scene.surroundings import BeyondSensor, Sensor, exact_text
+from limitsets.feeder.scene import BeyondSensor, Model, Scene, Sensor, exact_text, load
 from limitsets.proofs.policies.board import Board, Progress, Starts, board_of
 from limitsets.proofs.policies.policy import NONE, NOT_DECIDED, SOLVED, Found, Policy, search
 from limitsets.proofs.prover.certificate import brackets, pack, tidy

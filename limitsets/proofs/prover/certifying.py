@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from limitsets.base import AnswerError, Progress, arguments_checked_as, shown, shown_in_notebooks
-from limitsets.feeder.scene import Scene, load
-from limitsets.feeder.scene.laid import LaidLike, laid_goals
+from limitsets.feeder.scene import LaidLike, Scene, laid_goals, load
 from limitsets.feeder.scene.quantities import deviation, find
 from limitsets.feeder.scene.units import parse
 from limitsets.proofs.prover.attraction import Attraction, attraction, near_section, trapping

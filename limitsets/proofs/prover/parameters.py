@@ -20,8 +20,7 @@ from limitsets.base import AnswerError
 from limitsets.base.arrays import Mask
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.geometry.polygon import above_side
-from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.numbers import Numbers
+from limitsets.feeder.scene import Numbers, Scene
 from limitsets.feeder.scene.quantities import base_unit, find, text_at, texts
 from limitsets.feeder.scene.units import exact_factor, parse, share_of_pi
 from limitsets.feeder.thrower import Throw

@@ -12,8 +12,7 @@ import numpy as np
 
 from limitsets.base import AnswerError, Column, Table, Tabled, as_table, bands_of, picked
 from limitsets.feeder.goals import Goal, Laid, by_side
-from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.left_out import Model
+from limitsets.feeder.scene import Model, Scene
 from limitsets.feeder.scene.quantities import text_at, texts
 from limitsets.feeder.scene.units import convert, parse
 from limitsets.proofs.prover.attraction import Attraction

@@ -343,14 +343,20 @@ def has_slope(params: Any) -> bool:
 
 def _fewest_entries(params: Any) -> int | None:
     """Length of the shortest array among the parameters, None where there is none."""
-    if any(isinstance(field, str | complex) for field in params):
-        coerce(params)  # which refuses it by its name
-    counts = [
-        len(field) if isinstance(field, np.ndarray) else _fewest_entries(field)
-        for field in params
-        if isinstance(field, np.ndarray | tuple)
-    ]
-    return min((count for count in counts if count is not None), default=None)
+    fewest: int | None = None
+    for field in params:
+        count: int | None = None
+        if isinstance(field, float):
+            continue
+        if isinstance(field, np.ndarray):
+            count = len(field)
+        elif isinstance(field, tuple):
+            count = _fewest_entries(field)
+        elif isinstance(field, str | complex):
+            coerce(params)  # which refuses it by its name
+        if count is not None and (fewest is None or count < fewest):
+            fewest = count
+    return fewest
 
 
 def require_sides(params: Any, least: int, most: int) -> None:

@@ -173,8 +173,8 @@ def displacements(params: Any, x: ArrayLike, side: int) -> NDArray[np.float64]:
 def columns(x: ArrayLike, dimension: int) -> tuple[NDArray[np.float64], ...]:
     """States of shape (n,) or (n, dimension) as a tuple of coordinate arrays, as kernels take them."""
     states = np.asarray(x, dtype=np.float64)
-    if dimension == 1:
-        states = states.reshape(states.shape[0], 1) if states.ndim == 1 else states
+    if dimension == 1 and states.ndim == 1:
+        return (np.ascontiguousarray(states),)
     if states.ndim != 2 or states.shape[1] != dimension:
         raise MapError(
             "the shape of the states",
@@ -182,7 +182,7 @@ def columns(x: ArrayLike, dimension: int) -> tuple[NDArray[np.float64], ...]:
             f"(n, {dimension}), or (n,) in one dimension",
             "reshape them",
         )
-    return tuple(np.ascontiguousarray(states[:, k]) for k in range(dimension))
+    return tuple(map(np.ascontiguousarray, states.T))
 
 
 def rows(xs: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:

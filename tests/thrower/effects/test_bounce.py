@@ -22,8 +22,7 @@ from limitsets.feeder.thrower.flight import turn
 from limitsets.feeder.thrower.full import gather_full, with_effects
 from limitsets.feeder.thrower.motion import OFF, ON, Arrival, Contact, FullSide, above, right_of
 from limitsets.numbers.jit import entry_of, kernel
-from limitsets.systems.maps import codes
-from limitsets.systems.maps import images as images_of_drive
+from limitsets.systems.maps import codes, images as images_of_drive
 from limitsets.systems.maps.drivers import images
 from tests.kept import kept
 from tests.thrower.effects.test_slip import square
