@@ -108,18 +108,24 @@ def tests_of(file: Path, checkout: Path) -> list[str]:
     """List the tests in the folder of a room's name, those that name the room or their command, and its doctests."""
     room = file.parent
     word, public = ".".join(room.parts), f"ls.{room.name}"
-    named = [
-        path.relative_to(checkout)
-        for path in sorted((checkout / "tests").rglob("test_*.py"))
+    texts = {
+        path.relative_to(checkout): path.read_text(encoding="utf-8")
+        for path in (checkout / "tests").rglob("test_*.py")
         if "bench" not in path.parts
-        and (room.name in path.parts or word in (text := path.read_text(encoding="utf-8")) or public in text)
+    }
+    named = [
+        path
+        for path, text in texts.items()
+        if room.name in path.parts or f"{word}." in text or f"{word} " in text or public in text
     ]
-    named.sort(key=lambda path: path.parent.name not in room.parts)  # those of its own folder first
+    # those that import the file first, then those in the folder of the room's name
+    imports = f"{word}.{file.stem} "
+    named.sort(key=lambda path: (imports not in texts[path], path.parent.name not in room.parts, path))
     return [*map(str, named), str(room)]
 
 
-def first_failure(checkout: Path, tests: list[str], workers: str) -> str:
-    """Run tests until one fails and name that one; an empty text where all pass."""
+def first_failure(checkout: Path, tests: list[str], workers: str, seconds: float | None = None) -> str:
+    """Run tests until one fails and name that one; an empty text where all pass, or the time is over."""
     words = [
         "-m",
         "pytest",
@@ -134,9 +140,18 @@ def first_failure(checkout: Path, tests: list[str], workers: str) -> str:
         *tests,
     ]
     environment = os.environ | {"PYTHONPATH": str(checkout), "CI": "1"}
-    run = subprocess.run(
-        [sys.executable, *words], cwd=checkout, env=environment, capture_output=True, text=True, check=False
-    )
+    try:
+        run = subprocess.run(
+            [sys.executable, *words],
+            cwd=checkout,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=seconds,
+        )
+    except subprocess.TimeoutExpired:
+        return ""
     if run.returncode in (0, 5):  # all passed, or there were none
         return ""
     failed = [line for line in run.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
@@ -158,6 +173,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=28)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--workers", default="2")
+    parser.add_argument("--seconds", type=float, help="most time for the tests of one room")
     parser.add_argument("--rooms-only", action="store_true", help="leave out the run of all tests")
     words = parser.parse_args()
     log = [json.loads(line) for line in words.log.read_text().splitlines()] if words.log.exists() else []
@@ -174,7 +190,7 @@ def main() -> int:
                 continue
             source, begin = (ROOT / file).read_text(encoding="utf-8"), time.perf_counter()
             (checkout / file).write_text(with_fault(source, place), encoding="utf-8")
-            noticed = first_failure(checkout, tests_of(file, checkout), words.workers)
+            noticed = first_failure(checkout, tests_of(file, checkout), words.workers, words.seconds)
             if not noticed and not words.rooms_only:
                 noticed = first_failure(checkout, ["tests", "limitsets"], words.workers)
             (checkout / file).write_text(source, encoding="utf-8")
