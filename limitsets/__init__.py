@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from limitsets.proofs.policies import feedback as feedback
     from limitsets.proofs.prover import certify as certify
     from limitsets.proofs.prover.certificate import recheck as recheck
+    from limitsets.proofs.prover.programs import formulas as formulas
     from limitsets.systems import maps as maps, resilience as resilience
     from limitsets.systems.cells import grid as grid
     from limitsets.systems.graph import morse_graph as morse_graph, transitions as transitions
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
         orbit as orbit,
         register as register,
     )
+    from limitsets.systems.maps.written import map as map  # noqa: A004  # an attribute of the package
     from limitsets.systems.sets import (
         attractors as attractors,
         basins as basins,
@@ -80,9 +82,11 @@ _PUBLIC = {
     "feed": "cell.feeding:feed",
     "feedback": "proofs.policies:feedback",
     "fit": "parameters.fitting:fit",
+    "formulas": "proofs.prover.programs:formulas",
     "grid": "systems.cells:grid",
     "limit_set": "systems.sets:limit_set",
     "load": "feeder.scene:load",
+    "map": "systems.maps.written:map",
     "margin": "parameters.margins.single:margin",
     "morse_graph": "systems.graph:morse_graph",
     "noise_statistics": "parameters.noise:noise_statistics",
@@ -149,10 +153,12 @@ __all__ = [
     "feed",
     "feedback",
     "fit",
+    "formulas",
     "grid",
     "interval",
     "limit_set",
     "load",
+    "map",
     "maps",
     "margin",
     "morse_graph",

@@ -171,11 +171,16 @@ def _explained(error: Exception, cls: type) -> MapError:
         file, number = str(spot[0]), spot[1]
         above = (re.match(r"\s*def (\w+)", linecache.getline(file, k)) for k in range(number, 0, -1))
         name = next((head[1] for head in above if head), "the kernel")
+        remedy = (
+            "give each branch a number and a name (branches=), and register image_on, margin; or image_box"
+        )
+        if cls.__module__.split(".")[0] == "limitsets":  # made by `limitsets.map`
+            remedy = "give each branch a function of its own: limitsets.map(pieces=(f, g), margin=m)"
         return MapError(
             f"what {name} of {cls.__name__} does with x or a parameter ({place})",
             linecache.getline(file, number).strip(),
             f"for boxes: {NUMBERS_DO}",
-            "give each branch a number and a name (branches=), and register image_on, margin; or image_box",
+            remedy,
         )
     if any(_NO_STATE.search(line) for line in lines):
         return MapError(

@@ -35,6 +35,7 @@ from limitsets.parameters.atlas.work import STEP, answer
 from limitsets.systems.cells import Domain, as_domain
 from limitsets.systems.maps import coerce, domain_of, kind_of
 from limitsets.systems.maps.contract import require_dimension
+from limitsets.systems.maps.written import modules_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -418,7 +419,7 @@ def _require_importable(plan: Plan) -> None:
     """Refuse what stands in the script itself: processes cannot import it by its name."""
     modules = {plan.task.partition(":")[0]}
     if isinstance(plan.subject, MapSubject):
-        modules.add(type(plan.subject.params).__module__)
+        modules |= modules_of(type(plan.subject.params))
     if "__main__" in modules:
         raise LimitsetsError(
             "the task or the map", "one of the script itself", "one of a file that other processes import",

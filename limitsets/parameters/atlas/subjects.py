@@ -20,6 +20,7 @@ from limitsets.feeder.scene.quantities import base_unit, find, unit_read
 from limitsets.feeder.scene.units import Quantity, convert, parse
 from limitsets.systems.cells import Domain
 from limitsets.systems.graph.agreement import require_agreement
+from limitsets.systems.maps.written import modules_of
 
 # ----------------------------------------------------------------
 # The values of one quantity in a plan, the same floats on every machine.
@@ -260,7 +261,11 @@ class MapSubject:
     @property
     def sources(self) -> dict[str, str]:
         """Digests of code outside the package that it depends on."""
-        return source_of(type(self.params).__module__)
+        return {
+            file: digest
+            for module in modules_of(type(self.params))
+            for file, digest in source_of(module).items()
+        }
 
     def unit_of(self, name: str, text: str | None) -> str:
         """Refuse what is no number among the parameters; there are no units."""
