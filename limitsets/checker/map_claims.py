@@ -382,11 +382,11 @@ def claim_in_words(name: str, part: Part, file: MapFile, cycles: list[Cycle]) ->
     components = "; ".join(component_in_words(c, k) for k in own[:MOST_NAMED])
     components += f"; and {len(own) - MOST_NAMED} more" if len(own) > MOST_NAMED else ""
     if name == "basin":
-        share, steps = share_in_words(c, file.shape), int(c.rank.max(initial=0))
-        return f"every start in cells that cover {share} comes into {there}, within {steps} steps"
+        share, steps = share_in_words(c, file.shape), steps_in_words(int(c.rank.max(initial=0)))
+        return f"every start in cells that cover {share} comes {steps} into {there}"
     if name == "attracts-all":
-        steps = part.claims[name]["max_rank"]
-        return f"every start in the domain, which no orbit leaves, comes into {there}, within {steps} steps"
+        steps = steps_in_words(part.claims[name]["max_rank"])
+        return f"every start in the domain, which no orbit leaves, comes {steps} into {there}"
     if name == "ends-in":
         return goal_in_words(file)
     if name == "expanding":
@@ -410,6 +410,11 @@ def component_in_words(c: MapCells, component: int) -> str:
     where = " x ".join(map(interval_in_words, hull)) + (f" on side {side}" if len(c.edges) > 1 else "")
     elsewhere = " and on other sides" if len(np.unique(c.side_of(cells))) > 1 else ""
     return f"component {component} ({len(cells)} cells in {where}{elsewhere})"
+
+
+def steps_in_words(most: int) -> str:
+    """Write a bound of the number of steps."""
+    return f"within {most} step{'' if most == 1 else 's'}"
 
 
 def goal_in_words(file: MapFile) -> str:

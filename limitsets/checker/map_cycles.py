@@ -161,7 +161,7 @@ class Cycle:
         for k, slope in enumerate(slopes):
             b = self.inverses[(k + 1) % self.period] * matrix(slope) * self.frames[k]
             sums = [sum(map(abs, row), ZERO) for row in (b.transpose() * b).tolist()]
-            bounds.append(functools.reduce(arb.max, sums).sqrt())
+            bounds.append(functools.reduce(arb.max, sums).upper().sqrt())  # the ball itself may reach below 0
         return bounds
 
     def is_apart_from(self, other: "Cycle") -> bool:

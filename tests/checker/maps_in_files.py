@@ -1,7 +1,7 @@
 """A second writer of certificates of maps, in plain floats and apart from the package: it proves nothing.
 
-Formulas are functions of numpy, which run on arrays and on numbers that record.  Targets are the hull of sampled images,
-widened; the checker has to find everything right by itself.
+Formulas are functions of numpy, which run on arrays and on numbers that record.  Targets are the hull of sampled
+images, widened; the checker has to find everything right by itself.
 """
 
 import copy
@@ -19,7 +19,14 @@ from scipy.sparse.csgraph import connected_components
 
 from limitsets.checker import Report, recheck
 
-WORDS = {"subtract": "sub", "multiply": "mul", "divide": "div", "negative": "neg", "absolute": "abs", "arctan2": "atan2"}
+WORDS = {
+    "subtract": "sub",
+    "multiply": "mul",
+    "divide": "div",
+    "negative": "neg",
+    "absolute": "abs",
+    "arctan2": "atan2",
+}
 WORDS |= {"minimum": "min", "maximum": "max"}
 
 
@@ -65,11 +72,18 @@ class Example:
     def header(self):
         keys = list(itertools.product(range(self.sides), range(self.branches)))
         programs = [
-            {"side": s, "branch": b, "to": self.to(s, b), **recorded(self.image, self.dimension, self.names, s, b)}
+            {
+                "side": s,
+                "branch": b,
+                "to": self.to(s, b),
+                **recorded(self.image, self.dimension, self.names, s, b),
+            }
             for s, b in keys
         ]
         margins = [
-            {"side": s, **recorded(self.margin, self.dimension, self.names, s)} for s in range(self.sides) if self.margin
+            {"side": s, **recorded(self.margin, self.dimension, self.names, s)}
+            for s in range(self.sides)
+            if self.margin
         ]
         return {
             "dimension": self.dimension, "sides": self.sides, "branches": self.branches, "parameters": self.names,
@@ -97,7 +111,10 @@ def samples(lo, hi, count):
 
 def targets(example, edges, parameters, count=5, slack=0.02):
     """By branch the targets of all cells, and the cells whose image leaves the domain."""
-    corners = [SimpleNamespace(**dict(zip(parameters, at, strict=True))) for at in itertools.product(*parameters.values())]
+    corners = [
+        SimpleNamespace(**dict(zip(parameters, at, strict=True)))
+        for at in itertools.product(*parameters.values())
+    ]
     start = np.concatenate([[0], np.cumsum([np.prod([len(e) - 1 for e in axes]) for axes in edges])])
     d = example.dimension
     target = [np.full((start[-1], 2 * d), -2, np.int32) for _ in range(example.branches)]
@@ -105,12 +122,18 @@ def targets(example, edges, parameters, count=5, slack=0.02):
     for side, branch in itertools.product(range(example.sides), range(example.branches)):
         lo, hi = ends_of(edges[side])
         places = [(x.T, p) for x in samples(lo, hi, count) for p in corners]
-        images = np.array([np.broadcast_arrays(*np.atleast_2d(example.image(x, p, side, branch))) for x, p in places])
+        images = np.array(
+            [np.broadcast_arrays(*np.atleast_2d(example.image(x, p, side, branch))) for x, p in places]
+        )
         low, high = images.min(0).T, images.max(0).T
         wide = slack * (high - low) + 1e-9
         to = edges[example.to(side, branch)]
-        first = np.stack([np.searchsorted(e, v, "right") - 1 for e, v in zip(to, (low - wide).T, strict=True)], 1)
-        last = np.stack([np.searchsorted(e, v, "left") - 1 for e, v in zip(to, (high + wide).T, strict=True)], 1)
+        first = np.stack(
+            [np.searchsorted(e, v, "right") - 1 for e, v in zip(to, (low - wide).T, strict=True)], 1
+        )
+        last = np.stack(
+            [np.searchsorted(e, v, "left") - 1 for e, v in zip(to, (high + wide).T, strict=True)], 1
+        )
         met = np.ones(len(lo), bool)
         if example.margin:
             margins = np.array([np.broadcast_to(example.margin(x, p, side), len(lo)) for x, p in places])
@@ -139,23 +162,39 @@ def links(example, edges, target, start):
     return np.concatenate(rows), np.concatenate(columns)
 
 
-def arrays_of(example, edges, parameters, final=None, **how):
-    """The arrays of a box of parameters; `final`: cells near a cycle, which get component 0."""
+def arrays_of(example, edges, parameters, final=None, whole=False, **how):
+    """The arrays of a box of parameters; `final`: cells near a cycle, which get component 0.
+
+    Attracting cells are the strong components that nothing leaves; with `whole` all that recurrent cells lead to.
+    """
     target, lost, start = targets(example, edges, parameters, **how)
     n = start[-1]
     final = np.zeros(n, bool) if final is None else final
     row, column = links(example, edges, target, start)
     use = ~final[row]
     row, column = row[use], column[use]
-    _, label = connected_components(csr_array((np.ones(len(row)), (row, column)), (n, n)), connection="strong")
+    _, label = connected_components(
+        csr_array((np.ones(len(row)), (row, column)), (n, n)), connection="strong"
+    )
     leaves = np.bincount(label, minlength=n) * 0
     np.add.at(leaves, label[row], label[row] != label[column])
     np.add.at(leaves, label[lost & ~final], 1)
     recurs = np.zeros(len(leaves), bool)
     recurs[label[row][label[row] == label[column]]] = True
     attracting = (recurs & (leaves == 0))[label] & ~final
+    if whole:
+        attracting = recurs[label]
+        for _ in range(n):
+            after = attracting.copy()
+            after[column[attracting[row]]] = True
+            if (after == attracting).all():
+                break
+            attracting = after
+        label = np.zeros(n, int)
     component = np.full(n, -1, np.int32)
-    component[attracting] = 1 + np.unique(label[attracting], return_inverse=True)[1] if attracting.any() else 0
+    component[attracting] = (
+        1 + np.unique(label[attracting], return_inverse=True)[1] if attracting.any() else 0
+    )
     component[final] = 0
     rank = np.full(n, -1, np.int32)
     rank[attracting | final] = 0
@@ -171,7 +210,9 @@ def arrays_of(example, edges, parameters, final=None, **how):
 
 def hexed(value):
     """Floats, and lists of them, in hexadecimal."""
-    return [hexed(one) for one in value] if isinstance(value, (list, tuple, np.ndarray)) else float(value).hex()
+    return (
+        [hexed(one) for one in value] if isinstance(value, (list, tuple, np.ndarray)) else float(value).hex()
+    )
 
 
 def region(*box, side=0):
@@ -189,8 +230,21 @@ def cycle(points, *, width=1e-9, branches=None, sides=None, frames=None, radius=
     }  # fmt: skip
 
 
+def frames_of(slopes):
+    """Frames in which a cycle with these matrices of derivatives contracts: eigenvectors, carried along the cycle."""
+    one = np.eye(len(slopes[0]))
+    values, vectors = np.linalg.eig(np.linalg.multi_dot([one, *slopes[::-1], one]))
+    frames = [
+        np.column_stack([v.imag if w.imag < 0 else v.real for w, v in zip(values, vectors.T, strict=True)])
+    ]
+    for a in slopes[:-1]:
+        after = a @ frames[-1]
+        frames.append(after / max(np.linalg.norm(after, 2), 1e-300))
+    return frames if all(np.linalg.cond(s) < 1e6 for s in frames) else lyapunov_frames(slopes)
+
+
 def lyapunov_frames(slopes):
-    """Frames in which a cycle with these matrices of derivatives contracts at every step."""
+    """Frames by Lyapunov's equation, where eigenvectors are nearly parallel or a slope is 0."""
     one = np.eye(len(slopes[0]))
     p = [one] * len(slopes)
     for k in [*reversed(range(len(p)))] * 60:
@@ -204,16 +258,22 @@ class MapCertificate:
     def __init__(self, example, boxes, goal=None):
         """`boxes`: (parameters, claims, arrays) for each box of parameters."""
         rows = [
-            {"parameters": p, "prefix": f"{k}.", "claims": [{"claim": c, "section": s} for c, s in claims.items()]}
+            {
+                "parameters": p,
+                "prefix": f"{k}.",
+                "claims": [{"claim": c, "section": s} for c, s in claims.items()],
+            }
             for k, (p, claims, _) in enumerate(boxes)
         ]
         self.arrays = {f"{k}.{name}": v for k, one in enumerate(boxes) for name, v in (one[2] or {}).items()}
-        self.header = copy.deepcopy(
-            {
-                "format": "limitsets-proof", "version": 3, "map": example.header(), "boxes": rows,
-                "goal": goal, "plane": None, "producer": {"limitsets": "tests"},
-            }  # fmt: skip
-        )
+        header = {
+            "format": "limitsets-proof",
+            "version": 3,
+            "map": example.header(),
+            "boxes": rows,
+            "goal": goal,
+        }
+        self.header = copy.deepcopy(header | {"plane": None, "producer": {"limitsets": "tests"}})
 
     def copy(self):
         return copy.deepcopy(self)
@@ -229,7 +289,11 @@ class MapCertificate:
         """Write with fresh hashes."""
         arrays = {name: np.ascontiguousarray(v) for name, v in self.arrays.items()}
         said = {
-            name: {"sha256": hashlib.sha256(v.tobytes()).hexdigest(), "dtype": v.dtype.str, "shape": list(v.shape)}
+            name: {
+                "sha256": hashlib.sha256(v.tobytes()).hexdigest(),
+                "dtype": v.dtype.str,
+                "shape": list(v.shape),
+            }
             for name, v in arrays.items()
         }
         packed = io.BytesIO()
