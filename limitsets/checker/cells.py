@@ -379,26 +379,36 @@ def workers_ignore_interrupts() -> Iterator[None]:
 
 
 class Crew:
-    """The processes that check cells: this one alone, and others too for large certificates."""
+    """The processes that check cells: this one alone, and others too for large certificates.
+
+    Each process is set up by `prepare(*setup)` and does tasks, which have `cells`, by `check`.
+    """
 
     def __init__(
-        self, raw: list[object], noise: object, workers: int, progress: Callable[[int], None] | None
+        self,
+        setup: tuple[Any, ...],
+        workers: int,
+        progress: Callable[[int], None] | None,
+        *,
+        prepare: Callable[..., None] = prepare,
+        check: Callable[[Any], tuple[int, Failure | None, int]] = check_task,
     ):
-        self.setup, self.workers, self.progress = (raw, noise), workers, progress
+        self.setup, self.workers, self.progress = setup, workers, progress
+        self.prepare, self.check = prepare, check
         self.done = self.boxes = 0
         self.pool: ProcessPoolExecutor | None = None
-        prepare(raw, noise)
+        prepare(*setup)
 
-    def run(self, tasks: list[Task]) -> tuple[int, Failure] | None:
+    def run(self, tasks: list[Any]) -> tuple[int, Failure] | None:
         """Return the first cell that is not proved, in the order of the tasks, and the reason; or None."""
         if self.workers > 1 and self.pool is None and sum(len(t.cells) for t in tasks) > SMALL:
             # never by fork, which copies locks that other threads hold
             method = multiprocessing.get_start_method(allow_none=True)
             context = multiprocessing.get_context("forkserver" if method == "forkserver" else "spawn")
-            self.pool = ProcessPoolExecutor(self.workers, context, prepare, self.setup)
+            self.pool = ProcessPoolExecutor(self.workers, context, self.prepare, self.setup)
         try:
             with workers_ignore_interrupts():
-                results = map(check_task, tasks) if self.pool is None else self.pool.map(check_task, tasks)
+                results = map(self.check, tasks) if self.pool is None else self.pool.map(self.check, tasks)
             for task, (cell, failure, boxes) in zip(tasks, results, strict=True):
                 self.done += len(task.cells)
                 self.boxes += boxes

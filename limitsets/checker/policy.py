@@ -389,7 +389,7 @@ def check_images(
     """Check decision, landing and image of every cell from which a throw is made; "" or why, and the boxes."""
     total = sum(int(some.sum()) for some in made)
     advance = None if progress is None else (lambda done: progress(done, total))
-    crew = Crew([each.scene.raw for each in policy.choices], policy.noise, workers, advance)
+    crew = Crew(([each.scene.raw for each in policy.choices], policy.noise), workers, advance)
     try:
         for k, some in enumerate(made):
             failure = crew.run(

@@ -14,6 +14,7 @@ from typing import Any
 
 import flint
 
+from .any_map import map_in_words
 from .balls import PRECISION
 from .brackets import Chances, chances_in_words, check_chances, read_chances
 from .cells import Crew, extents
@@ -35,6 +36,7 @@ from .file import (
     table,
 )
 from .goals import content_of_goal, goal_of_scene
+from .map_claims import MapFile, check_map_file, read_map_file
 from .model import FORMULAS
 from .plane import (
     Plane,
@@ -48,6 +50,7 @@ from .plane import (
     read_plane,
 )
 from .policy import Policy, check_policy, policy_in_words, read_policy
+from .program import is_whole
 from .scene import (
     Scene,
     check_by_halves,
@@ -106,6 +109,10 @@ class Report:
         the scene's [world] that it has not; nobody looked which assumptions the scene breaks.
     reason : str
         Why the certificate fails, empty where it does not.
+    map : dict, or None
+        Of a certificate of a map: ``{"dimension", "sides", "branches", "formulas": [...], "boxes": [...]}``, by box of
+        parameters ``{"parameters": [...], "holds_for", "verdict", "claims": [...]}``, by claim name, a word of `WORDS`,
+        and what is proved or why not.
     seconds : float
         Time of the recheck.
     cells, boxes : int
@@ -124,6 +131,7 @@ class Report:
     parameters: dict[str, str] = field(default_factory=dict, repr=False)
     relied_on: list[str] = field(default_factory=list, repr=False)
     model: dict[str, Any] | None = field(default=None, repr=False)
+    map: dict[str, Any] | None = field(default=None, repr=False)
     reason: str = ""
     seconds: float = 0.0
     cells: int = 0
@@ -157,19 +165,17 @@ class Certificate:
     unknown: list[tuple[str, str, str]]  # and those that cannot
 
 
-def open_and_look(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict[str, memoryview]]:
-    """Open a file, and see that it is a certificate of this map; raises BadFileError."""
-    header, entries = open_certificate(path)
+def require_scenes(header: dict[str, Any]) -> None:
+    """Require that a file is a certificate of scenes; raises BadFileError."""
     needed = "format version map noise boxes claims arrays tolerance"
     table(header, "header.json", needed, "state producer")
     version = header["version"]
     right = header["format"] == "limitsets-proof" and type(version) is int and version in (1, 2)
-    require(right, "the format is not limitsets-proof, version 2")
+    require(right, "the format is not limitsets-proof, version 2 or 3")
     require(version == 2, "version 1 of the format is not read any more: prove the scene again")
     the_map = table(header["map"], "map", "name version flight flip", "formulas")
     first = type(the_map["version"]) is int and the_map["version"] == 1
     require(the_map["name"] == "throw" and first, "the map is not throw, version 1")
-    return header, entries
 
 
 def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> Certificate:
@@ -241,7 +247,11 @@ def recheck(
 
 def check_certificate(path: str | os.PathLike[str], workers: int, progress: Progress, report: Report) -> None:
     """Fill in the report; raises BadFileError."""
-    header, entries = open_and_look(path)
+    header, entries = open_certificate(path)
+    if header.get("format") == "limitsets-proof" and is_whole(header.get("version"), 3, 3):
+        recheck_map(read_map_file(header, entries), workers, progress, report)
+        return
+    require_scenes(header)
     alone = next((word for word in ALONE if claims_a(word, header)), None)
     if alone is not None:
         read, check, noise_of = ALONE[alone]
@@ -258,13 +268,37 @@ def check_certificate(path: str | os.PathLike[str], workers: int, progress: Prog
     failed = failed_at_once(file, gap, own)
     work = work_of(file)
     advance = None if progress is None else (lambda done: progress(min(done, work), work))
-    crew = Crew(list(file.raw), file.noise, workers, advance)
+    crew = Crew((list(file.raw), file.noise), workers, advance)
     try:
         check_boxes(file, crew, failed)
     finally:
         crew.close()
     report.boxes = crew.boxes
     conclude(report, file, failed, own)
+
+
+def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report) -> None:
+    """Check a certificate of a map, and fill in the report."""
+    outcomes, report.boxes = check_map_file(file, workers, progress)
+    report.map = {
+        "dimension": file.shape.dimension,
+        "sides": file.shape.sides,
+        "branches": file.shape.branches,
+        "formulas": list(map_in_words(file.shape)),
+        "boxes": [outcome._asdict() for outcome in outcomes],
+    }
+    report.cells = sum(len(part.cells.rank) for part in file.parts if part.cells is not None)
+    arithmetic = f"the ball arithmetic of python-flint {flint.__version__} (Arb), numpy and Python"
+    report.relied_on = ["exact arithmetic of these formulas (no rounding of a computer's orbits)", arithmetic]
+    for k, outcome in enumerate(outcomes):
+        where = f"box {k}: " if len(outcomes) > 1 else ""
+        for name, word, text in outcome.claims:
+            good = word in ("proved", "refuted")
+            report.claims.append((where + name, word, "" if good else text))
+            report.statement += [f"{where}{name}: {text}"] if good else []
+    worst = {outcome.verdict for outcome in outcomes if outcome.verdict}
+    report.verdict = "failed" if "failed" in worst else "proved" if "proved" in worst else "refuted"
+    report.reason = next((f"{name}: {why}" for name, _, why in report.claims if why), "")
 
 
 def describe_alone(

@@ -271,7 +271,7 @@ def _thrown(proof: Proof) -> dict[str, Callable[[State], str]]:
 
 
 @command()
-def recheck(run: Run, file: Path) -> Answer:
+def recheck(run: Run, file: Path, *, formulas: bool = False) -> Answer:
     """Check a certificate by other code and in other arithmetic than those that made it.
 
     Exit 0 where every claim is proved; 1 where one fails or is proved of some starts only, or is a refutation.
@@ -280,6 +280,8 @@ def recheck(run: Run, file: Path) -> Answer:
     ----------
     file : FILE
         A certificate, NAME.proof.zip.
+    formulas
+        Of a certificate of a map: print all lines of its formulas.
     """
     verdicts = ls.recheck(
         file, workers=None, progress=lambda done, of: run.tell("cells checked", done - 1, of)
@@ -289,7 +291,7 @@ def recheck(run: Run, file: Path) -> Answer:
     from limitsets.checker import EXITS, show
 
     def words() -> tuple[str, ...]:
-        show(verdicts, str(file))
+        show(verdicts, str(file), formulas=formulas)
         return ()
 
     claims = Table(("claim", "verdict", "reason"), verdicts.claims, str(file))

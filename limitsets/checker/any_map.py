@@ -1,0 +1,241 @@
+"""A map that a file gives by its formulas, and what is proved of it on one cell.
+
+docs/certificates.md, "Certificates of any map": the map in the header, the parameters of a box, and "One cell".
+"""
+
+import itertools
+import math
+import operator
+import re
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+from flint import arb
+
+from .balls import ZERO, Arb, Pair
+from .cells import Failure
+from .file import plain, read_side, require, rows, table
+from .program import Formulas, Program, in_words, is_whole, named, number, rational, read_formulas
+
+MOST_PIECES = 4_000  # of one cell: a certificate that needs more is refused
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.]{0,40}")
+
+# ----------------------------------------------------------------
+# The map of a file.
+
+
+class Shape(NamedTuple):
+    """A map as its file has it: read, and not yet for certain parameters."""
+
+    dimension: int
+    sides: int
+    branches: int
+    names: list[str]  # of the parameters
+    images: dict[tuple[int, int], Formulas]  # by side and branch
+    to: dict[tuple[int, int], int]  # the side that they lead to
+    margins: list[Formulas]  # by side, where there are two branches
+
+
+def read_map(raw: object) -> Shape:
+    """Read the map of a header."""
+    known = table(raw, "map", "dimension sides branches parameters programs margins periodic")
+    for word, most in (("dimension", 3), ("sides", 64), ("branches", 2)):
+        require(is_whole(known[word], 1, most), f"map: {word} is not a whole number from 1 to {most}")
+    dimension, sides, branches = known["dimension"], known["sides"], known["branches"]
+    names = rows(known["parameters"], "map: parameters", 0, 1_000)
+    fine = all(isinstance(name, str) and NAME.fullmatch(name) for name in names)
+    require(fine and len(set(names)) == len(names), "map: the name of a parameter is odd, or stands twice")
+    for axes in rows(known["periodic"], "map: periodic", sides, sides):
+        closed = [
+            period for period in rows(axes, "map: periodic", dimension, dimension) if period is not None
+        ]
+        require(not closed, "map: this checker does not know axes with a period")
+    keys = list(itertools.product(range(sides), range(branches)))
+    images, to = {}, {}
+    for key, one in zip(keys, rows(known["programs"], "map: programs", len(keys), len(keys)), strict=True):
+        where = "the program of side {}, branch {}".format(*key)
+        table(one, where, "side branch to ops out")
+        own = is_whole(one["side"], key[0], key[0]) and is_whole(one["branch"], key[1], key[1])
+        require(own, f"{where} is missing, or not in its place")
+        images[key] = read_formulas(one, dimension, names, dimension, where)
+        to[key] = read_side(one["to"], sides)
+    margins, count = [], sides if branches == 2 else 0
+    for side, one in enumerate(rows(known["margins"], "map: margins", count, count)):
+        where = f"the margin of side {side}"
+        table(one, where, "side ops out")
+        require(is_whole(one["side"], side, side), f"{where} is missing, or not in its place")
+        margins.append(read_formulas(one, dimension, names, 1, where))
+    return Shape(dimension, sides, branches, names, images=images, to=to, margins=margins)
+
+
+def map_in_words(shape: Shape) -> Iterator[str]:
+    """Write the formulas that are checked."""
+    for (side, branch), formulas in shape.images.items():
+        yield f"side {side}, branch {branch}, to side {shape.to[side, branch]}:"
+        yield from ("    " + line for line in in_words(formulas, [f"x{i}'" for i in range(shape.dimension)]))
+    for side, formulas in enumerate(shape.margins):
+        yield f"side {side}: branch 1 if and only if margin > 0, else branch 0"
+        yield from ("    " + line for line in in_words(formulas, ["margin"]))
+    if shape.margins:
+        yield "the proof is of these formulas, not of the function image"
+
+
+def read_parameters(raw: object, names: list[str], where: str) -> dict[str, tuple[str, str]]:
+    """Read the parameters of a box: their two ends as texts, the same text where there is no range."""
+    given = table(raw, where, " ".join(names))
+    texts = {}
+    for name in names:
+        value = given[name]
+        pair = rows(value, f"{where}: a range", 2, 2) if isinstance(value, list) else [value, value]
+        lo, hi = (rational(text, f"{where}: {plain(name)}") for text in pair)
+        require(lo < hi or not isinstance(value, list), f"{where}: the range of {plain(name)} is empty")
+        texts[name] = (pair[0], pair[1])
+    return texts
+
+
+def parameter_in_words(name: str, ends: tuple[str, str]) -> str:
+    """Write the value or the range of a parameter."""
+    lo, hi = ends
+    return f"{named(name)} = {lo}" if lo == hi else f"{named(name)} in [{lo}, {hi}]"
+
+
+class Map:
+    """A map for one box of parameters."""
+
+    def __init__(self, shape: Shape, parameters: dict[str, tuple[str, str]]):
+        self.shape, self.dimension = shape, shape.dimension
+        values = {n: number(lo, n).union(number(hi, n)) for n, (lo, hi) in parameters.items()}
+        wide = [name for name, (lo, hi) in parameters.items() if lo != hi]
+        self.ranges = [floats_around(values[name]) for name in wide]
+        self.image = {key: Program(f, self.dimension, values, wide) for key, f in shape.images.items()}
+        self.margin = [Program(f, self.dimension, values, wide) for f in shape.margins]
+
+    def piece(self, box: list[Pair]) -> "Piece":
+        """Return the piece of all x in a box and all parameters."""
+        return Piece([*box, *self.ranges])
+
+
+def floats_around(x: Arb) -> Pair:
+    """Return a float below a ball and one above it."""
+    return math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
+
+
+# ----------------------------------------------------------------
+# One cell.
+
+Relation = Callable[[Any, Any], Any]
+Bound = tuple[
+    int, Relation, Arb
+]  # result, relation, end: the result has to stand in this relation to the end
+AT_MOST: list[Bound] = [(0, operator.le, ZERO)]
+ABOVE: list[Bound] = [(0, operator.gt, ZERO)]
+
+
+class Piece:
+    """All x and all parameters with a range in a box, closed."""
+
+    def __init__(self, box: list[Pair]):
+        self.box = box
+        self.balls = [arb(lo).union(arb(hi)) for lo, hi in box]
+
+    def corner(self, slopes: list[Arb], upper: bool) -> list[Arb]:
+        """Put every number by which a result rises or falls at the end where the result is largest, or least."""
+        return [
+            arb(hi if upper else lo) if slope >= 0 else arb(lo if upper else hi) if slope <= 0 else ball
+            for slope, (lo, hi), ball in zip(slopes, self.box, self.balls, strict=True)
+        ]
+
+    def halves(self, slopes: list[Arb]) -> list["Piece"]:
+        """Halve along the number that moves a result most; [] where no float lies between its ends."""
+        widths = [
+            (float(abs(slope).upper()) if slope.is_finite() else math.inf, hi - lo)
+            for slope, (lo, hi) in zip(slopes, self.box, strict=True)
+        ]
+        j = max(
+            range(len(widths)),
+            key=lambda k: (widths[k][0] * widths[k][1] if widths[k][1] > 0 else 0.0, widths[k][1]),
+        )
+        lo, hi = self.box[j]
+        middle = 0.5 * lo + 0.5 * hi
+        if not lo < middle < hi:
+            return []
+        return [Piece([*self.box[:j], half, *self.box[j + 1 :]]) for half in ((lo, middle), (middle, hi))]
+
+
+def slopes_unless(program: Program, piece: Piece, bounds: list[Bound]) -> list[Arb] | None:
+    """Return None if all bounds are proved on a piece, else the gradient of a result whose bound is not.
+
+    Three enclosures are tried: operation by operation; by the mean value theorem; with every number by which the result
+    rises or falls at its end.
+    """
+    results = program.at(piece.balls)
+    left = [bound for bound in bounds if not bound[1](results[bound[0]], bound[2])]
+    if not left:
+        return None
+    middle = [ball.mid() for ball in piece.balls]  # exact, and in the ball: the gradients hold between them
+    off = [ball - m for ball, m in zip(piece.balls, middle, strict=True)]
+    at_middle, gradients = program.at(middle), program.gradients(piece.balls)
+    for k, relation, end in left:
+        slopes = gradients[k]
+        mean = sum((g * d for g, d in zip(slopes, off, strict=True)), at_middle[k])
+        if relation(mean, end):
+            continue
+        corner = piece.corner(slopes, upper=relation in (operator.le, operator.lt))
+        if not relation(program.at(corner)[k], end):
+            return slopes
+    return None
+
+
+def possible(the_map: Map, side: int, piece: Piece) -> tuple[tuple[int, ...], list[Arb] | None]:
+    """Return the branches that are not excluded on a piece, and where both are the gradient of the margin."""
+    if not the_map.margin:
+        return (0,), None
+    if slopes_unless(the_map.margin[side], piece, AT_MOST) is None:
+        return (0,), None
+    slopes = slopes_unless(the_map.margin[side], piece, ABOVE)
+    return ((1,), None) if slopes is None else ((0, 1), slopes)
+
+
+class Claimed(NamedTuple):
+    """What is claimed of one cell: by branch the bounds of its image, None where the branch is impossible."""
+
+    side: int
+    box: list[Pair]
+    bounds: list[list[Bound] | None]
+    least: Arb | None  # of the size of the slope
+
+
+def check_cell(the_map: Map, claimed: Claimed) -> tuple[Failure | None, int]:
+    """Prove what is claimed of a cell, for all parameters; the failure or None, and the number of pieces."""
+    stack, pieces = [the_map.piece(claimed.box)], 0
+    while stack:
+        piece = stack.pop()
+        pieces += 1
+        failure, slopes = check_piece(the_map, claimed, piece)
+        if failure is None:
+            continue
+        halves = [] if slopes is None else piece.halves(slopes)
+        if not halves or pieces + len(stack) > MOST_PIECES:
+            return failure, pieces
+        stack += halves
+    return None, pieces
+
+
+def check_piece(the_map: Map, claimed: Claimed, piece: Piece) -> tuple[Failure | None, list[Arb] | None]:
+    """Check a piece of a cell; where that fails also a gradient, which tells where to halve."""
+    branches, of_margin = possible(the_map, claimed.side, piece)
+    for branch in branches:
+        bounds = claimed.bounds[branch]
+        if bounds is None:
+            return Failure("exclusion", f"branch {branch} is not excluded"), of_margin
+        program = the_map.image[claimed.side, branch]
+        slopes = slopes_unless(program, piece, bounds)
+        if slopes is not None:
+            return Failure(
+                "image", f"the image on branch {branch} is not proved to lie in its target cells"
+            ), slopes
+        if claimed.least is not None:
+            slopes = program.gradients(piece.balls)[0]
+            if not abs(slopes[0]) >= claimed.least:
+                return Failure("slope", f"the slope on branch {branch} is not proved"), slopes
+    return None, None

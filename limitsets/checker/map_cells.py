@@ -1,0 +1,215 @@
+"""The cells of a map in one to three coordinates: their arrays, their labels, and how they are shared out.
+
+docs/certificates.md, "Certificates of any map": the arrays of a box, and the two rules that labels follow.
+"""
+
+import itertools
+import math
+import operator
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import flint
+import numpy as np
+from flint import arb
+
+from .any_map import Bound, Claimed, Map, Shape, check_cell
+from .balls import PRECISION, Array, Pair
+from .cells import CHUNK, Failure
+from .file import Arrays, require
+
+MOST_CELLS = 2**31
+
+
+class MapCells:
+    """The arrays of one box of parameters; cells of all sides one after another, the last axis fastest."""
+
+    def __init__(self, arrays: Arrays, prefix: str, shape: Shape):
+        sides, d = range(shape.sides), shape.dimension
+        self.edges = [[arrays.read(f"{prefix}edges.{s}.{a}", "<f8") for a in range(d)] for s in sides]
+        ascending = all(len(e) > 1 and bool((e[1:] > e[:-1]).all()) for axes in self.edges for e in axes)
+        require(ascending, "the edges of the cells do not ascend")
+        counts = [[len(e) - 1 for e in axes] for axes in self.edges]
+        sizes = [math.prod(along) for along in counts]
+        require(sum(sizes) <= MOST_CELLS, "there are more than 2^31 cells")
+        self.target = [arrays.read(f"{prefix}target.{b}", "<i4", 2 * d) for b in range(shape.branches)]
+        self.rank, self.component = (arrays.read(prefix + name, "<i4") for name in ("rank", "component"))
+        alike = all(len(one) == sum(sizes) for one in (*self.target, self.rank, self.component))
+        require(alike, "the arrays do not have one row for each cell")
+        labelled = bool((self.rank >= -1).all() and (self.component >= -1).all())
+        require(labelled, "a rank or a component is below -1")
+        self.counts = np.array(counts, dtype=np.int64)
+        self.start = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)  # the first cell of each side
+        self.to = [[shape.to[s, b] for s in sides] for b in range(shape.branches)]
+        for b, target in enumerate(self.target):
+            for s in sides:
+                own = target[self.start[s] : self.start[s + 1]]
+                first, last = own[:, :d], own[:, d:]
+                inside = (first >= 0) & (first <= last) & (last < self.counts[self.to[b][s]])
+                fits = bool((inside.all(axis=1) | (own == -2).all(axis=1)).all())
+                require(fits, f"side {s}, branch {b}: target cells are out of range")
+
+    def side_of(self, cells: Array) -> Array:
+        """Return the side of each of some cells."""
+        return np.searchsorted(self.start, cells, side="right") - 1
+
+    def ends(self, cells: Array, side: int) -> Array:
+        """Return the ends of some cells of a side: lower, upper along each axis in turn."""
+        at = np.unravel_index(cells - self.start[side], tuple(self.counts[side]))
+        columns = [e[k + shift] for e, k in zip(self.edges[side], at, strict=True) for shift in (0, 1)]
+        return np.stack(columns, axis=1)
+
+    def box(self, cell: int) -> tuple[int, list[Pair]]:
+        """Return side and ends of one cell."""
+        side = int(self.side_of(np.array([cell]))[0])
+        ends = self.ends(np.array([cell]), side)[0].tolist()
+        return side, list(zip(ends[::2], ends[1::2], strict=True))
+
+    def name(self, cell: int) -> str:
+        """Name a cell, for people."""
+        side, box = self.box(cell)
+        return f"side {side}, cell {cell}, x in {' x '.join(f'[{lo!r}, {hi!r}]' for lo, hi in box)}"
+
+    def in_domain(self, side: int, box: list[Pair]) -> bool:
+        """Whether a box lies in the domain."""
+        return all(e[0] <= lo and hi <= e[-1] for e, (lo, hi) in zip(self.edges[side], box, strict=True))
+
+    def largest(self, labels: Array, branch: int, cells: Array) -> Array:
+        """Return the largest label among the target cells of each of some cells; the branch is possible there."""
+        d, out = self.counts.shape[1], np.zeros(len(cells), dtype=np.int64)
+        side = self.side_of(cells)
+        for s in np.unique(side).tolist():
+            to, own = self.to[branch][s], side == s
+            table = labels[self.start[to] : self.start[to + 1]].reshape(tuple(self.counts[to]))
+            target = self.target[branch][cells[own]].astype(np.int64)
+            out[own] = box_max(table.astype(np.int64), target[:, :d], target[:, d:])
+        return out
+
+    def check_labels(self, final: Array) -> str:
+        """Check the two rules by whole numbers, off the final cells; "" or the reason.
+
+        Every target of an attracting cell is of its component; of every other cell with a rank it has a smaller one.
+        """
+        attracting = self.component >= 0
+        high = np.flatnonzero(attracting & (self.rank != 0))
+        if len(high):
+            return f"{self.name(int(high[0]))}: it has a component, and a rank that is not 0"
+        checked = (self.rank >= 0) & ~final
+        for branch, target in enumerate(self.target):
+            use = checked & (target[:, 0] >= 0)
+            cells = np.flatnonzero(use & attracting)
+            own = self.component[cells]
+            highest, lowest = (
+                self.largest(self.component, branch, cells),
+                -self.largest(-self.component, branch, cells),
+            )
+            bad = cells[(highest != own) | (lowest != own)]
+            if len(bad):
+                return f"{self.name(int(bad[0]))}: branch {branch} may lead out of its component"
+            cells = np.flatnonzero(use & ~attracting)
+            highest, lowest = self.largest(self.rank, branch, cells), -self.largest(-self.rank, branch, cells)
+            bad = cells[(lowest < 0) | (highest >= self.rank[cells])]
+            if len(bad):
+                return f"{self.name(int(bad[0]))}: the rank does not fall along branch {branch}"
+        return ""
+
+
+def box_max(table: Array, first: Array, last: Array) -> Array:
+    """Return the largest entry of each box of a table, from maxima over windows of length 2^k along each axis.
+
+    The boxes are `first` to `last` (n, axes), both included.
+    """
+    level = np.frexp((last - first + 1).astype(np.float64))[1] - 1  # floor(log2), exact for integers
+    out = np.zeros(len(first), dtype=np.int64)
+
+    def fill(window: Array, boxes: Array, axis: int) -> None:
+        """Fill in some boxes; `window` has the maxima over windows as long as theirs along the axes before this one."""
+        if axis == table.ndim:
+            ends = zip(first[boxes].T, (last[boxes] - (1 << level[boxes]) + 1).T, strict=True)
+            out[boxes] = np.max([window[corner] for corner in itertools.product(*ends)], axis=0)
+            return
+        for k in range(int(level[boxes, axis].max(initial=-1)) + 1):
+            now = boxes[level[boxes, axis] == k]
+            if len(now):
+                fill(window, now, axis + 1)
+            along = np.moveaxis(window, axis, 0)
+            window = np.moveaxis(np.maximum(along[: -(1 << k)], along[1 << k :]), 0, axis)
+
+    fill(table, np.arange(len(first)), 0)
+    return out
+
+
+# ----------------------------------------------------------------
+# Cells for the processes that share the work.
+
+
+class MapTask(NamedTuple):
+    """Some cells of one side, one row for each."""
+
+    box: int  # of parameters
+    side: int
+    cells: Array
+    ends: Array  # (n, 2 d)
+    targets: list[
+        Array
+    ]  # by branch (n, 2 d): the ends of the target cells, nan where the branch is impossible
+    strict: Array  # whether the image has to lie strictly inside
+    least: Array  # the size that the slope has to have, 0 where none is claimed
+
+
+def tasks_of(c: MapCells, box: int, chosen: Array, strict: Array, least: Array) -> Iterator[MapTask]:
+    """Cut the chosen cells, which ascend, into tasks of one side each; `strict` and `least` are by cell of the box."""
+    d, side = c.counts.shape[1], c.side_of(chosen)
+    for s in np.unique(side).tolist():
+        own = chosen[side == s]
+        for part in np.array_split(own, max(1, -(-len(own) // CHUNK))):
+            targets = []
+            for branch, target in enumerate(c.target):
+                rows, to = target[part], c.edges[c.to[branch][s]]
+                ends = np.full((len(part), 2 * d), math.nan)
+                use = rows[:, 0] >= 0
+                for a, e in enumerate(to):
+                    ends[use, 2 * a], ends[use, 2 * a + 1] = e[rows[use, a]], e[rows[use, d + a] + 1]
+                targets.append(ends)
+            yield MapTask(
+                box, s, part, c.ends(part, s), targets=targets, strict=strict[part], least=least[part]
+            )
+
+
+# Balls cannot be sent to another process: each keeps the texts of all boxes, and the map of the box that it is at.
+SETUP: list[Any] = []
+MAPS: dict[int, Map] = {}
+
+
+def prepare_map(shape: Shape, parameters: list[dict[str, tuple[str, str]]]) -> None:
+    """Set up a process that checks cells of a map."""
+    flint.ctx.prec = PRECISION
+    SETUP[:] = shape, parameters
+    MAPS.clear()
+
+
+def check_map_task(task: MapTask) -> tuple[int, Failure | None, int]:
+    """Return the first cell of a task that is not proved (-1 if all are), the reason, and the number of pieces."""
+    if task.box not in MAPS:
+        MAPS.clear()
+        MAPS[task.box] = Map(SETUP[0], SETUP[1][task.box])
+    total = 0
+    for i, cell in enumerate(task.cells.tolist()):
+        ends, strict, least = task.ends[i].tolist(), bool(task.strict[i]), float(task.least[i])
+        bounds = [bounds_of(target[i].tolist(), strict) for target in task.targets]
+        box = list(zip(ends[::2], ends[1::2], strict=True))
+        claimed = Claimed(task.side, box, bounds, arb(least) if least > 0 else None)
+        failure, pieces = check_cell(MAPS[task.box], claimed)
+        total += pieces
+        if failure is not None:
+            return cell, failure, total
+    return -1, None, total
+
+
+def bounds_of(ends: list[float], strict: bool) -> list[Bound] | None:
+    """Return what proves that an image lies in its target cells; None where the branch is impossible."""
+    if math.isnan(ends[0]):
+        return None
+    above, below = (operator.gt, operator.lt) if strict else (operator.ge, operator.le)
+    lower = [(a, above, arb(end)) for a, end in enumerate(ends[::2])]
+    return lower + [(a, below, arb(end)) for a, end in enumerate(ends[1::2])]

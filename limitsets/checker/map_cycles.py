@@ -1,0 +1,220 @@
+"""Periodic orbits of a map: that they exist, differ and attract, and that cells lie where one attracts.
+
+docs/certificates.md, "Certificates of any map": the claims `cycles` and `converges`.
+"""
+
+import functools
+import itertools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import arb, arb_mat
+
+from .any_map import Map, Shape, floats_around, possible
+from .balls import ONE, ZERO, Arb, Pair
+from .file import hex_float, read_side, require, rounded, rows, table
+from .map_cells import MapCells
+from .program import is_whole
+
+MOST_CYCLES, MOST_POINTS = 1_000, 200
+WORST_MATRIX = 1e12  # condition of Newton's matrix, above which it is taken for singular
+Boxes = list[list[Pair]]
+Matrix = Any  # flint.arb_mat has no stubs
+
+
+class Listed(NamedTuple):
+    """A periodic orbit as a file lists it: of each of its points a box, side and branch."""
+
+    boxes: Boxes
+    side: list[int]
+    branch: list[int]
+    attracts: bool
+    frames: list[list[list[float]]]  # by point a matrix, [] where none is needed
+    radius: float | None  # of the balls in these frames that the map contracts
+
+
+def read_box(raw: object, dimension: int, where: str) -> list[Pair]:
+    """Read the ends of a box."""
+    pairs = [rows(pair, where, 2, 2) for pair in rows(raw, where, dimension, dimension)]
+    box = [(hex_float(lo, where), hex_float(hi, where)) for lo, hi in pairs]
+    require(all(lo < hi for lo, hi in box), f"{where}: its ends do not ascend")
+    return box
+
+
+def read_cycle(raw: object, shape: Shape, where: str) -> Listed:
+    """Read one orbit."""
+    known, d = table(raw, where, "boxes side branch attracts frames radius"), shape.dimension
+    boxes = [read_box(box, d, where) for box in rows(known["boxes"], where, 1, MOST_POINTS)]
+    p = len(boxes)
+    sides = [read_side(side, shape.sides) for side in rows(known["side"], where, p, p)]
+    branches = rows(known["branch"], where, p, p)
+    require(
+        all(is_whole(b, 0, shape.branches - 1) for b in branches), f"{where}: a branch is not one of the map"
+    )
+    require(isinstance(known["attracts"], bool), f"{where}: attracts is neither true nor false")
+    radius = None if known["radius"] is None else hex_float(known["radius"], where)
+    require(radius is None or radius > 0, f"{where}: its radius is not above 0")
+    needed = known["attracts"] or radius is not None
+    require((known["frames"] is not None) == needed, f"{where}: frames are missing, or not needed")
+    frames = [
+        [[hex_float(v, where) for v in rows(row, where, d, d)] for row in rows(frame, where, d, d)]
+        for frame in (rows(known["frames"], where, p, p) if needed else [])
+    ]
+    return Listed(boxes, sides, branches, attracts=known["attracts"], frames=frames, radius=radius)
+
+
+def read_cycles(raw: object, shape: Shape, where: str) -> list[Listed]:
+    """Read the orbits of a claim."""
+    listed = enumerate(rows(raw, where, 1, MOST_CYCLES))
+    return [read_cycle(one, shape, f"{where}, cycle {k}") for k, one in listed]
+
+
+# ----------------------------------------------------------------
+# Proving.
+
+
+def matrix(entries: list[list[Any]]) -> Matrix:
+    """Make a matrix of balls."""
+    return arb_mat(len(entries), len(entries[0]), [v for row in entries for v in row])
+
+
+def slopes_along(the_map: Map, listed: Listed, boxes: Boxes) -> tuple[list[list[list[Arb]]], str]:
+    """Enclose the matrix of derivatives on each box of an orbit, whose sides and branches are proved; or the reason."""
+    slopes = []
+    for k, (side, branch, box) in enumerate(zip(listed.side, listed.branch, boxes, strict=True)):
+        piece = the_map.piece(box)
+        leads = the_map.shape.to[side, branch] == listed.side[(k + 1) % len(boxes)]
+        if not leads or possible(the_map, side, piece)[0] != (branch,):
+            return [], f"side or branch of point {k} is not proved"
+        gradients = the_map.image[side, branch].gradients(piece.balls)
+        slopes.append([gradient[: the_map.dimension] for gradient in gradients])
+    return slopes, ""
+
+
+class Cycle:
+    """A periodic orbit of a file, for all parameters of a box; `prove` shows that exactly one lies in its boxes."""
+
+    def __init__(self, the_map: Map, listed: Listed):
+        self.map, self.listed, self.period = the_map, listed, len(listed.boxes)
+        self.points: list[list[Arb]] = []  # where the points of the orbit lie
+        self.frames = [matrix([[arb(v) for v in row] for row in frame]) for frame in listed.frames]
+        self.inverses: list[Matrix] = []
+        self.hulls: list[tuple[int, list[Pair]]] = []  # side and box around each ball
+
+    def prove(self) -> str:
+        """Prove existence, period and, where claimed, that it attracts; "" or the reason."""
+        slopes, bad = slopes_along(self.map, self.listed, self.listed.boxes)
+        bad = bad or self.krawczyk(slopes)
+        if bad:
+            return bad
+        first = self.points[0]
+        for k in range(1, self.period):
+            again = self.period % k == 0 and self.listed.side[k] == self.listed.side[0]
+            if again and meet(first, self.points[k]):
+                return f"that its period is not {k} is not proved"
+        try:
+            self.inverses = [frame.inv() for frame in self.frames]
+        except ZeroDivisionError:
+            return "a frame is singular"
+        attracts = self.listed.attracts and math.prod(self.stretches(slopes), start=ONE) < 1
+        return "" if attracts or not self.listed.attracts else "that it attracts is not proved"
+
+    def krawczyk(self, slopes: list[list[list[Arb]]]) -> str:
+        """Prove that K(X), of all points together, lies in the interior of X, and store it; "" or the reason.
+
+        With F_k = f(x_k) - x_k+1: K(X) = m - C F(m) + (1 - C DF(X)) (X - m) for the middle m and any matrix C.
+        """
+        p, d = self.period, self.map.dimension
+        pieces = [self.map.piece(box) for box in self.listed.boxes]
+        middle = [ball.mid() for piece in pieces for ball in piece.balls[:d]]
+        off = [ball - ball.mid() for piece in pieces for ball in piece.balls[:d]]
+        newton, residual = [[ZERO] * (p * d) for _ in range(p * d)], []
+        for k, piece in enumerate(pieces):
+            after = (k + 1) % p
+            program = self.map.image[self.listed.side[k], self.listed.branch[k]]
+            images = program.at(middle[k * d : k * d + d] + piece.balls[d:])
+            for i in range(d):
+                row = newton[k * d + i]
+                row[k * d : k * d + d] = slopes[k][i]
+                row[after * d + i] = row[after * d + i] - 1
+                residual.append([images[i] - middle[after * d + i]])
+        near = np.array([[float(v.mid()) for v in row] for row in newton])
+        if not np.isfinite(near).all() or not np.linalg.cond(near) < WORST_MATRIX:
+            return "Newton's matrix is singular, or nearly so"
+        c, one = matrix(np.linalg.inv(near).tolist()), matrix(np.eye(p * d).tolist())
+        moved = (
+            matrix([[v] for v in middle])
+            - c * matrix(residual)
+            + (one - c * matrix(newton)) * matrix([[v] for v in off])
+        )
+        ends = [pair for box in self.listed.boxes for pair in box]
+        entries = moved.entries()
+        if not all(v > lo and v < hi for v, (lo, hi) in zip(entries, ends, strict=True)):
+            return "that K(X) lies in the interior of X is not proved"
+        self.points = [entries[k * d : k * d + d] for k in range(p)]
+        return ""
+
+    def stretches(self, slopes: list[list[list[Arb]]]) -> list[Arb]:
+        """Bound |S_k+1^-1 DF_k S_k|_2, whose square is at most the largest row of the product with its transpose."""
+        bounds = []
+        for k, slope in enumerate(slopes):
+            b = self.inverses[(k + 1) % self.period] * matrix(slope) * self.frames[k]
+            sums = [sum(map(abs, row), ZERO) for row in (b.transpose() * b).tolist()]
+            bounds.append(functools.reduce(arb.max, sums).upper().sqrt())  # the ball itself may reach below 0
+        return bounds
+
+    def is_apart_from(self, other: "Cycle") -> bool:
+        """Whether it is proved that two orbits differ; both are proved."""
+        if self.period != other.period:
+            return True
+        begun = other.listed.side[0], other.points[0]
+        return not any(
+            side == begun[0] and meet(point, begun[1])
+            for side, point in zip(self.listed.side, self.points, strict=True)
+        )
+
+    def contract(self) -> str:
+        """Prove that the map contracts the balls |S_k^-1 (x - x_k)| < r around the orbit; "" or the reason."""
+        r, self.hulls = arb(self.listed.radius), []
+        for side, point, frame in zip(self.listed.side, self.points, self.frames, strict=True):
+            reach = [r * sum((v * v for v in row), ZERO).sqrt() for row in frame.tolist()]
+            hull = [floats_around((v - far).union(v + far)) for v, far in zip(point, reach, strict=True)]
+            self.hulls.append((side, hull))
+        slopes, bad = slopes_along(self.map, self.listed, [hull for _, hull in self.hulls])
+        contracts = not bad and all(stretch < 1 for stretch in self.stretches(slopes))
+        return "" if contracts else f"that its balls are contracted is not proved{f': {bad}' if bad else ''}"
+
+    def check_drawn(self, c: MapCells, cells: list[int]) -> str:
+        """Prove that some cells lie in these balls, by their corners; "" or the reason."""
+        for cell in cells:
+            side, box = c.box(cell)
+            if not any(self.holds(k, box) for k in range(self.period) if self.listed.side[k] == side):
+                return f"{c.name(cell)}: that it lies in a ball of its cycle is not proved"
+        return ""
+
+    def holds(self, k: int, box: list[Pair]) -> bool:
+        """Whether all corners of a box, hence the box, are proved to lie in the k-th ball."""
+        r = arb(self.listed.radius)
+        for corner in itertools.product(*box):
+            off = matrix([[arb(x) - v] for x, v in zip(corner, self.points[k], strict=True)])
+            if not sum((v * v for v in (self.inverses[k] * off).entries()), ZERO) < r * r:
+                return False
+        return True
+
+    def in_words(self) -> str:
+        """Write period, place and kind."""
+        where = " x ".join(interval_in_words(floats_around(v)) for v in self.points[0])
+        side = f", side {self.listed.side[0]}" if self.map.shape.sides > 1 else ""
+        return f"period {self.period} in {where}{side}{', attracting' if self.listed.attracts else ''}"
+
+
+def meet(one: list[Arb], other: list[Arb]) -> bool:
+    """Whether two points may be the same."""
+    return all(map(arb.overlaps, one, other))
+
+
+def interval_in_words(ends: Pair) -> str:
+    """Write an interval, rounded outward."""
+    lo, hi = ends
+    return f"[{rounded(lo, up=False, digits=6)}, {rounded(hi, up=True, digits=6)}]"

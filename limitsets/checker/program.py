@@ -1,0 +1,309 @@
+"""A formula as a list of operations: read strictly, evaluated in balls with gradients, and printed.
+
+docs/certificates.md, "Formulas of a map".  A formula is never text that is evaluated, and neither evaluation nor print
+recurses, so that 20 000 operations of depth 20 000 are read as any other.
+"""
+
+import functools
+import itertools
+import operator
+import re
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import arb
+
+from .balls import ONE, ZERO, Arb, exact
+from .file import plain, require, rows
+
+MOST_OPERATIONS = 20_000
+LARGEST_POWER = 200
+LONGEST_LINE = 90  # signs of a formula: a longer part of it is printed as a line of its own
+NAN = arb("nan")
+ALL_SIGNS = arb(0, 1)
+DECIMAL = re.compile(r"-?[0-9]{1,40}(\.[0-9]{1,40})?(e[+-]?[0-9]{1,2})?")
+Gradient = list[Arb | None]  # by x0, x1, ... and the parameters with a range; None is exactly 0
+
+# ----------------------------------------------------------------
+# Numbers, and the operations on balls.
+
+
+def rational(text: object, where: str) -> Fraction:
+    """Read a decimal."""
+    fits = isinstance(text, str) and DECIMAL.fullmatch(text) is not None
+    require(fits, f"{where} is not a decimal of at most 40 digits on each side of the point")
+    return Fraction(str(text))
+
+
+def number(text: object, where: str) -> Arb:
+    """Enclose a decimal together with the double next to it: what is proved holds for both."""
+    value = rational(text, where)
+    return exact(value).union(arb(float(value)))
+
+
+def magnitude(x: Arb) -> Arb:
+    """Enclose the absolute value; where x may be 0 it lies between 0 and the larger end."""
+    if x > 0 or x < 0:
+        return abs(x)
+    largest = x.abs_upper()
+    return ZERO.union(largest) if largest > 0 else abs(x)
+
+
+def power(x: Arb, n: int) -> Arb:
+    """Enclose x^n, n not 0: Arb's own power of a ball around 0 is nan or twice as wide as needed."""
+    if n < 0:
+        return 1 / power(x, -n)
+    if n % 2:
+        return x if n == 1 else x * power(x, n - 1)
+    half = power(magnitude(x), n // 2)
+    square = half * half
+    # the ball of a square reaches below 0 where the ball of its root holds 0
+    return square if half > 0 else magnitude(square)
+
+
+def sign(x: Arb) -> Arb:
+    """Enclose the slopes of |x|, at 0 all of them."""
+    return ONE if x > 0 else -ONE if x < 0 else ALL_SIGNS
+
+
+def by_quotient(x: Arb, y: Arb, ratio: Arb) -> tuple[Arb, Arb]:
+    """Return the partial derivatives of x / y."""
+    inverse = 1 / y
+    return inverse, -ratio * inverse
+
+
+def by_largest(x: Arb, y: Arb, _: Arb) -> tuple[Arb, Arb]:
+    """Return those of max(x, y): where neither is surely larger, all slopes between."""
+    share = (1 + sign(x - y)) / 2
+    return share, 1 - share
+
+
+def by_least(x: Arb, y: Arb, largest: Arb) -> tuple[Arb, Arb]:
+    """Return those of min(x, y)."""
+    first, second = by_largest(x, y, largest)
+    return second, first
+
+
+def by_angle(y: Arb, x: Arb, _: Arb) -> tuple[Arb, Arb]:
+    """Return those of atan2(y, x); nan where the box meets the cut: y = 0 and x <= 0."""
+    whole = x * x + y * y if x > 0 or y > 0 or y < 0 else NAN
+    return x / whole, -y / whole
+
+
+Function = Callable[..., Arb]
+Partials = Callable[[Arb, Arb, Arb], tuple[Arb, Arb]]
+BINARY: dict[str, tuple[Function, Partials]] = {
+    "add": (operator.add, lambda _, __, ___: (ONE, ONE)),
+    "sub": (operator.sub, lambda _, __, ___: (ONE, -ONE)),
+    "mul": (operator.mul, lambda x, y, _: (y, x)),
+    "div": (operator.truediv, by_quotient),
+    "min": (arb.min, by_least),
+    "max": (arb.max, by_largest),
+    "atan2": (arb.atan2, by_angle),
+}
+"""Operations on two numbers, and their partial derivatives at x, y, from the value too."""
+
+UNARY: dict[str, tuple[Function, Callable[[Arb, Arb], Arb]]] = {
+    "neg": (operator.neg, lambda _, __: -ONE),
+    "abs": (magnitude, lambda x, _: sign(x)),
+    "sqrt": (arb.sqrt, lambda _, v: 1 / (2 * v)),
+    "exp": (arb.exp, lambda _, v: v),
+    "log": (arb.log, lambda x, _: 1 / x),
+    "sin": (arb.sin, lambda x, _: x.cos()),
+    "cos": (arb.cos, lambda x, _: -x.sin()),
+    "tan": (arb.tan, lambda _, v: 1 + v * v),
+    "tanh": (arb.tanh, lambda _, v: 1 - v * v),
+    "floor": (
+        arb.floor,
+        lambda _, v: ZERO if v.is_exact() else NAN,
+    ),  # constant where its ball is one integer
+}
+"""Operations on one number, and their derivatives at x, from the value v too."""
+
+
+def slope_of_power(n: int, x: Arb, _: Arb) -> Arb:
+    """Return the derivative of x^n."""
+    return ONE if n == 1 else n * power(x, n - 1)
+
+
+# ----------------------------------------------------------------
+# Reading.
+
+
+class Operation(NamedTuple):
+    """An operation on earlier ones; `what` is an axis, the name of a parameter, a constant's text or an exponent."""
+
+    word: str
+    entries: tuple[int, ...] = ()
+    what: Any = None
+
+
+class Formulas(NamedTuple):
+    """Operations in order, and the numbers of those that are the results."""
+
+    operations: list[Operation]
+    out: list[int]
+
+
+def is_whole(value: object, least: int, most: int) -> bool:
+    """Whether a value of a header is an integer, not true or false, from `least` to `most`."""
+    return type(value) is int and least <= int(str(value)) <= most
+
+
+def read_formulas(
+    raw: dict[str, Any], dimension: int, names: list[str], results: int, where: str
+) -> Formulas:
+    """Read operations and results."""
+    listed = rows(raw["ops"], f"{where}: ops", 0, MOST_OPERATIONS)
+    operations = [
+        read_operation(one, at, dimension, names, f"{where}, operation {at}") for at, one in enumerate(listed)
+    ]
+    out = rows(raw["out"], f"{where}: out", results, results)
+    require(all(is_whole(k, 0, len(operations) - 1) for k in out), f"{where}: a result is not an operation")
+    return Formulas(operations, out)
+
+
+def read_operation(raw: object, at: int, dimension: int, names: list[str], where: str) -> Operation:
+    """Read one operation; it may use earlier ones only."""
+    word, *rest = rows(raw, where, 2, 3)
+    require(isinstance(word, str), f"{where} does not begin with a word")
+    require(len(rest) == 1 + (word in BINARY or word == "pow"), f"{where} has a wrong number of entries")
+    if word == "x":
+        require(is_whole(rest[0], 0, dimension - 1), f"{where}: there is no such axis")
+        return Operation(word, what=rest[0])
+    if word == "p":
+        require(isinstance(rest[0], str) and rest[0] in names, f"{where}: there is no such parameter")
+        return Operation(word, what=rest[0])
+    if word == "c":
+        rational(rest[0], where)
+        return Operation(word, what=rest[0])
+    require(word in BINARY or word in UNARY or word == "pow", f"{where}: {plain(word)} is not known")
+    if word == "pow":
+        whole = is_whole(rest[1], -LARGEST_POWER, LARGEST_POWER) and rest[1] != 0
+        require(whole, f"{where}: the power is not a whole number of size 1 to {LARGEST_POWER}")
+    entries = rest[:1] if word == "pow" else rest
+    require(all(is_whole(k, 0, at - 1) for k in entries), f"{where} is on an operation that is not before it")
+    return Operation(word, tuple(entries), rest[1] if word == "pow" else None)
+
+
+# ----------------------------------------------------------------
+# Evaluating.
+
+
+class Program:
+    """Formulas for one box of parameters; what depends on neither x nor a range of a parameter is computed once.
+
+    `values` are the balls of the parameters, `wide` those with a range: they are inputs after x0, x1, ...
+    """
+
+    def __init__(self, formulas: Formulas, dimension: int, values: dict[str, Arb], wide: list[str]):
+        self.formulas, self.out, self.n_inputs = formulas, formulas.out, dimension + len(wide)
+        self.known: list[Arb] = []  # None where it has to be computed
+        self.inputs: list[tuple[int, int]] = []
+        self.steps: list[
+            tuple[int, Function, int, int]
+        ] = []  # number, function, one or two entries (else -1)
+        for k, (word, entries, what) in enumerate(formulas.operations):
+            if word in ("x", "p", "c"):
+                self.known.append(None)
+                if word == "x" or (what in wide and word == "p"):
+                    self.inputs.append((k, what if word == "x" else dimension + wide.index(what)))
+                else:
+                    self.known[k] = values[what] if word == "p" else number(what, "a constant")
+                continue
+            function = (
+                functools.partial(power, n=what) if word == "pow" else (BINARY.get(word) or UNARY[word])[0]
+            )
+            constant = all(self.known[j] is not None for j in entries)
+            self.known.append(function(*(self.known[j] for j in entries)) if constant else None)
+            if not constant:
+                self.steps.append((k, function, entries[0], entries[1] if len(entries) == 2 else -1))
+
+    def at(self, inputs: list[Arb]) -> list[Arb]:
+        """Enclose the results for all numbers in the balls of the inputs."""
+        balls = self.known.copy()
+        for k, j in self.inputs:
+            balls[k] = inputs[j]
+        for k, function, a, b in self.steps:
+            balls[k] = function(balls[a]) if b < 0 else function(balls[a], balls[b])
+        return [balls[k] for k in self.out]
+
+    def gradients(self, inputs: list[Arb]) -> list[list[Arb]]:
+        """Enclose the gradients of the results, by all inputs; at a kink all slopes between, at a jump nan.
+
+        A finite gradient is so only where the formula is defined and Lipschitz on the balls of the inputs.
+        """
+        flat: Gradient = [None] * self.n_inputs
+        balls = self.known.copy()
+        by: list[Gradient] = [flat] * len(balls)
+        for k, j in self.inputs:
+            balls[k], by[k] = inputs[j], [ONE if i == j else None for i in range(self.n_inputs)]
+        for k, function, a, b in self.steps:
+            word, _, exponent = self.formulas.operations[k]
+            x = balls[a]
+            y = None if b < 0 else balls[b]
+            value = balls[k] = function(x) if y is None else function(x, y)
+            if y is not None:
+                first, second = BINARY[word][1](x, y, value) if value.is_finite() else (NAN, NAN)
+                by[k] = [summed(first, u, second, v) for u, v in zip(by[a], by[b], strict=True)]
+                continue
+            slope = functools.partial(slope_of_power, exponent) if word == "pow" else UNARY[word][1]
+            factor = slope(x, value) if value.is_finite() else NAN
+            by[k] = [None if u is None else factor * u for u in by[a]]
+        return [[ZERO if u is None else u for u in by[k]] for k in self.out]
+
+
+def summed(first: Arb, u: Arb | None, second: Arb, v: Arb | None) -> Arb | None:
+    """Return first u + second v, where None is exactly 0."""
+    if u is None:
+        return None if v is None else second * v
+    return first * u if v is None else first * u + second * v
+
+
+# ----------------------------------------------------------------
+# Printing.
+
+INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
+WORDS = "|".join([*BINARY, *UNARY, "pow", "margin", "pi", "tau", "e", "inf", "nan", "if", "else", "mod"])
+MISLEADING = re.compile(rf"[xt][0-9]+(\..*)?|p\..*|{WORDS}", re.IGNORECASE)
+
+
+def named(name: str) -> str:
+    """Write a parameter, with `p.` before a name that could be read as something else."""
+    return f"p.{name}" if MISLEADING.fullmatch(name) else name
+
+
+def bare(text: str) -> str:
+    """Leave out the brackets around a whole text: only sums, products and negations stand in such."""
+    return text[1:-1] if text[0] == "(" and text[-1] == ")" else text
+
+
+def in_words(formulas: Formulas, names: list[str]) -> list[str]:
+    """Write the formulas as they are checked; what is used twice, or is long, has a line of its own."""
+    inner = list(itertools.chain.from_iterable(one.entries for one in formulas.operations))
+    uses = np.bincount(np.array(inner, dtype=np.int64), minlength=len(formulas.operations)).tolist()
+    lines: list[str] = []
+    shown: list[str] = []
+    for k, one in enumerate(formulas.operations):
+        text = operation_in_words(one, [shown[j] for j in one.entries], formulas.operations)
+        if one.entries and (uses[k] > 1 or len(text) > LONGEST_LINE):
+            lines.append(f"t{len(lines) + 1} = {bare(text)}")
+            text = f"t{len(lines)}"
+        shown.append(text)
+    return lines + [f"{name} = {bare(shown[k])}" for name, k in zip(names, formulas.out, strict=True)]
+
+
+def operation_in_words(one: Operation, parts: list[str], before: list[Operation]) -> str:
+    """Write one operation on parts that are written."""
+    if one.word in INFIX:
+        return f"({parts[0]} {INFIX[one.word]} {parts[1]})"
+    if one.word == "neg":
+        return f"(-({parts[0]}))" if parts[0].startswith("-") else f"(-{parts[0]})"
+    if one.word == "pow":  # (x0^2)^3 is not x0^2^3, nor is (-2)^2 -2^2
+        closed = before[one.entries[0]].word in ("pow", "c")
+        return f"({parts[0]})^{one.what}" if closed else f"{parts[0]}^{one.what}"
+    if one.entries:
+        return f"{one.word}({', '.join(map(bare, parts))})"
+    return f"x{one.what}" if one.word == "x" else named(one.what) if one.word == "p" else str(one.what)

@@ -1,0 +1,275 @@
+"""Certificates of maps whose claims are true: proved, refuted, printed; and what a checker cannot prove is denied.
+
+Expected answers: Henon's blocks and 7-cycle, Ricker's stability and Leslie's two attractors are known from the
+literature, the 2-cycle of the map with a gap by hand.
+"""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+from limitsets.checker import show
+from tests.checker import map_examples as known
+from tests.checker.maps_in_files import (
+    Example,
+    MapCertificate,
+    arrays_of,
+    cycle,
+    frames_of,
+    hexed,
+    region,
+    uniform,
+)
+
+PROVED = {
+    "gap": known.gap,
+    "seven": known.seven,
+    "seven, every a in a range": lambda: known.seven(("1.2399", "1.2401"), 0.003),
+    "delayed Ricker": known.delayed,
+    "Ricker": known.ricker,
+    "Leslie": known.two_ages,
+    "pendulum": known.pushed,
+}
+
+
+def words_of(report):
+    return {name: word for name, word, _ in report.claims}
+
+
+@pytest.mark.parametrize("name", PROVED)
+def test_what_is_true_is_proved(name, tmp_path):
+    report = PROVED[name]().recheck(tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+    assert set(words_of(report).values()) <= {"proved", "refuted"}
+
+
+def test_the_map_with_a_gap(tmp_path, capsys):
+    certificate = known.gap()
+    report = certificate.recheck(tmp_path)
+    show(report, "gap.proof.zip")
+    text = capsys.readouterr().out
+    assert certificate.claims()["attracts-all"]["max_rank"] == 1
+    assert "certificate of a map: 1 coordinate, 1 side, 2 branches" in text
+    assert "side 0: branch 1 if and only if margin > 0, else branch 0" in text
+    assert "the proof is of these formulas, not of the function image" in text
+    assert "    x0' = (s * x0) - 1\n" in text
+    assert "s = 1.4" in text
+    assert "at least 0.336471" in text  # ln 1.4 = 0.33647223...
+    assert "period 2 in [-0.270834, -0.270833]" in text  # -0.26/0.96
+    assert text.endswith("PROVED\n")
+
+
+def test_henon(tmp_path):
+    """On 512 x 512 cells an attracting block, to which orbits come from 79 % of the rectangle."""
+    certificate = known.henon()
+    share = float((certificate.arrays["0.rank"] >= 0).mean())
+    report = certificate.recheck(tmp_path)
+    assert report.verdict == "proved"
+    assert 0.78 < share < 0.80
+    assert "cover 78." in report.statement[1]
+    assert report.cells == 512 * 512
+
+
+def test_leslie_has_two_blocks(tmp_path):
+    assert [text.count("component") for text in known.two_ages().recheck(tmp_path).statement] == [2, 0]
+
+
+def test_sentences_say_for_which_parameters(tmp_path, capsys):
+    show(known.delayed().recheck(tmp_path), "delayed")
+    text = capsys.readouterr().out
+    assert (
+        "for every alpha in the range, fixed in time: cycles, converges; changed at every step too: basin"
+        in text
+    )
+    assert "alpha in [0.6, 0.601]" in text
+    show(known.ricker().recheck(tmp_path), "margin")
+    text = capsys.readouterr().out
+    assert "PROVED, boxes of parameters: 1 proved, 1 refuted" in text
+    assert "every start in [0.02, 2.6] ends in [0.35, 1.65] and stays" in text
+    assert "refuted: REFUTED - an open set of starts" in text
+
+
+def test_refutations_alone_are_refuted(tmp_path):
+    certificate = known.ricker().copy()
+    del certificate.header["boxes"][0]
+    certificate.arrays.clear()
+    report = certificate.recheck(tmp_path)
+    assert (report.verdict, words_of(report)) == ("refuted", {"cycles": "proved", "refuted": "refuted"})
+
+
+def test_command_line(tmp_path):
+    """Exit codes, JSON, and formulas that are long."""
+    long = Example(1, "", lambda x, *_: sum((np.sin(x[0] + k) / 500 for k in range(160)), 0.5 * x[0]))
+    cells = arrays_of(long, uniform((-1, 1), cells=20), {})
+    file = MapCertificate(long, [({}, {"trapping": {}}, cells)]).write(tmp_path / "long.proof.zip")
+    forged = known.seven().copy()
+    forged.header["map"]["programs"][0]["ops"][0] = ["sin", 0]
+    bad = forged.write(tmp_path / "bad.proof.zip")
+
+    def run(*words):
+        return subprocess.run(
+            [sys.executable, "-m", "limitsets.checker", *words], capture_output=True, text=True
+        )
+
+    short, whole, told = run(str(file)), run(str(file), "--formulas"), run(str(file), "--json")
+    assert (short.returncode, whole.returncode, told.returncode) == (0, 0, 0)
+    assert "lines of formulas are not shown: --formulas shows all" in short.stdout
+    assert "not shown" not in whole.stdout
+    assert len(json.loads(told.stdout)["map"]["formulas"]) > 40
+    assert json.loads(told.stdout)["map"]["boxes"][0]["verdict"] == "proved"
+    denied = run(str(bad))
+    assert denied.returncode == 2
+    assert "BAD FILE" in denied.stdout
+    assert denied.stderr == ""
+
+
+# ------------------------------------------------------------------------------ small maps
+
+
+def square(x, p, *_):
+    return 1.0 - x[0] ** 2
+
+
+def small(image, cells, *, claims, dimension=1, names="", parameters=None, margin=None, **how):
+    example = Example(dimension, names, image, margin, **how)
+    return MapCertificate(example, [(parameters or {}, claims, cells)])
+
+
+def cells_with(edges, targets, rank, component):
+    """Arrays by hand, on one side of one dimension."""
+    named = {f"target.{b}": np.array(rows, np.int32) for b, rows in enumerate(targets)}
+    return {"edges.0.0": np.array(edges, float), **named, "rank": np.array(rank, np.int32),
+            "component": np.array(component, np.int32)}  # fmt: skip
+
+
+def by_hand():
+    """Certificates by hand: the identity, a superstable cycle, a line, margins at the end of a cell, two sides."""
+    one = cells_with([0, 1], [[[0, 0]]], [0], [0])
+    yield "identity", small(lambda x, *_: x[0], one, claims={"invariant": {}})
+    listed = cycle([0.0, 1.0], width=1e-3, frames=frames_of([np.array([[0.0]]), np.array([[-2.0]])]))
+    yield "superstable", small(square, None, claims={"cycles": {"cycles": [listed]}})
+    grid = arrays_of(Example(2, "", lambda x, *_: (x[1], 0.0 * x[0])), uniform((-1, 1), (-1, 1), cells=3), {})
+    yield (
+        "line",
+        small(lambda x, *_: (x[1], 0.0 * x[0]), grid, claims={"trapping": {}, "basin": {}}, dimension=2),
+    )
+    half = cells_with([-1, 0, 1], [[[0, 1], [-2, -2]], [[-2, -2], [0, 0]]], [0, 0], [0, 0])
+    half["target.1"][0], half["target.0"][1] = -2, -2
+    margin = small(
+        lambda x, p, _, b: -0.5 if b else 0.5 * x[0],
+        half,
+        claims={"invariant": {}},
+        margin=lambda x, *_: x[0] + 0,
+    )
+    # at 0, which belongs to both cells, branch 0 is taken: cell 1 needs its target too
+    margin.arrays["0.target.0"][1] = [0, 1]
+    yield "margin on an edge", margin
+    both = Example(1, "", lambda x, p, side, _: 0.25 * x[0] + side, sides=2, to=lambda side, _: 1 - side)
+    edges = [[np.linspace(-1, 2, 7)], [np.linspace(-1, 2, 13)]]
+    yield "two sides", MapCertificate(both, [({}, {"trapping": {}, "basin": {}}, arrays_of(both, edges, {}))])
+    fold = arrays_of(Example(1, "", lambda x, *_: 0.5 * abs(x[0])), uniform((-1, 1), cells=4), {})
+    yield "a fold", small(lambda x, *_: 0.5 * np.abs(x[0]), fold, claims={"basin": {}})
+    three = Example(3, "", lambda x, *_: (0.5 * x[1], 0.5 * x[2], 0.5 * np.sin(x[0])))
+    yield (
+        "three coordinates",
+        MapCertificate(
+            three,
+            [
+                (
+                    {},
+                    {"trapping": {}, "basin": {}},
+                    arrays_of(three, uniform((-1, 1), (-1, 1), (-1, 1), cells=5), {}, count=3),
+                )
+            ],
+        ),
+    )
+
+
+@pytest.mark.parametrize(("name", "certificate"), list(by_hand()))
+def test_maps_by_hand_are_proved(name, certificate, tmp_path):
+    report = certificate.recheck(tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+
+
+def test_claims_about_orbits_alone_need_no_cells_and_may_be_many(tmp_path):
+    """x' = 4 x (1 - x) has the fixed point 3/4 and the 2-cycle (5 -+ sqrt 5)/8; the fixed point repels."""
+    low, high = ((5 + s * np.sqrt(5)) / 8 for s in (-1, 1))
+    cycles = [cycle([0.75]), cycle([low, high])]
+    certificate = small(lambda x, *_: 4.0 * x[0] * (1.0 - x[0]), None, claims={"cycles": {"cycles": cycles}})
+    report = certificate.recheck(tmp_path)
+    assert report.verdict == "proved"
+    assert "2 periodic orbits: period 1 in [0.749999, 0.750001]; period 2 in" in report.statement[0]
+
+
+def test_attracts_all_with_the_ball_of_a_cycle(tmp_path):
+    """x' = x/2: every start tends to 0; the number of attractors is exact."""
+    half = Example(1, "", lambda x, *_: 0.5 * x[0])
+    edges = uniform((-1, 1), cells=16)
+    final = np.abs(np.arange(16) - 7.5) < 4
+    cells = arrays_of(half, edges, {}, final=final)
+    listed = cycle([0.0], frames=[[[1.0]]], radius=0.75)
+    claims = {
+        "cycles": {"cycles": [listed]},
+        "converges": {"components": [0], "cycles": [0]},
+        "attracts-all": {"max_rank": int(cells["rank"].max())},
+        "ends-in": {},
+    }
+    goal = {"starts": [region((-1, 1))], "ends": [region((-0.8, 0.8))]}
+    certificate = MapCertificate(half, [({}, claims, cells)], goal)
+    assert certificate.recheck(tmp_path).verdict == "proved"
+    certificate.header["goal"]["ends"] = [region((-0.6, 0.8))]
+    assert words_of(certificate.recheck(tmp_path)) == {**dict.fromkeys(claims, "proved"), "ends-in": "failed"}
+    certificate.claims()["cycles"]["cycles"][0]["radius"] = hexed(1.5)
+    assert words_of(certificate.recheck(tmp_path))["attracts-all"] == "failed"
+
+
+# ------------------------------------------------------------------------------ true or not, not proved
+
+
+@pytest.mark.parametrize(
+    ("forge", "why"),
+    [
+        (lambda: known.delayed(radius=0.2), "contracted"),
+        (lambda: wider(known.delayed(), alpha=["0.6", "0.64"]), ""),
+        (lambda: slope_of(known.gap(), 1.41), "slope"),
+        (lambda: slope_of(known.gap(), 1.4), ""),  # of the double above 1.4 this is false
+        (lambda: told_twice(known.seven()), "period is not 7"),
+    ],
+)
+def test_what_goes_too_far_is_denied(forge, why, tmp_path):
+    report = forge().recheck(tmp_path)
+    assert report.verdict == "failed"
+    assert why in report.reason
+
+
+def wider(certificate, **parameters):
+    certificate = certificate.copy()
+    certificate.header["boxes"][0]["parameters"] |= parameters
+    return certificate
+
+
+def slope_of(certificate, least):
+    certificate = certificate.copy()
+    certificate.claims()["expanding"]["least"] = hexed(least)
+    return certificate
+
+
+def told_twice(certificate):
+    """A 7-cycle told as one of period 14."""
+    certificate = certificate.copy()
+    (listed,) = certificate.claims()["cycles"]["cycles"]
+    for key in ("boxes", "side", "branch", "frames"):
+        listed[key] = listed[key] * 2
+    return certificate
+
+
+def test_a_rotation_by_half_a_turn_has_cycles_that_newton_cannot_tell_apart(tmp_path):
+    turned = small(lambda x, *_: 1.0 - x[0], None, claims={"cycles": {"cycles": [cycle([0.25, 0.75])]}})
+    report = turned.recheck(tmp_path)
+    assert report.verdict == "failed"
+    assert "singular" in report.reason

@@ -1,0 +1,564 @@
+"""Forged certificates of maps, each with fresh hashes: what has become false is denied, an odd file refused.
+
+Never a traceback: an error of the checker's own code would end a test here.
+"""
+
+import json
+import zipfile
+
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+from limitsets.checker import recheck
+from tests.checker import map_examples as known
+from tests.checker.maps_in_files import Example, MapCertificate, arrays_of, cycle, hexed, region, uniform
+
+
+def program(certificate, k=0):
+    return certificate.header["map"]["programs"][k]
+
+
+def cycle_of(certificate, box=0):
+    return certificate.claims(box)["cycles"]["cycles"][0]
+
+
+def moved(listed, point, by):
+    """The box of a point, moved along the first axis."""
+    box = [[float.fromhex(v) for v in pair] for pair in listed["boxes"][point]]
+    box[0] = [v + by for v in box[0]]
+    listed["boxes"][point] = hexed(box)
+
+
+def a_cell(certificate, **wanted):
+    """A cell of rank 1, or of a component."""
+    rank, component = certificate.arrays["0.rank"], certificate.arrays["0.component"]
+    fits = (
+        (rank == wanted["rank"])
+        if "rank" in wanted
+        else (component >= 0)
+        if "attracting" in wanted
+        else rank < 0
+    )
+    return int(np.flatnonzero(fits)[0])
+
+
+def far_cell(certificate):
+    """An attracting cell in the middle of its component, whose targets are all of one component."""
+    cells = np.flatnonzero(certificate.arrays["0.component"] >= 0)
+    return int(cells[len(cells) // 2])
+
+
+# ------------------------------------------------------------------------------ false: denied
+
+FALSE = {}
+
+
+def false(make, why=""):
+    """A forgery of a certificate, whose reason holds `why`."""
+
+    def of(forge):
+        FALSE[forge.__name__] = (make, forge, why)
+        return forge
+
+    return of
+
+
+@false(known.gap)
+def formula(c):
+    program(c)["ops"].append(["neg", program(c)["out"][0]])
+    program(c)["out"] = [len(program(c)["ops"]) - 1]
+
+
+@false(known.gap, "image on branch 0")
+def constant(c):
+    ops = program(c)["ops"]
+    ops[ops.index(["c", "0.9"])] = ["c", "0.91"]
+
+
+@false(known.gap)
+def parameter(c):
+    c.header["boxes"][0]["parameters"]["s"] = "1.41"
+
+
+@false(known.gap)
+def parameter_in_the_last_digit_of_a_slope(c):
+    c.claims()["expanding"]["least"] = hexed(np.nextafter(1.4, 2))
+
+
+@false(known.delayed)
+def range_too_wide(c):
+    c.header["boxes"][0]["parameters"]["alpha"] = ["0.6", "0.61"]
+
+
+@false(known.gap, "is not excluded")
+def margin(c):
+    c.header["map"]["margins"][0]["ops"].append(["neg", c.header["map"]["margins"][0]["out"][0]])
+    c.header["map"]["margins"][0]["out"] = [len(c.header["map"]["margins"][0]["ops"]) - 1]
+
+
+@false(known.two_ages, "image on branch 0")
+def target_moved(c):
+    c.arrays["0.target.0"][far_cell(c)] += 1
+
+
+@false(known.two_ages, "image on branch 0")
+def target_shortened(c):
+    row = c.arrays["0.target.0"]
+    cell = next(k for k in np.flatnonzero(c.arrays["0.rank"] >= 0) if row[k, 2] > row[k, 0])
+    row[cell, 2] -= 1
+
+
+@false(known.two_ages)
+def axes_swapped(c):
+    program(c)["out"] = program(c)["out"][::-1]
+
+
+@false(known.gap, "rank does not fall")
+def rank_lowered(c):
+    c.arrays["0.rank"][a_cell(c, rank=1)] = 0
+
+
+@false(known.two_ages)
+def ranks_invented(c):
+    c.arrays["0.rank"][c.arrays["0.rank"] < 0] = 60
+
+
+@false(known.gap, "max_rank")
+def max_rank(c):
+    c.claims()["attracts-all"]["max_rank"] = 0
+
+
+@false(known.two_ages, "rank")
+def attractor_dropped(c):
+    c.arrays["0.component"][c.arrays["0.component"] == 2] = -1
+
+
+@false(known.two_ages, "rank does not fall")
+def all_attractors_dropped(c):
+    c.arrays["0.component"][:] = -1
+
+
+@false(known.two_ages, "lead out of its component")
+def components_exchanged_in_one_cell(c):
+    c.arrays["0.component"][a_cell(c, attracting=True)] += 1
+
+
+@false(known.two_ages, "rank that is not 0")
+def rank_in_a_component(c):
+    c.arrays["0.rank"][a_cell(c, attracting=True)] = 1
+
+
+@false(known.gap, "is not excluded")
+def branch_excluded(c):
+    """At 0, the end of the cell, the margin is 0: branch 0 is taken."""
+    edges = c.arrays["0.edges.0.0"]
+    cell = int(np.flatnonzero(np.isclose(edges, 0.0, atol=1e-12))[0])
+    edges[cell] = 0.0
+    c.arrays["0.target.0"][cell] = -2
+
+
+@false(known.gap, "is not excluded")
+def no_branch_at_all(c):
+    cell = far_cell(c)
+    c.arrays["0.target.0"][cell] = c.arrays["0.target.1"][cell] = -2
+
+
+@false(known.gap, "slope")
+def slope(c):
+    c.claims()["expanding"]["least"] = hexed(1.41)
+
+
+@false(known.seven)
+def cycle_moved(c):
+    moved(cycle_of(c), 3, 1e-7)
+
+
+@false(known.seven, "differ")
+def cycle_listed_twice(c):
+    c.claims()["cycles"]["cycles"] *= 2
+
+
+@false(known.seven, "differ")
+def cycle_from_another_point(c):
+    listed = cycle_of(c)
+    again = {key: listed[key][2:] + listed[key][:2] for key in ("boxes", "side", "branch", "frames")}
+    c.claims()["cycles"]["cycles"].append(listed | again)
+
+
+@false(known.seven, "period is not 7")
+def period_doubled(c):
+    cycle_of(c).update({key: cycle_of(c)[key] * 2 for key in ("boxes", "side", "branch", "frames")})
+
+
+@false(known.gap, "attracts")
+def attracts_of_an_unstable_cycle(c):
+    cycle_of(c).update(attracts=True, frames=[[hexed([1.0])]] * 2)
+
+
+@false(known.seven, "frame is singular")
+def singular_frame(c):
+    cycle_of(c)["frames"][0] = [hexed([1.0, 2.0]), hexed([1.0, 2.0])]
+
+
+@false(known.gap, "attracts")
+def frame_with_tiny_rows(c):
+    cycle_of(c).update(attracts=True, frames=[[hexed([1.0])], [hexed([1e-200])]])
+
+
+@false(known.gap, "side or branch")
+def cycle_on_the_other_branch(c):
+    cycle_of(c)["branch"] = [1, 0]
+
+
+@false(known.delayed, "contracted")
+def ball_enlarged(c):
+    cycle_of(c)["radius"] = hexed(0.2)
+
+
+@false(known.delayed, "lies in a ball")
+def ball_shrunk(c):
+    cycle_of(c)["radius"] = hexed(0.05)
+
+
+@false(known.delayed, "lies in a ball")
+def cells_put_into_a_ball(c):
+    cell = a_cell(c, rank=1)
+    c.arrays["0.rank"][cell] = c.arrays["0.component"][cell] = 0
+
+
+@false(known.delayed, "has no cells")
+def component_without_cells(c):
+    c.claims()["converges"]["components"] = [5]
+
+
+@false(known.delayed, "no attracting cells")
+def trapping_of_the_cells_of_converges(c):
+    c.claim("trapping")
+
+
+@false(known.delayed, "no attracting cells")
+def invariant_of_the_cells_of_converges(c):
+    c.claim("invariant")
+
+
+@false(known.ricker, "ends of the goal")
+def goal_narrowed(c):
+    c.header["goal"]["ends"] = [region((0.4, 1.65))]
+
+
+@false(known.ricker, "outside the domain")
+def starts_beyond_the_domain(c):
+    c.header["goal"]["starts"] = [region((0.01, 2.6))]
+
+
+@false(known.ricker, "has no rank")
+def starts_without_a_rank(c):
+    c.arrays["0.rank"][a_cell(c, rank=1)] = -1
+    del c.header["boxes"][0]["claims"][0]
+
+
+@false(known.ricker, "no attracting cycle")
+def refuted_though_it_stays(c):
+    c.header["goal"]["ends"] = [region((0.2, 1.9))]
+
+
+@false(known.ricker, "no attracting cycle")
+def refuted_with_starts_elsewhere(c):
+    c.header["goal"]["starts"] = [region((2.0, 2.6))]
+
+
+@false(known.ricker, "no attracting cycle")
+def refuted_by_a_cycle_that_is_not_said_to_attract(c):
+    cycle_of(c, 1).update(attracts=False, frames=None)
+
+
+@false(known.gap, "does not know")
+def claim_unknown(c):
+    c.claim("escapes-never")
+
+
+@pytest.mark.parametrize("name", FALSE)
+def test_false_statements_are_denied(name, tmp_path):
+    make, forge, why = FALSE[name]
+    certificate = make().copy()
+    forge(certificate)
+    report = certificate.recheck(tmp_path)
+    assert report.verdict == "failed"
+    assert any(why in reason for _, _, reason in report.claims if reason)
+
+
+def test_an_attracting_ball_beyond_the_domain_is_denied(tmp_path):
+    half = Example(1, "", lambda x, *_: 0.5 * x[0])
+    cells = arrays_of(half, uniform((-1, 1), cells=16), {}, final=np.abs(np.arange(16) - 7.5) < 4)
+    claims = {
+        "cycles": {"cycles": [cycle([0.0], frames=[[[1.0]]], radius=1.25)]},
+        "converges": {"components": [0], "cycles": [0]},
+        "attracts-all": {"max_rank": int(cells["rank"].max())},
+    }
+    report = MapCertificate(half, [({}, claims, cells)]).recheck(tmp_path)
+    assert "beyond the domain" in report.reason
+
+
+def test_a_claim_that_fails_leaves_the_others(tmp_path):
+    certificate = known.gap().copy()
+    certificate.claims()["attracts-all"]["max_rank"] = 0
+    states = {name: word for name, word, _ in certificate.recheck(tmp_path).claims}
+    assert states.pop("attracts-all") == "failed"
+    assert set(states.values()) == {"proved"}
+
+
+# ------------------------------------------------------------------------------ odd: refused
+
+
+def put(*path, value):
+    """A change of the header at a path."""
+
+    def forge(c):
+        where = c.header
+        for key in path[:-1]:
+            where = where[key]
+        where[path[-1]] = value
+
+    return forge
+
+
+OPS = ("map", "programs", 0, "ops")
+BOX = ("boxes", 0)
+ONE_CLAIM = (*BOX, "claims", 0)
+
+
+def array(name, value):
+    return lambda c: c.arrays.update({f"0.{name}": value(c.arrays[f"0.{name}"])})
+
+
+def with_section(name, **section):
+    return lambda c: c.claims()[name].update(section)
+
+
+ODD = {
+    "later entry": put(*OPS, 0, value=["neg", 3]),
+    "own entry": put(*OPS, 0, value=["neg", 0]),
+    "string for a list": put(*OPS, 0, value="x0"),
+    "empty operation": put(*OPS, 0, value=[]),
+    "word is a list": put(*OPS, 0, value=[["x"], 0]),
+    "unknown word": put(*OPS, 0, value=["gamma", 0]),
+    "code for a word": put(*OPS, 0, value=["__import__('os')", 0]),
+    "too many entries": put(*OPS, 1, value=["x", 0, 0]),
+    "too few entries": put(*OPS, 2, value=["mul", 0]),
+    "power 0": put(*OPS, 2, value=["pow", 0, 0]),
+    "power 201": put(*OPS, 2, value=["pow", 0, 201]),
+    "power true": put(*OPS, 2, value=["pow", 0, True]),
+    "power 2.0": put(*OPS, 2, value=["pow", 0, 2.0]),
+    "entry true": put(*OPS, 2, value=["mul", True, 0]),
+    "negative entry": put(*OPS, 2, value=["mul", -1, 0]),
+    "no such axis": put(*OPS, 1, value=["x", 1]),
+    "no such parameter": put(*OPS, 1, value=["p", "r"]),
+    "parameter is a list": put(*OPS, 1, value=["p", ["s"]]),
+    "constant is a number": put(*OPS, 1, value=["c", 0.5]),
+    "constant 1e100": put(*OPS, 1, value=["c", "1e100"]),
+    "constant nan": put(*OPS, 1, value=["c", "nan"]),
+    "constant with a blank": put(*OPS, 1, value=["c", " 1"]),
+    "constant in other digits": put(*OPS, 1, value=["c", "٣"]),
+    "constant of 41 digits": put(*OPS, 1, value=["c", "1" * 41]),
+    "no operations": put(*OPS, value=[]),
+    "operations are no list": put(*OPS, value={"0": ["x", 0]}),
+    "result is missing": put("map", "programs", 0, "out", value=[]),
+    "result is no operation": put("map", "programs", 0, "out", value=[99]),
+    "program on no side": put("map", "programs", 0, "to", value=1),
+    "program in another place": put("map", "programs", 0, "branch", value=1),
+    "branch true": put("map", "programs", 1, "branch", value=True),
+    "program missing": lambda c: c.header["map"]["programs"].pop(),
+    "margin missing": lambda c: c.header["map"]["margins"].pop(),
+    "key too many": put("map", "names", value=["low", "high"]),
+    "key too many in a program": put("map", "programs", 0, "note", value=""),
+    "key too many in the header": put("claims", value=[]),
+    "key missing": lambda c: c.header.pop("plane"),
+    "dimension 4": put("map", "dimension", value=4),
+    "dimension true": put("map", "dimension", value=True),
+    "sides 0": put("map", "sides", value=0),
+    "a period": put("map", "periodic", value=[["1"]]),
+    "periods missing": put("map", "periodic", value=[]),
+    "a plane": put("plane", value={"axes": []}),
+    "version 4": put("version", value=4),
+    "version 3.0": put("version", value=3.0),
+    "other format": put("format", value="limitsets"),
+    "map is a text": put("map", value="throw"),
+    "parameter odd": put("map", "parameters", value=["1s"]),
+    "parameter twice": put("map", "parameters", value=["s", "s"]),
+    "parameter with a new line": put("map", "parameters", value=["s\n"]),
+    "parameter missing": put(*BOX, "parameters", value={}),
+    "parameter too many": put(*BOX, "parameters", value={"s": "1.4", "t": "1"}),
+    "value is a number": put(*BOX, "parameters", "s", value=1.4),
+    "value 1e": put(*BOX, "parameters", "s", value="1e"),
+    "range reversed": put(*BOX, "parameters", "s", value=["1.5", "1.4"]),
+    "range empty": put(*BOX, "parameters", "s", value=["1.4", "1.40"]),
+    "range of three": put(*BOX, "parameters", "s", value=["1.4", "1.5", "1.6"]),
+    "no boxes": put("boxes", value=[]),
+    "nothing claimed": put(*BOX, "claims", value=[]),
+    "claim twice": lambda c: c.claim("trapping"),
+    "claim is a number": put(*ONE_CLAIM, "claim", value=1),
+    "claim without section": lambda c: c.header["boxes"][0]["claims"][0].pop("section"),
+    "section is a list": put(*ONE_CLAIM, "section", value=[]),
+    "section with a key": put(*ONE_CLAIM, "section", value={"strict": False}),
+    "prefix is a path": put(*BOX, "prefix", value="../0."),
+    "prefix twice": lambda c: c.header["boxes"].append(c.header["boxes"][0]),
+    "max_rank nan": with_section("attracts-all", max_rank=float("nan")),
+    "max_rank 2.0": with_section("attracts-all", max_rank=2.0),
+    "max_rank true": with_section("attracts-all", max_rank=True),
+    "least 0.4": with_section("expanding", least=hexed(0.4)),
+    "least in decimals": with_section("expanding", least="1.4"),
+    "huge hexadecimal": with_section("expanding", least="0x1.0p9999"),
+    "no cycle": with_section("cycles", cycles=[]),
+    "goal without ends": put("goal", value={"starts": None, "ends": []}),
+    "goal without starts": put("goal", value={"starts": [], "ends": [region((0, 1))]}),
+    "goal on no side": put("goal", value={"starts": None, "ends": [region((0, 1), side=1)]}),
+    "goal in two dimensions": put("goal", value={"starts": None, "ends": [region((0, 1), (0, 1))]}),
+    "goal reversed": put("goal", value={"starts": None, "ends": [region((1, 0))]}),
+    "ends-in without a goal": lambda c: c.claim("ends-in"),
+    "refuted beside others": lambda c: c.claim("refuted"),
+    "ranks in floats": array("rank", lambda v: np.where(v == 1, np.nan, v)),
+    "ranks of eight bytes": array("rank", lambda v: v.astype(np.int64)),
+    "rank -2": array("rank", lambda v: np.where(v == 1, -2, v).astype(np.int32)),
+    "component -2": array("component", lambda v: np.minimum(v, -2).astype(np.int32)),
+    "rank too short": array("rank", lambda v: v[:-1]),
+    "target in one column": array("target.0", lambda v: v[:, 0]),
+    "target beyond": array("target.0", lambda v: np.where(v >= 0, 1000, v).astype(np.int32)),
+    "target -1": array("target.0", lambda v: np.where(v == -2, -1, v).astype(np.int32)),
+    "target reversed": array("target.0", lambda v: v[:, ::-1].copy()),
+    "edge nan": array("edges.0.0", lambda v: np.where(np.arange(len(v)) == 5, np.nan, v)),
+    "edge infinite": array("edges.0.0", lambda v: np.append(v[:-1], np.inf)),
+    "edges that do not ascend": array("edges.0.0", lambda v: np.where(np.arange(len(v)) == 5, v[4], v)),
+    "one edge": array("edges.0.0", lambda v: v[:1]),
+    "array missing": lambda c: c.arrays.pop("0.rank"),
+    "array too many": lambda c: c.arrays.update({"0.note": np.zeros(3)}),
+    "array of another box": lambda c: c.arrays.update({"1.rank": c.arrays["0.rank"]}),
+    "arrays is a list": put("arrays", value=[]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_files_are_refused(name, tmp_path):
+    certificate = known.gap().copy()
+    ODD[name](certificate)
+    report = certificate.recheck(tmp_path)
+    assert report.verdict == "bad file"
+    assert report.reason
+
+
+ODD_CYCLES = {
+    "boxes missing": {"boxes": []},
+    "side missing": {"side": [0]},
+    "side true": {"side": [False] * 7},
+    "branch 1": {"branch": [1] * 7},
+    "attracts is a number": {"attracts": 1},
+    "frames missing": {"frames": None},
+    "frames too few": {"frames": [[hexed([1, 0]), hexed([0, 1])]]},
+    "frames of one row": {"frames": [[hexed([1, 0])]] * 7},
+    "radius 0": {"radius": hexed(0.0)},
+    "radius below 0": {"radius": hexed(-1.0)},
+    "a key too many": {"period": 7},
+}
+
+
+@pytest.mark.parametrize("name", ODD_CYCLES)
+def test_odd_cycles_are_refused(name, tmp_path):
+    certificate = known.seven().copy()
+    cycle_of(certificate).update(ODD_CYCLES[name])
+    assert certificate.recheck(tmp_path).verdict == "bad file"
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        {"components": [0, 1], "cycles": [0]},
+        {"components": [0, 1], "cycles": [0, 0]},
+        {"components": [0, 0], "cycles": [0, 1]},
+        {"components": [], "cycles": []},
+        {"components": [-1], "cycles": [0]},
+        {"components": [0], "cycles": [1]},
+        {"components": [0], "cycles": [-1]},
+        {"components": [True], "cycles": [0]},
+    ],
+)
+def test_odd_sections_of_converges_are_refused(section, tmp_path):
+    certificate = known.delayed().copy()
+    certificate.claims()["converges"].update(section)
+    assert certificate.recheck(tmp_path).verdict == "bad file"
+
+
+def test_converges_needs_radius_and_cycles(tmp_path):
+    certificate = known.delayed().copy()
+    cycle_of(certificate)["radius"] = None
+    assert certificate.recheck(tmp_path).verdict == "bad file"
+    certificate = known.delayed().copy()
+    del certificate.header["boxes"][0]["claims"][0]
+    assert certificate.recheck(tmp_path).verdict == "bad file"
+
+
+def test_slopes_are_of_one_dimension_and_refutations_name_their_starts(tmp_path):
+    plane = known.two_ages().copy().claim("expanding", least=hexed(1.5))
+    assert "one dimension" in plane.recheck(tmp_path).reason
+    margin = known.ricker().copy()
+    margin.header["goal"]["starts"] = None
+    assert "name its starts" in margin.recheck(tmp_path).reason
+    margin = known.ricker().copy()
+    margin.header["goal"] = None
+    assert "no goal" in margin.recheck(tmp_path).reason
+    cells = known.ricker().copy()
+    cells.arrays.clear()
+    assert "missing" in cells.recheck(tmp_path).reason
+
+
+def test_bytes_that_are_no_certificate_are_refused(tmp_path):
+    file = known.gap().write(tmp_path / "map.proof.zip")
+    whole = file.read_bytes()
+    texts = {
+        "nothing": b"",
+        "half": whole[: len(whole) // 2],
+        "noise": bytes(range(256)) * 10,
+        "changed": whole[:-4000] + bytes([whole[-4000] ^ 1]) + whole[-3999:],
+    }
+    for name, content in texts.items():
+        (tmp_path / name).write_bytes(content)
+        assert recheck(tmp_path / name).verdict == "bad file"
+    assert recheck(tmp_path / "absent").verdict == "bad file"
+    header = json.loads(zipfile.ZipFile(file).read("header.json"))
+    arrays = zipfile.ZipFile(file).read("arrays.npz")
+    deep = json.dumps(header).replace('"goal": null', '"goal": ' + "[" * 100 + "]" * 100)
+    large = json.dumps(header).replace('"1.4"', "1" + "0" * 400)
+    for text, method in ((deep, 0), (large, 0), (json.dumps(header), zipfile.ZIP_DEFLATED)):
+        with zipfile.ZipFile(tmp_path / "odd.zip", "w", method) as odd:
+            odd.writestr("header.json", text)
+            odd.writestr("arrays.npz", arrays)
+        assert recheck(tmp_path / "odd.zip").verdict == "bad file"
+
+
+def test_long_axes_without_arrays_need_no_memory(tmp_path):
+    three = Example(3, "", lambda x, *_: (0.5 * x[0], 0.5 * x[1], 0.5 * x[2]))
+    cells = arrays_of(three, uniform((-1, 1), (-1, 1), (-1, 1), cells=3), {})
+    cells |= {f"edges.0.{axis}": np.linspace(-1, 1, 20_001) for axis in range(3)}
+    report = MapCertificate(three, [({}, {"basin": {}}, cells)]).recheck(tmp_path)
+    assert (report.verdict, report.reason) == ("bad file", "there are more than 2^31 cells")
+    cells |= {f"edges.0.{axis}": np.linspace(-1, 1, 1_001) for axis in range(3)}
+    report = MapCertificate(three, [({}, {"basin": {}}, cells)]).recheck(tmp_path)
+    assert "one row for each cell" in report.reason
+
+
+def test_towers_of_powers_end(tmp_path):
+    tower = Example(1, "", lambda x, *_: x[0])
+    cell = np.zeros(1, np.int32)
+    cells = {
+        "edges.0.0": np.array([0.0, 1.0]),
+        "target.0": np.zeros((1, 2), np.int32),
+        "rank": cell,
+        "component": cell,
+    }
+    certificate = MapCertificate(tower, [({}, {"invariant": {}}, cells)])
+    ops = program(certificate)["ops"]
+    ops += [["c", "9e99"], *(["pow", k, 200] for k in range(1, 30))]
+    for last in (["exp", 30], ["sin", 30], ["pow", 30, -200]):
+        ops[31:] = [last]
+        program(certificate)["out"] = [31]
+        assert certificate.recheck(tmp_path).verdict == "failed"
