@@ -363,7 +363,7 @@ def pack(
     DeniedError
         The checker does not confirm it: it is kept as NAME.denied.zip.
     """
-    whole = {
+    header = {
         "format": FORMAT,
         "version": VERSION,
         "map": {"name": "throw", "version": 1, **model, "formulas": FORMULAS},
@@ -371,20 +371,36 @@ def pack(
         "tolerance": spelled_plainly(tolerance) if tolerance else None,
         "boxes": spelled_plainly(list(boxes)),
         "claims": spelled_plainly([{"claim": each["claim"], "section": each["section"]} for each in claims]),
-        "producer": _producer(),
         "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
-        "arrays": {
-            name: {
-                "sha256": hashlib.sha256(value.tobytes()).hexdigest(),
-                "dtype": value.dtype.str,
-                "shape": list(value.shape),
-            }
-            for name, value in arrays.items()
-        },
     }
+    verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
+    return written(path, header, arrays, verdicts, recheck=recheck, workers=workers)
+
+
+def written(
+    path: str | Path,
+    header: Mapping[str, Any],
+    arrays: Mapping[str, NDArray[Any]],
+    verdicts: Mapping[str, str],
+    *,
+    recheck: bool,
+    workers: int | None,
+) -> float | None:
+    """Write a header, with what describes the arrays, and the arrays; the last two arguments as in `pack`.
+
+    `verdicts` says what has to become of each claim.
+    """
+    described = {
+        name: {
+            "sha256": hashlib.sha256(value.tobytes()).hexdigest(),
+            "dtype": value.dtype.str,
+            "shape": list(value.shape),
+        }
+        for name, value in arrays.items()
+    }
+    whole = {**header, "producer": _producer(), "arrays": described}
     packed = io.BytesIO()
     np.savez(packed, **arrays)  # type: ignore[arg-type]  # arrays by name
-    verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
     target, seconds, denied = Path(path), None, None
     with replaced(target.parent) as draft:
         written = draft / target.name

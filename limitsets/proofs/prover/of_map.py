@@ -13,8 +13,7 @@ and it is no multiple one (Krawczyk; Neumaier, "Interval Methods for Systems of 
 points at once, and not the first one under f^p: so images of a box of parameters do not grow along the orbit.  On X
 every branch is proved to be taken.
 
-For two corners of parameters all of it holds for each of the maps between.  No certificate is written: the independent
-checker knows the throw only.
+For two corners of parameters all of it holds for each of the maps between.
 """
 
 from __future__ import annotations
@@ -24,7 +23,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add, mul
-from typing import Any, NoReturn, TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,7 @@ from limitsets.base import (
 from limitsets.base.arrays import Array, Ints
 from limitsets.numbers.interval import guard
 from limitsets.proofs.prover.attraction import components_of
+from limitsets.proofs.prover.certificate_of_map import cycle_in_file, write_map
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.proof import Claim
 from limitsets.systems.cells import CellSet, Grid
@@ -143,20 +144,37 @@ class ProofOfMap(Tabled):
         """The cells all of whose points are proved to enter the attracting cells."""
         return CellSet(self.graph.grid, self.graph.condensation().destinations(passing(self.graph)) >= 0)
 
-    def save(self, path: object = None, **_: object) -> NoReturn:
-        """Refuse: there are certificates of scenes alone (`Proof.save`).
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
+
+        The file holds the formulas of `image_on` (of `image` where a map of one branch has no other) and `margin`, as
+        `limitsets.formulas` shows them, and the proof is of these.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
 
         Raises
         ------
         AnswerError
-            Always.
+            Nothing is proved, or the map cannot be recorded: the line names the function and the way out.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip.
         """
-        raise AnswerError(
-            "the certificate",
-            f"of the map {type(self.map).__name__}",
-            "one of a scene: nothing rechecks other maps",
-            "keep .to_csv(file) or .to_json(), and the lines that call limitsets.certify",
-        )
+        claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
+        if not claims:
+            raise AnswerError(
+                "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
+            )
+        if "cycles" in claims:
+            claims["cycles"] = {"cycles": [_in_file(self, cycle) for cycle in self.cycles]}
+        write_map(path, self.map, self.upper, self.graph.grid, claims, recheck=recheck, workers=workers)
+        return Path(path)
 
     def functions(self, claim: str) -> str:
         """Name the functions of the map that a claim is proved of: `image` may be another, but for a sample."""
@@ -304,7 +322,9 @@ def _expanding(proof: ProofOfMap) -> Claim:
 # ---------------------------------------------------------------- cycles
 
 
-def _stepped(proof: ProofOfMap, lo: Array, hi: Array, cycle: Cycle) -> tuple[Intervals, Intervals] | str:
+def _stepped(
+    proof: ProofOfMap, lo: Array, hi: Array, cycle: Cycle | CycleOfMap
+) -> tuple[Intervals, Intervals] | str:
     """Enclose images (p, d) and slopes (p, d, d) of boxes around the points of an orbit; or say what is missing."""
     image, slope = np.empty((2, *lo.shape)), np.empty((2, *lo.shape, lo.shape[1]))
     for side, branch in sorted(set(zip(cycle.side.tolist(), cycle.branches.tolist(), strict=True))):
@@ -360,6 +380,15 @@ def _inverse(slope: Intervals) -> Array:
         return np.asarray(np.linalg.inv(derivative.reshape(p * d, p * d)), dtype=np.float64)
     except np.linalg.LinAlgError:
         return np.full((p * d, p * d), np.nan)
+
+
+def _in_file(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
+    slopes = None
+    if cycle.attracts:
+        step = _stepped(proof, cycle.lo, cycle.hi, cycle)
+        assert not isinstance(step, str)  # it was proved on these boxes
+        slopes = 0.5 * (step[1].lo + step[1].hi)
+    return cycle_in_file(cycle.lo, cycle.hi, cycle.side, cycle.branches, slopes)
 
 
 def _krawczyk(middle: Array, c: Array, off: Intervals, slope: Intervals, wide: Intervals) -> Intervals:

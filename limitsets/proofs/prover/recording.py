@@ -86,8 +86,13 @@ def lifted(tape: Tape, value: Any) -> Recorded:
         raise RefusedError(str(shown(value)), "calculate with numbers alone, and return a tuple of them")
     if not abs(value) <= GREATEST or 0 < abs(value) < LEAST:
         raise RefusedError(f"the number {shown(value)}", f"use numbers from {LEAST} to {GREATEST}, and 0")
+    return Recorded(tape, "c", decimal(value))
+
+
+def decimal(value: float) -> str:
+    """Write a number as its shortest decimal, a whole one without a point."""
     whole = abs(value) < 2**53 and value == int(value)
-    return Recorded(tape, "c", str(int(value)) if whole else repr(float(value)))
+    return str(int(value)) if whole else repr(float(value))
 
 
 def _tape_of(values: Any) -> Tape | None:

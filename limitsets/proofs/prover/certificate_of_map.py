@@ -1,0 +1,241 @@
+"""Certificates of maps: formulas as lists of operations, cells with targets, ranks and components, orbits in boxes.
+
+docs/certificates.md, "Certificates of any map".  The checker evaluates the operations in balls of its own, whose ends
+differ from our boxes in the last digits: targets are chosen for boxes that are wider by that, and ranks and components
+are those of these targets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base import AnswerError
+from limitsets.base.arrays import Array, Arrays, Ints
+from limitsets.proofs.prover.certificate import FORMAT, written
+from limitsets.proofs.prover.programs import recorded_map, require_same
+from limitsets.proofs.prover.recording import decimal, names_of
+from limitsets.systems.cells import Grid
+from limitsets.systems.graph.components import attracting_of, ranks, reach, strong_components
+from limitsets.systems.graph.ranges import build
+from limitsets.systems.maps.derived import NEVER, UNKNOWN, branch_boxes
+
+VERSION = 3
+
+# Boxes are wider by these shares of their width and of their size.  Balls of 100 bits are narrower than our boxes but
+# for the radius, which has 30 bits: 2^-28 of the width is four times its rounding.
+OF_WIDTH, OF_SIZE = 2.0**-28, 2.0**-50
+
+# A claimed slope is smaller by this share, and the boxes of an orbit are wider by MORE of their width and LEAST of the
+# size of its points: the checker has to find Newton's operator inside them.
+LESS, MORE, LEAST = 2.0**-40, 0.25, 2.0**-40
+
+# Condition of a frame of eigenvectors beyond which Lyapunov's equation is solved, by so many rounds along the orbit.
+WORST, ROUNDS = 1e6, 60
+
+NO_CLAIM = -1  # the rank of cells of which nothing is claimed
+IMPOSSIBLE = -2  # the target of a branch that is not taken
+
+
+def cells_of(lower: Any, upper: Any, grid: Grid, branches: int) -> Arrays:
+    """Find the arrays of one box of parameters.
+
+    Parameters
+    ----------
+    lower, upper : NamedTuple
+        Corners of the parameters.
+    grid : Grid
+        The cells.
+    branches : int
+        How many the map has.
+
+    Returns
+    -------
+    dict of str to ndarray
+        ``edges.S.A``, ``target.B``, `rank` and `component`.  A cell from which an image may leave the domain, is not
+        enclosed, or may come to recurrent cells that do not attract, has rank -1.
+    """
+    count, dimension = grid.n_cells, grid.dimension
+    target = np.full((branches, count, 2 * dimension), IMPOSSIBLE, np.int32)
+    to, lost = np.zeros((branches, count), np.int32), np.zeros(count, dtype=bool)
+    for side, branch in np.ndindex(grid.sides, branches):
+        mine = np.arange(count)[grid.of_side(side)]
+        boxes = branch_boxes(lower, upper, side, branch, *grid.boxes(mine, side))
+        cells = _target_cells(grid, boxes.side, boxes.lo, boxes.hi)
+        first, last = cells[:, :dimension], cells[:, dimension:]
+        inside = ((first >= 0) & (last < grid.shape[boxes.side])).all(axis=1) & (boxes.state != UNKNOWN)
+        lost[mine[(boxes.state != NEVER) & ~inside]] = True
+        chosen = (boxes.state != NEVER) & inside
+        target[branch, mine[chosen]], to[branch, mine] = cells[chosen], boxes.side
+    component, rank = _labels(grid, target, to, lost)
+    edges = {f"edges.{s}.{axis}": e for s, axes in enumerate(grid.edges) for axis, e in enumerate(axes)}
+    targets = {f"target.{branch}": each for branch, each in enumerate(target)}
+    return {"component": component, "rank": rank, **edges, **targets}
+
+
+def _target_cells(grid: Grid, side: int, lo: Array, hi: Array) -> Ints:
+    """First and last cell along each axis that boxes meet, shape (n, 2 d); outside the grid where they reach beyond."""
+    slack = OF_WIDTH * (hi - lo) + OF_SIZE * np.maximum(np.abs(lo), np.abs(hi))
+    axes = grid.edges[side]
+    first = [np.searchsorted(e, low, "right") - 1 for e, low in zip(axes, (lo - slack).T, strict=True)]
+    last = [np.searchsorted(e, high, "left") - 1 for e, high in zip(axes, (hi + slack).T, strict=True)]
+    return np.stack([*first, *last], axis=1)
+
+
+def _labels(grid: Grid, target: Ints, to: Ints, lost: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+    """Find component and rank of each cell, in the graph of the targets."""
+    dimension = grid.dimension
+    cell, branch = np.nonzero(target[:, :, 0].T != IMPOSSIBLE)
+    boxes, sides = target[branch, cell], to[branch, cell]
+    begin = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=grid.n_cells))])
+    first, last = (np.ascontiguousarray(boxes[:, part]) for part in np.split(np.arange(2 * dimension), 2))
+    ranges = build(grid, begin, sides, first, last, lost.astype(np.uint8))
+    parts = strong_components(ranges)
+    sets = [np.flatnonzero(parts.label == k).astype(np.int32) for k in np.flatnonzero(parts.recurrent)]
+    attracts = attracting_of(ranges, parts, sets)
+    component, open_ends = np.full(grid.n_cells, -1, np.int32), lost.astype(np.uint8)
+    for cells in (each for each, good in zip(sets, attracts, strict=True) if not good):
+        open_ends[cells] = 1
+    for number, cells in enumerate(each for each, good in zip(sets, attracts, strict=True) if good):
+        component[cells] = number
+    rank = ranks(ranges, parts, np.asarray(parts.recurrent))
+    rank[reach(ranges, parts, open_ends) > 0] = NO_CLAIM
+    rank[component >= 0] = 0
+    return component, rank
+
+
+# ---------------------------------------------------------------- sections
+
+
+def _hexed(values: Array) -> Any:
+    """Write floats of an array of any shape in hexadecimal."""
+    return float(values).hex() if np.ndim(values) == 0 else [_hexed(each) for each in values]
+
+
+def cycle_in_file(lo: Array, hi: Array, side: Ints, branches: Ints, slopes: Array | None) -> dict[str, Any]:
+    """Write a periodic orbit.
+
+    Parameters
+    ----------
+    lo, hi : ndarray, shape (p, d)
+        Boxes of its points.
+    side, branches : ndarray of int, shape (p,)
+        Of its points.
+    slopes : ndarray, shape (p, d, d), or None
+        Derivatives of its steps, if it attracts.
+    """
+    wide = MORE * (hi - lo) + LEAST * np.maximum(np.maximum(np.abs(lo), np.abs(hi)), 1.0)
+    return {
+        "boxes": _hexed(np.stack([lo - wide, hi + wide], axis=-1)),
+        "side": side.tolist(),
+        "branch": branches.tolist(),
+        "attracts": slopes is not None,
+        "frames": None if slopes is None else _hexed(frames(slopes)),
+        "radius": None,
+    }
+
+
+def frames(slopes: Array) -> Array:
+    """Choose S_k so that S_(k+1)^-1 A_k S_k contracts, from the derivatives A_k of the steps of an attracting orbit.
+
+    Eigenvectors of the product of all steps, carried along the orbit; where these are nearly parallel or a step loses a
+    direction, Lyapunov's equation: |A_k x| in the norm of k + 1 is below |x| in that of k.
+    """
+    count, dimension = slopes.shape[:2]
+    whole = reduce(lambda product, slope: slope @ product, slopes, np.eye(dimension))
+    values, vectors = np.linalg.eig(whole)
+    chosen = np.stack(
+        [v.imag if w.imag < 0 else v.real for w, v in zip(values, vectors.T, strict=True)], axis=1
+    )
+    carried = [chosen]
+    for slope in slopes[:-1]:
+        after = slope @ carried[-1]
+        carried.append(after / max(float(np.linalg.norm(after, 2)), np.finfo(float).tiny))
+    if all(np.linalg.cond(frame) < WORST for frame in carried):
+        return np.array(carried)
+    weights = [np.eye(dimension)] * count
+    for k in [*reversed(range(count))] * ROUNDS:
+        weights[k] = np.eye(dimension) + slopes[k].T @ weights[(k + 1) % count] @ slopes[k]
+    return np.array([np.linalg.inv(np.linalg.cholesky(weight).T) for weight in weights])
+
+
+def _parameters(lower: Any, upper: Any) -> dict[str, Any]:
+    """Write each parameter as a decimal, or two where it has a range."""
+    ends = zip(names_of(lower), names_of(upper), strict=True)
+    return {name: decimal(lo) if lo == hi else [decimal(lo), decimal(hi)] for (name, lo), (_, hi) in ends}
+
+
+def _section(claim: str, arrays: Arrays, known: Mapping[str, Any]) -> dict[str, Any]:
+    """Write the section of a claim; the numbers of cells are those of the file."""
+    if claim == "attracts-all":
+        if (arrays["rank"] < 0).any():
+            raise AnswerError(
+                "the certificate of attracts-all",
+                "orbits pass through cells that recur, for a number of steps that ranks of cells do not show",
+                "cells of which none recurs but those that attract",
+                "take finer cells, or leave the claim out",
+            )
+        return {"max_rank": int(arrays["rank"].max())}
+    if claim == "expanding":
+        return {"least": (float.fromhex(known["least_slope"]) * (1.0 - LESS)).hex()}
+    return dict(known) if claim == "cycles" else {}
+
+
+def write_map(
+    path: str | Path,
+    lower: Any,
+    upper: Any,
+    grid: Grid,
+    claims: Mapping[str, Mapping[str, Any]],
+    *,
+    recheck: bool = True,
+    workers: int | None = 1,
+) -> float | None:
+    """Write a certificate of a map, replacing an older file whole; it gets its name once the checker has confirmed it.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    lower, upper : NamedTuple
+        Corners of the parameters.
+    grid : Grid
+        The cells.
+    claims : mapping of str to mapping
+        What is claimed, with the numbers that the prover knows: `least_slope` of expanding, `cycles` of cycles.
+    recheck : bool
+        Whether to check it first.
+    workers : int, optional
+        Processes that check it, None for all processors.
+
+    Returns
+    -------
+    float or None
+        Seconds that the check took.
+
+    Raises
+    ------
+    AnswerError
+        For a map that cannot be recorded, or whose recorded formulas are not what is compiled.
+    DeniedError
+        The checker does not confirm it: it is kept as NAME.denied.zip.
+    """
+    table = recorded_map(lower, grid.sides)
+    require_same(lower, upper, table, grid.domain)
+    arrays = {} if set(claims) == {"cycles"} else cells_of(lower, upper, grid, table["branches"])
+    sections = [{"claim": word, "section": _section(word, arrays, known)} for word, known in claims.items()]
+    arrays = {f"0.{name}": np.ascontiguousarray(each) for name, each in arrays.items()}
+    header = {
+        "format": FORMAT,
+        "version": VERSION,
+        "map": table,
+        "boxes": [{"parameters": _parameters(lower, upper), "prefix": "0.", "claims": sections}],
+        "goal": None,
+        "plane": None,
+    }
+    return written(path, header, arrays, dict.fromkeys(claims, "proved"), recheck=recheck, workers=workers)
