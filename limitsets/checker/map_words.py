@@ -146,7 +146,7 @@ SENTENCES: dict[str, Callable[[Proved], str]] = {
     "ends-in": Proved.of_goal,
     "expanding": Proved.growth,
     "refuted": lambda proved: (
-        f"an open set of starts, around a point of an attracting cycle, violates: {proved.of_goal()}"
+        f"an open set of starts, around a point of a cycle, violates: {proved.of_goal()}"
     ),
 }
 
