@@ -1,7 +1,7 @@
-"""Check a proof certificate of a throw-and-catch feeder: written from the physics, not from the prover.
+"""Check a proof certificate of a throw-and-catch feeder, or of a map: written from the physics, not from the prover.
 
-    python recheck.pyz FILE [--json] [--workers N]      # this package, packed in one file by `make checker`
-    python -m limitsets.checker FILE                    # the same
+    python recheck.pyz FILE [--json] [--formulas] [--workers N]      # this package, in one file: `make checker`
+    python -m limitsets.checker FILE                                 # the same
 
 The checker needs Python, numpy and python-flint, and nothing else of the package that wrote the certificate.  It
 believes integer comparisons, exact rationals, and signs of balls that Arb computed.  A certificate comes from a
@@ -11,6 +11,7 @@ The proof is about one throw map: a part rests on side i at x = R, the arm throw
 angle phi and either falls back ("jog") or over that vertex on side i+1 ("flip").  The certificate cuts every side into
 cells.  For every cell it says how the throw decides, where the images lie and what bracket holds phi; the checker
 proves each of these anew, for all x in the cell and all parameters allowed, and follows the integers to the claims.
+A certificate of any other map holds its formulas, as data.
 
 A function that checks a statement returns "" where it proves the statement, and else the reason in words for people.
 The files follow docs/certificates.md, and each imports only from those before it:
@@ -44,6 +45,13 @@ The files follow docs/certificates.md, and each imports only from those before i
     links        what a step needs of every cell, and the chain of it             20, 21
     chances      a claim of probabilities                                         "Probabilities"
     brackets     its brackets                                                     22
+    program      formulas as operations: read, evaluated, printed                 "Certificates of any map"
+    any_map      the map of a file, and one cell of it
+    map_cells    the cells, their labels
+    map_cycles   periodic orbits, and balls around them
+    map_file     the file of a map
+    map_words    what is proved, in sentences
+    map_claims   the claims
     report       a file from first to last, and the report about it
     main         the command line
 """

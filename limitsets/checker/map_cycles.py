@@ -129,16 +129,12 @@ class Cycle:
         pieces = [self.map.piece(box) for box in self.listed.boxes]
         middle = [ball.mid() for piece in pieces for ball in piece.balls[:d]]
         off = [ball - ball.mid() for piece in pieces for ball in piece.balls[:d]]
-        newton, residual = [[ZERO] * (p * d) for _ in range(p * d)], []
+        newton, residual = derivative_of_gaps(slopes), []
         for k, piece in enumerate(pieces):
-            after = (k + 1) % p
             program = self.map.image[self.listed.side[k], self.listed.branch[k]]
             images = program.at(middle[k * d : k * d + d] + piece.balls[d:])
-            for i in range(d):
-                row = newton[k * d + i]
-                row[k * d : k * d + d] = slopes[k][i]
-                row[after * d + i] = row[after * d + i] - 1
-                residual.append([images[i] - middle[after * d + i]])
+            after = (k + 1) % p * d
+            residual += [[image - m] for image, m in zip(images, middle[after : after + d], strict=True)]
         near = np.array([[float(v.mid()) for v in row] for row in newton])
         if not np.isfinite(near).all() or not np.linalg.cond(near) < WORST_MATRIX:
             return "Newton's matrix is singular, or nearly so"
@@ -207,6 +203,20 @@ class Cycle:
         where = " x ".join(interval_in_words(floats_around(v)) for v in self.points[0])
         side = f", side {self.listed.side[0]}" if self.map.shape.sides > 1 else ""
         return f"period {self.period} in {where}{side}{', attracting' if self.listed.attracts else ''}"
+
+
+def derivative_of_gaps(slopes: list[list[list[Arb]]]) -> list[list[Arb]]:
+    """Return the matrix of derivatives of all f(x_k) - x_k+1 by all points."""
+    d, size = len(slopes[0]), len(slopes) * len(slopes[0])
+    derivative = []
+    for k, slope in enumerate(slopes):
+        for i, entries in enumerate(slope):
+            row = [ZERO] * size
+            row[k * d : k * d + d] = entries
+            after = (k + 1) * d % size + i
+            row[after] = row[after] - 1
+            derivative.append(row)
+    return derivative
 
 
 def meet(one: list[Arb], other: list[Arb]) -> bool:

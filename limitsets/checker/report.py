@@ -36,7 +36,8 @@ from .file import (
     table,
 )
 from .goals import content_of_goal, goal_of_scene
-from .map_claims import MapFile, check_map_file, read_map_file
+from .map_claims import check_map_file
+from .map_file import MapFile, read_map_file
 from .model import FORMULAS
 from .plane import (
     Plane,

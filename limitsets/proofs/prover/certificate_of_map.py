@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import reduce
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,8 @@ LESS, MORE, LEAST = 2.0**-40, 0.25, 2.0**-40
 
 # Condition of a frame of eigenvectors beyond which Lyapunov's equation is solved, by so many rounds along the orbit.
 WORST, ROUNDS = 1e6, 60
+
+Numbers: TypeAlias = NDArray[np.int32]
 
 NO_CLAIM = -1  # the rank of cells of which nothing is claimed
 IMPOSSIBLE = -2  # the target of a branch that is not taken
@@ -87,7 +89,7 @@ def _target_cells(grid: Grid, side: int, lo: Array, hi: Array) -> Ints:
     return np.stack([*first, *last], axis=1)
 
 
-def _labels(grid: Grid, target: Ints, to: Ints, lost: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+def _labels(grid: Grid, target: Numbers, to: Numbers, lost: NDArray[np.bool_]) -> tuple[Numbers, Numbers]:
     """Find component and rank of each cell, in the graph of the targets."""
     dimension = grid.dimension
     cell, branch = np.nonzero(target[:, :, 0].T != IMPOSSIBLE)

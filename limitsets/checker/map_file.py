@@ -1,0 +1,152 @@
+"""A certificate of a map as its file has it: boxes of parameters, claims and a goal, read and not yet believed.
+
+docs/certificates.md, "Certificates of any map".
+"""
+
+import re
+from typing import Any, NamedTuple
+
+from .any_map import Shape, read_map, read_parameters
+from .balls import Pair
+from .file import Arrays, hex_float, read_side, require, rows, table
+from .map_cells import MapCells
+from .map_cycles import Listed, read_box, read_cycles
+from .program import is_whole
+
+CLAIMS = {  # the claims that are known, and the keys of their sections
+    "cycles": "cycles",
+    "converges": "components cycles",
+    "invariant": "",
+    "trapping": "",
+    "basin": "",
+    "attracts-all": "max_rank",
+    "ends-in": "",
+    "expanding": "least",
+    "refuted": "",
+}
+OF_ORBITS = ("cycles", "converges", "refuted")  # the others are about cells; these hold for fixed parameters
+MOST_BOXES = 100_000
+Regions = list[tuple[int, list[Pair]]]  # side and box
+
+
+class Goal(NamedTuple):
+    """Every start of some boxes, None for those in cells with a rank, ends in others and stays there."""
+
+    starts: Regions | None
+    ends: Regions
+
+
+class Part(NamedTuple):
+    """A box of parameters: what is claimed there."""
+
+    parameters: dict[str, tuple[str, str]]
+    claims: dict[str, Any]  # those that are known, with their sections
+    unknown: list[str]
+    cycles: list[Listed]
+    drawn: list[tuple[int, int]]  # by `converges`: component and cycle
+    max_rank: int
+    least: float  # the slope of `expanding`, 0 where that is not claimed
+    cells: MapCells | None
+
+
+class MapFile(NamedTuple):
+    """The content of a file: read, and not yet believed."""
+
+    shape: Shape
+    goal: Goal | None
+    parts: list[Part]
+
+
+# ----------------------------------------------------------------
+# Reading.
+
+
+def read_map_file(header: dict[str, Any], entries: dict[str, memoryview]) -> MapFile:
+    """Read the content of a file; raises BadFileError."""
+    table(header, "header.json", "format version map boxes goal plane arrays", "producer")
+    require(header["plane"] is None, "plane: this checker does not know regions of a map's parameters")
+    shape = read_map(header["map"])
+    goal = None if header["goal"] is None else read_goal(header["goal"], shape)
+    boxes = rows(header["boxes"], "boxes", 1, MOST_BOXES)
+    prefixes = [table(box, "a box", "parameters prefix claims")["prefix"] for box in boxes]
+    plain_ones = all(isinstance(prefix, str) and re.fullmatch(r"[0-9]{1,6}\.", prefix) for prefix in prefixes)
+    require(
+        plain_ones and len(set(prefixes)) == len(boxes), "the prefixes of the boxes are not as they should be"
+    )
+    arrays = Arrays(header["arrays"], entries)
+    parts = [read_part(box, shape, goal, arrays, f"box {k}") for k, box in enumerate(boxes)]
+    require(any(part.claims or part.unknown for part in parts), "nothing is claimed")
+    if not any(part.unknown for part in parts):  # which may need arrays
+        arrays.require_no_others(
+            "the header describes arrays that no claim needs", "it holds arrays that no claim needs"
+        )
+    return MapFile(shape, goal, parts)
+
+
+def read_goal(raw: object, shape: Shape) -> Goal:
+    """Read the goal of a file."""
+    known = table(raw, "goal", "starts ends")
+
+    def regions(key: str) -> Regions:
+        listed = [table(one, f"goal.{key}", "side box") for one in rows(known[key], f"goal.{key}", 1, 10_000)]
+        return [
+            (read_side(r["side"], shape.sides), read_box(r["box"], shape.dimension, f"goal.{key}"))
+            for r in listed
+        ]
+
+    return Goal(None if known["starts"] is None else regions("starts"), regions("ends"))
+
+
+def read_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: Arrays, where: str) -> Part:
+    """Read a box of parameters."""
+    parameters = read_parameters(box["parameters"], shape.names, f"{where}: parameters")
+    claims: dict[str, Any] = {}
+    for claim in rows(box["claims"], f"{where}: claims", 0, 100):
+        name = table(claim, f"{where}: a claim", "claim section")["claim"]
+        require(isinstance(name, str) and name not in claims, f"{where}: a claim is no text, or made twice")
+        claims[name] = claim["section"]
+    known = {name: section for name, section in claims.items() if name in CLAIMS}
+    for name, section in known.items():
+        table(section, f"{where}: section of {name}", CLAIMS[name])
+    require(goal is not None or not {"ends-in", "refuted"} & set(known), f"{where}: there is no goal")
+    if "refuted" in known:
+        require(set(claims) == {"refuted", "cycles"}, f"{where}: a refutation has to stand with cycles alone")
+        require(
+            goal is not None and goal.starts is not None, f"{where}: a refuted goal has to name its starts"
+        )
+    cycles = read_cycles(known["cycles"]["cycles"], shape, where) if "cycles" in known else []
+    drawn = read_drawn(known["converges"], cycles, where) if "converges" in known else []
+    cells = MapCells(arrays, box["prefix"], shape) if set(known) - {"cycles", "refuted"} else None
+    unknown = [name for name in claims if name not in CLAIMS]
+    numbers = read_numbers(known, shape, where)
+    return Part(parameters, known, unknown, cycles, drawn=drawn, **numbers, cells=cells)
+
+
+def read_numbers(known: dict[str, Any], shape: Shape, where: str) -> dict[str, Any]:
+    """Read the numbers of `attracts-all` and `expanding`, 0 where these are not claimed."""
+    numbers: dict[str, Any] = {"max_rank": 0, "least": 0.0}
+    if "attracts-all" in known:
+        numbers["max_rank"] = known["attracts-all"]["max_rank"]
+        require(is_whole(numbers["max_rank"], 0, 2**31), f"{where}: max_rank is not a whole number")
+    if "expanding" in known:
+        numbers["least"] = hex_float(known["expanding"]["least"], f"{where}: least")
+        above = shape.dimension == 1 and numbers["least"] > 1
+        require(above, f"{where}: slopes are of one dimension, and the least is above 1")
+    return numbers
+
+
+def read_drawn(section: dict[str, Any], cycles: list[Listed], where: str) -> list[tuple[int, int]]:
+    """Read which component tends to which cycle."""
+    components = rows(section["components"], f"{where}: components", 1, 2**31)
+    pairs = list(
+        zip(components, rows(section["cycles"], where, len(components), len(components)), strict=True)
+    )
+    for component, k in pairs:
+        fine = is_whole(component, 0, 2**31) and is_whole(k, 0, len(cycles) - 1)
+        require(
+            fine and cycles[k].radius is not None,
+            f"{where}: converges names no component, or no cycle with a radius",
+        )
+    alone = all(len(set(column)) == len(pairs) for column in zip(*pairs, strict=True))
+    require(alone, f"{where}: converges names a component or a cycle twice")
+    return pairs
