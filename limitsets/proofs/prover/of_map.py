@@ -5,6 +5,7 @@ the interior of the component, relative to the domain.
 *Attracts all*: besides, no image leaves the domain and every recurrent component attracts, or orbits pass through: its
 cells, cut finer, do not recur.  Then the rank of a cell, the longest path to an attracting cell, falls along every
 orbit outside, but for the stays where orbits pass, which are bounded.
+*Basin*: orbits from the cells all of whose paths end in attracting cells enter these, and stay.
 *Expanding*, in one dimension: |dx'/dx| > 1 on every attracting cell, on every branch that is possible there; refuted
 where it is below 1 on all of them.
 *Cycles*: for the points x_0 .. x_p-1 of an orbit along an itinerary, F_k = f(x_k) - x_k+1 and boxes X_k around them,
@@ -388,7 +389,9 @@ def _in_file(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
         step = _stepped(proof, cycle.lo, cycle.hi, cycle)
         assert not isinstance(step, str)  # it was proved on these boxes
         slopes = 0.5 * (step[1].lo + step[1].hi)
-    return cycle_in_file(cycle.lo, cycle.hi, cycle.side, cycle.branches, slopes)
+    # branches that are names alone are one in the file
+    branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
+    return cycle_in_file(cycle.lo, cycle.hi, cycle.side, branches, slopes)
 
 
 def _krawczyk(middle: Array, c: Array, off: Intervals, slope: Intervals, wide: Intervals) -> Intervals:
@@ -507,6 +510,7 @@ PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "attracts-all": _attracts_all,
     "expanding": _expanding,
     "invariant": _invariant,
+    "basin": lambda proof: replace(_invariant(proof), claim="basin"),
     "trapping": lambda proof: replace(_invariant(proof), claim="trapping"),
 }
 CLAIMS_OF_MAP = (*PROVERS, "cycles")

@@ -11,7 +11,7 @@ import functools
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -98,13 +98,18 @@ def recorded_map(params: Any, sides: int) -> dict[str, Any]:
                     "correct what it returns, or give the number of sides",
                 )
             programs.append({"side": side, "branch": branch, **program})
-        if kind.has_margin:
+        if not kind.has_margin:  # names of branches alone: every branch has the one formula
+            first, *others = programs[-len(kind.branches) :]
+            if any({**program, "branch": first["branch"]} != first for program in others):
+                _refuse_branches(kind)
+            del programs[len(programs) - len(others) :]
+        else:
             program = recorded(kernels.margin.methods[type(params)], params, kind.dimension, side)
             margin_of_side.append({"side": side, "ops": program["ops"], "out": program["out"]})
     return {
         "dimension": kind.dimension,
         "sides": sides,
-        "branches": len(kind.branches),
+        "branches": len(kind.branches) if kind.has_margin else 1,
         "parameters": names,
         "programs": programs,
         "margins": margin_of_side,
@@ -115,16 +120,22 @@ def recorded_map(params: Any, sides: int) -> dict[str, Any]:
 def _require_recordable(cls: type, kind: Any, sides: int) -> None:
     """Refuse maps of which a certificate could not speak."""
     extra = next((name for name in ("scattered", "on_side") if cls in getattr(kernels, name).methods), None)
-    two = len(kind.branches) == 2 and kind.has_margin and kind.has_image_on
-    value = (
-        f"{kind.name}, which has {extra}" if extra
-        else f"{kind.name}, of {len(kind.branches)} branches without image_on and margin"
-    )  # fmt: skip
-    if extra or not (two or (len(kind.branches) == 1 and not kind.has_margin)):
-        allowed = "a map of one branch, or of two with image_on and margin, whose parameters stay as they are"
-        raise AnswerError("the map", value, allowed, "register the map so; a feeder is certified as a scene")
+    if extra:
+        remedy = "register the map without; a feeder is certified as a scene"
+        raise AnswerError("the map", f"{kind.name}, which has {extra}", "a map whose parameters stay", remedy)
+    if len(kind.branches) != 2 and kind.has_margin:
+        _refuse_branches(kind)
     if not 1 <= sides <= MOST_SIDES:
         raise AnswerError("the number of sides", sides, f"1 to {MOST_SIDES}", "pass sides=1")
+
+
+def _refuse_branches(kind: Any) -> NoReturn:
+    raise AnswerError(
+        "the map",
+        f"{kind.name}, of {len(kind.branches)} branches, with{'' if kind.has_margin else 'out'} margin",
+        "a map of one formula, or of two with image_on and margin",
+        "register image_on and margin for two branches",
+    )
 
 
 # ---------------------------------------------------------------- the comparison

@@ -1,0 +1,179 @@
+"""Proofs of one's own maps, saved and rechecked: what stands in the file, and what the checker finds by itself."""
+
+import json
+import math
+import zipfile
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.base.errors import AnswerError
+from limitsets.proofs.prover import certificate_of_map
+from limitsets.proofs.prover.certificate import DeniedError
+from limitsets.proofs.prover.certificate_of_map import frames
+
+
+def low(x, s):
+    return s * x + 0.9
+
+
+def high(x, s):
+    return s * x - 1.0
+
+
+def place(x):
+    return x
+
+
+def ricker(x, r):
+    return x * math.exp(r * (1.0 - x))
+
+
+def logistic(x, r):
+    return r * x * (1.0 - x)
+
+
+def spiral(x, y):
+    return 0.4 * x - 0.4 * y + 0.1 * x**2, 0.4 * x + 0.4 * y
+
+
+def gap():
+    return ls.map(pieces=(low, high), margin=place, s=1.4)
+
+
+# By name: the map, its grid, the upper corner's values, the claims, and an orbit: its period and one of its points.
+TWO = 0.5 * (3.2 + 1 - math.sqrt((3.2 - 3) * (3.2 + 1))) / 3.2
+CASES = {
+    # 1.4 (1.4 x + 0.9) - 1 = x
+    "gap": (gap, [(-1.3, 1.2)], 1000, {}, "trapping attracts-all expanding cycles", (2, -0.26 / 0.96)),
+    "logistic": (lambda: ls.map(logistic, r=3.2), [(0.4, 0.9)], 512, {}, "invariant cycles", (2, TWO)),
+    "range": (lambda: ls.map(ricker, r=2.3), [(0.02, 2.6)], 1000, {"r": 2.35}, "trapping basin", None),
+    "spiral": (lambda: ls.map(spiral), [(-1, 1), (-1, 1)], 64, {}, "trapping basin cycles", (1, 0.0)),
+    "textbook": (lambda: ls.maps.Logistic(2.5), [(0.1, 0.9)], 512, {}, "attracts-all", None),
+}
+
+
+def certified(name, folder):
+    make, box, cells, upper, claims, orbit = CASES[name]
+    lower = make()
+    corner = lower.with_values(**upper) if upper else None
+    proof = ls.certify(lower, ls.grid(box, cells=cells), claims.split(), upper=corner)
+    assert proof.proved
+    return proof, proof.save(folder / f"{name}.proof.zip"), orbit
+
+
+def header_of(file):
+    with zipfile.ZipFile(file) as packed:
+        return json.loads(packed.read("header.json"))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_proved_is_saved_and_rechecked(name, tmp_path):
+    proof, file, orbit = certified(name, tmp_path)
+    report = ls.recheck(file)
+    assert report.verdict == "proved"
+    assert {claim for claim, *_ in report.claims} == set(CASES[name][4].split())
+    assert report.map["formulas"] == ls.formulas(proof.map).lines
+    header = header_of(file)
+    assert (header["version"], header["goal"], header["map"]["dimension"]) == (3, None, len(CASES[name][1]))
+    if orbit is not None:
+        period, point = orbit
+        claims = {each["claim"]: each["section"] for each in header["boxes"][0]["claims"]}
+        listed = [each for each in claims["cycles"]["cycles"] if len(each["boxes"]) == period]
+        ends = [[float.fromhex(end) for end in box[0]] for each in listed for box in each["boxes"]]
+        assert any(lo < point < hi and hi - lo < 1e-6 for lo, hi in ends)
+        assert listed[0]["attracts"] is (name != "gap")  # 1.4^2 > 1
+
+
+def test_a_range_of_parameters_stands_in_the_file_as_it_was_written(tmp_path):
+    _, file, _ = certified("range", tmp_path)
+    assert header_of(file)["boxes"][0]["parameters"] == {"r": ["2.3", "2.35"]}
+    assert "r in [2.3, 2.35]" in "\n".join(ls.recheck(file).map["boxes"][0]["parameters"])
+
+
+def test_orbits_that_pass_through_recurrent_cells_have_no_rank_and_no_certificate(tmp_path):
+    proof = ls.certify(ls.map(spiral), ls.grid([(-1, 1), (-1, 1)], cells=64), ["attracts-all"])
+    assert proof.proved
+    with pytest.raises(AnswerError, match=r"pass through cells that recur.*finer cells"):
+        proof.save(tmp_path / "spiral.proof.zip")
+
+
+def test_only_what_is_proved_is_claimed(tmp_path):
+    proof = ls.certify(gap(), ls.grid([(-1.3, 1.2)], cells=1000), ["expanding", "trapping", "cycles"])
+    undecided = [each.claim for each in proof.claims if each.verdict != "proved"]
+    assert undecided == []
+    coarse = ls.certify(ls.map(logistic, r=3.2), ls.grid([(0.4, 0.9)], cells=64), ["trapping", "expanding"])
+    assert [each.verdict for each in coarse.claims] == ["proved", "undecided"]
+    report = ls.recheck(coarse.save(tmp_path / "coarse.proof.zip"))
+    assert [claim for claim, *_ in report.claims] == ["trapping"]
+    nothing = ls.certify(ls.map(logistic, r=3.2), ls.grid([(0.4, 0.9)], cells=64), ["expanding"])
+    with pytest.raises(AnswerError, match="without a proved claim"):
+        nothing.save(tmp_path / "nothing.proof.zip")
+
+
+def test_a_certificate_of_other_formulas_is_denied_and_kept(tmp_path, monkeypatch):
+    proof = ls.certify(ls.map(logistic, r=3.2), ls.grid([(0.4, 0.9)], cells=256), ["trapping"])
+    table = certificate_of_map.recorded_map(ls.map(logistic, r=3.2), 1)
+    one = next(op for op in table["programs"][0]["ops"] if op[0] == "c")
+    one[1] = "1.05"
+    monkeypatch.setattr(certificate_of_map, "recorded_map", lambda *_: table)
+    with pytest.raises(AnswerError, match="as it is compiled"):  # the comparison after recording
+        proof.save(tmp_path / "logistic.proof.zip")
+    monkeypatch.setattr(certificate_of_map, "require_same", lambda *_: None)
+    with pytest.raises(DeniedError, match="trapping"):
+        proof.save(tmp_path / "logistic.proof.zip")
+    assert [each.name for each in tmp_path.iterdir()] == ["logistic.denied.zip"]
+
+
+def test_cells_of_which_nothing_is_claimed_have_no_rank():
+    lower = ls.map(logistic, r=3.2)
+    arrays = certificate_of_map.cells_of(lower, lower, ls.grid([(-0.1, 0.9)], cells=500), 1)
+    middle = np.linspace(-0.1, 0.9, 501)[:-1] + 0.001
+    rank, component = arrays["rank"], arrays["component"]
+    assert (rank[middle < -0.01] == -1).all()  # they leave
+    near = np.abs(middle - 0.6875) < 0.002  # the unstable fixed point
+    assert (rank[near] == -1).all()
+    assert (rank[middle > 0.1] >= 0).mean() > 0.95
+    assert (rank[component >= 0] == 0).all()
+    first, last = arrays["target.0"][rank > 0].T
+    highest = np.array([rank[a : b + 1].max() for a, b in zip(first, last, strict=True)])
+    assert (highest < rank[rank > 0]).all()
+
+
+@pytest.mark.parametrize(
+    "slopes",
+    [
+        [[[0.5, -0.7], [0.7, 0.5]]],  # a spiral
+        [[[0.9, 5.0], [0.0, 0.9]]],  # eigenvectors that are parallel
+        [[[0.0, 1.0], [0.0, 0.0]], [[0.3, 0.0], [0.4, 0.2]]],  # a step that loses a direction
+        [[[0.0, 0.0], [0.0, 0.0]]],
+        [[[0.2]], [[-3.0]]],
+    ],
+)
+def test_every_step_contracts_in_the_frames_of_an_attracting_orbit(slopes):
+    slopes = np.array(slopes)
+    chosen = frames(slopes)
+    size = 1.0
+    for k, slope in enumerate(slopes):
+        after = chosen[(k + 1) % len(slopes)]
+        size *= np.linalg.norm(np.linalg.solve(after, slope @ chosen[k]), 2)
+    assert size < 1.0
+
+
+def remainder(x, r):
+    return r * x % 1.0
+
+
+def kinked(x, r):
+    return r * x if x < 0.5 else r * (1.0 - x)
+
+
+@pytest.mark.parametrize(("function", "word"), [(remainder, "%"), (kinked, "<")])
+def test_a_map_that_cannot_be_recorded_is_refused_in_one_line(function, word, tmp_path):
+    lower = ls.map(logistic, r=3.2)
+    proof = ls.certify(lower, ls.grid([(0.4, 0.9)], cells=64), ["trapping"])
+    with pytest.raises(AnswerError, match=word) as error:
+        ls.formulas(ls.map(function, r=1.5))
+    assert "\n" not in str(error.value)
+    assert proof.proved
