@@ -472,9 +472,3 @@ ls.register(Halves, image=_halves, branches=("left", "right"))
 def test_a_change_just_above_zero_is_at_zero():
     found = ls.critical_points(Halves(), ls.grid([(-1.0, 1.0)]).domain)
     assert [point.x for point in found[0]] == [0.0]
-
-
-def test_a_proof_of_a_map_says_why_it_has_no_certificate(tmp_path):
-    proof = ls.certify(ls.maps.Logistic(3.2), ls.grid([(0.1, 0.9)], cells=256))
-    with pytest.raises(AnswerError, match=r"of the map Logistic.*nothing rechecks other maps"):
-        proof.save(tmp_path / "logistic.proof.zip")
