@@ -8,6 +8,7 @@ import subprocess
 import sys
 import types
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from limitsets.parameters.atlas.subjects import MapSubject
 # ----------------------------------------------------------------
 # Functions as users write them.
 
-SHIFT = 0.5
+SHIFT = WEIGHT = 0.5
 
 
 def henon(x, y, a, b):
@@ -147,7 +148,12 @@ def test_a_cell_of_a_notebook_that_runs_again():
         assert ls.orbit(first, 1.0, 0, 1).x[1] == 6.0
         exec(CELL + "\nother = 5", vars(cell))  # noqa: S102  # as a notebook does
         assert type(ls.map(cell.outer, a=3.0)) is type(first)
-        for edit, after in (("SCALE = 4.0", 12.0), ("def inner(x): return x + 7", 24.0), (CELL, 6.0)):
+        for edit, after in (
+            ("SCALE = 4.0", 12.0),
+            ("SCALE = 5.0", 15.0),
+            ("def inner(x): return x + 7", 24.0),
+            (CELL, 6.0),
+        ):
             exec(edit, vars(cell))  # noqa: S102  # as a notebook does
             assert ls.orbit(ls.map(cell.outer, a=3.0), 1.0, 0, 1).x[1] == after
         assert type(ls.map(cell.outer, a=3.0)) is type(first)
@@ -156,16 +162,40 @@ def test_a_cell_of_a_notebook_that_runs_again():
         del sys.modules["notebook"]
 
 
+class Before(NamedTuple):
+    a: float
+
+
+class After(NamedTuple):
+    a: float
+
+
+def scaled(x):
+    return WEIGHT * x
+
+
+def image(params, x, side):
+    return params.a + scaled(x), side, 0
+
+
+def test_a_helper_of_a_registered_map_reads_its_globals_anew(monkeypatch):
+    for cls, weight in ((Before, 2.0), (After, 4.0)):
+        monkeypatch.setitem(globals(), "WEIGHT", weight)
+        assert ls.orbit(ls.register(cls, image=image)(1.0), 1.0, 0, 1).x[1] == 1.0 + weight
+
+
 SCRIPT = """
 import pickle, sys
 import limitsets as ls
 from numba.core import event
 import mine, other
+if edit := sys.argv[2:]:
+    open("helpers.py", "w").write(edit[0])
 with event.install_recorder("numba:compile") as recorder:
     params = ls.map(mine.grown, a=2.0)
     print(float(ls.orbit(params, 1.0, 0, 1).x[1]), float(ls.orbit(ls.map(other.grown, a=2.0), 1.0, 0, 1).x[1]))
 print(len(recorder.buffer))
-print(pickle.loads(bytes.fromhex(sys.argv[1])) if sys.argv[1:] else pickle.dumps(params).hex())
+print(pickle.loads(bytes.fromhex(sys.argv[1])) if sys.argv[1:2] else pickle.dumps(params).hex())
 """
 MINE = "import helpers\ndef grown(x, a):\n    return helpers.push(a * x)\n"
 
@@ -187,9 +217,13 @@ def test_an_edited_helper_never_gives_an_old_number(tmp_path):
     numbers, count, pickled = run()
     assert (numbers, count > 0) == ([3.0, -3.0], True)
     assert run(pickled) == ([3.0, -3.0], 0, "grown(a=2.0)")
-    (tmp_path / "helpers.py").write_text("def push(x):\n    return x + 2.0\n")
+    push = "def push(x):\n    return x + {}\n"
+    (tmp_path / "helpers.py").write_text(push.format(2.0))
     numbers, count, _ = run()
     assert (numbers, count > 0) == ([4.0, -3.0], True)
+    # edited between import and use: what is kept under the new text is never the old code
+    assert run(pickled, push.format(3.0))[0] == [4.0, -3.0]
+    assert run()[0] == [5.0, -3.0]
 
 
 def test_an_atlas_knows_the_file_of_the_functions():
