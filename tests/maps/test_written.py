@@ -40,6 +40,10 @@ def beyond(x):
     return x - SHIFT
 
 
+def odd_names(side, x, count, index):
+    return count * x + index, side
+
+
 def lorenz(x, y, z, h, rho):
     return x + h * 10 * (y - x), y + h * (x * (rho - z) - y), z + h * (x * y - 8 / 3 * z)
 
@@ -64,12 +68,13 @@ def tent_in_python(x):
     ("params", "step", "start"),
     [
         (ls.map(henon, a=1.4, b=0.3), lambda x, y: henon(x, y, 1.4, 0.3), (0.1, 0.2)),
+        (ls.map(odd_names, count=0.5, index=1), lambda x, y: (0.5 * y + 1, x), (0.1, 0.2)),
         (ls.map(henon, a=1.2, b=np.float32(0.25)), lambda x, y: henon(x, y, 1.2, 0.25), (0.1, 0.2)),
         (tent(), tent_in_python, (0.3,)),
         (ls.map(lorenz, h=0.01, rho=28), lambda x, y, z: lorenz(x, y, z, 0.01, 28), (1.0, 2.0, 3.0)),
         (ls.map(halved), halved, (0.7,)),
     ],
-    ids=["henon", "other-values", "tent", "three-coordinates", "no-parameters"],
+    ids=["henon", "odd-names", "other-values", "tent", "three-coordinates", "no-parameters"],
 )
 def test_orbits_are_those_of_the_functions_in_python(params, step, start):
     orbit = ls.orbit(params, start if len(start) > 1 else start[0], 0, 12)
@@ -248,6 +253,10 @@ def two_defaults(x, slope=2.0):
     return slope * x
 
 
+def worded(x, mode="fast"):
+    return x
+
+
 def late(x, a, y):
     return a * x, y
 
@@ -341,6 +350,7 @@ REFUSED = {
         lambda: ls.map(pieces=(left, two_defaults), margin=beyond),
         "the default of slope in two_defaults is 2.0; allowed: 1.8",
     ),
+    "a default that is no number": (lambda: ls.map(worded), "the value of mode is 'fast'"),
 }
 
 

@@ -94,7 +94,7 @@ def map(  # noqa: A001  # limitsets.map, as limitsets.maps
     """
     functions = _functions_of(formula, pieces, margin)
     takes = {name: tuple(_parameters_of(f)) for name, f in functions.items()}
-    values = {**_defaults_of(functions), **values}
+    values = _defaults_of(functions, values) | values
     coordinates = _coordinates_of(functions, takes, values)
     fields = tuple(dict.fromkeys(name for names in takes.values() for name in names if name in values))
     numbers = {name: _number(name, values[name]) for name in fields}
@@ -154,25 +154,26 @@ def _parameters_of(f: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     return parameters
 
 
-def _defaults_of(functions: dict[str, Callable[..., Any]]) -> dict[str, Any]:
-    """Values of parameters that the functions bring themselves."""
-    defaults: dict[str, Any] = {}
+def _defaults_of(functions: dict[str, Callable[..., Any]], values: dict[str, float]) -> dict[str, float]:
+    """Values that the functions bring themselves, of parameters to which none is given."""
+    defaults: dict[str, float] = {}
     for f in functions.values():
         for name, parameter in _parameters_of(f).items():
-            if parameter.default is parameter.empty:
+            if parameter.default is parameter.empty or name in values:
                 continue
-            if defaults.setdefault(name, parameter.default) != parameter.default:
+            value = _number(name, parameter.default)
+            if defaults.setdefault(name, value) != value:
                 raise MapError(
                     f"the default of {name} in {f.__name__}",
-                    shown(parameter.default),
-                    f"{shown(defaults[name])}, as in the function before",
-                    "give a parameter one default",
+                    value,
+                    f"{defaults[name]}, as in the function before",
+                    f"pass {name}=..., or give it one default",
                 )
     return defaults
 
 
 def _coordinates_of(
-    functions: dict[str, Callable[..., Any]], takes: dict[str, tuple[str, ...]], values: dict[str, Any]
+    functions: dict[str, Callable[..., Any]], takes: dict[str, tuple[str, ...]], values: dict[str, float]
 ) -> tuple[str, ...]:
     """Names of the coordinates: those without a value, which come first."""
     first = functions["first"].__name__
