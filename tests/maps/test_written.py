@@ -8,6 +8,7 @@ import subprocess
 import sys
 import types
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from limitsets.parameters.atlas.subjects import MapSubject
 # ----------------------------------------------------------------
 # Functions as users write them.
 
-SHIFT = 0.5
+SHIFT = WEIGHT = 0.5
 
 
 def henon(x, y, a, b):
@@ -37,6 +38,10 @@ def right(x, slope=1.8):
 
 def beyond(x):
     return x - SHIFT
+
+
+def odd_names(side, x, count, index):
+    return count * x + index, side
 
 
 def lorenz(x, y, z, h, rho):
@@ -63,12 +68,13 @@ def tent_in_python(x):
     ("params", "step", "start"),
     [
         (ls.map(henon, a=1.4, b=0.3), lambda x, y: henon(x, y, 1.4, 0.3), (0.1, 0.2)),
+        (ls.map(odd_names, count=0.5, index=1), lambda x, y: (0.5 * y + 1, x), (0.1, 0.2)),
         (ls.map(henon, a=1.2, b=np.float32(0.25)), lambda x, y: henon(x, y, 1.2, 0.25), (0.1, 0.2)),
         (tent(), tent_in_python, (0.3,)),
         (ls.map(lorenz, h=0.01, rho=28), lambda x, y, z: lorenz(x, y, z, 0.01, 28), (1.0, 2.0, 3.0)),
         (ls.map(halved), halved, (0.7,)),
     ],
-    ids=["henon", "other-values", "tent", "three-coordinates", "no-parameters"],
+    ids=["henon", "odd-names", "other-values", "tent", "three-coordinates", "no-parameters"],
 )
 def test_orbits_are_those_of_the_functions_in_python(params, step, start):
     orbit = ls.orbit(params, start if len(start) > 1 else start[0], 0, 12)
@@ -147,7 +153,12 @@ def test_a_cell_of_a_notebook_that_runs_again():
         assert ls.orbit(first, 1.0, 0, 1).x[1] == 6.0
         exec(CELL + "\nother = 5", vars(cell))  # noqa: S102  # as a notebook does
         assert type(ls.map(cell.outer, a=3.0)) is type(first)
-        for edit, after in (("SCALE = 4.0", 12.0), ("def inner(x): return x + 7", 24.0), (CELL, 6.0)):
+        for edit, after in (
+            ("SCALE = 4.0", 12.0),
+            ("SCALE = 5.0", 15.0),
+            ("def inner(x): return x + 7", 24.0),
+            (CELL, 6.0),
+        ):
             exec(edit, vars(cell))  # noqa: S102  # as a notebook does
             assert ls.orbit(ls.map(cell.outer, a=3.0), 1.0, 0, 1).x[1] == after
         assert type(ls.map(cell.outer, a=3.0)) is type(first)
@@ -156,16 +167,40 @@ def test_a_cell_of_a_notebook_that_runs_again():
         del sys.modules["notebook"]
 
 
+class Before(NamedTuple):
+    a: float
+
+
+class After(NamedTuple):
+    a: float
+
+
+def scaled(x):
+    return WEIGHT * x
+
+
+def image(params, x, side):
+    return params.a + scaled(x), side, 0
+
+
+def test_a_helper_of_a_registered_map_reads_its_globals_anew(monkeypatch):
+    for cls, weight in ((Before, 2.0), (After, 4.0)):
+        monkeypatch.setitem(globals(), "WEIGHT", weight)
+        assert ls.orbit(ls.register(cls, image=image)(1.0), 1.0, 0, 1).x[1] == 1.0 + weight
+
+
 SCRIPT = """
 import pickle, sys
 import limitsets as ls
 from numba.core import event
 import mine, other
+if edit := sys.argv[2:]:
+    open("helpers.py", "w").write(edit[0])
 with event.install_recorder("numba:compile") as recorder:
     params = ls.map(mine.grown, a=2.0)
     print(float(ls.orbit(params, 1.0, 0, 1).x[1]), float(ls.orbit(ls.map(other.grown, a=2.0), 1.0, 0, 1).x[1]))
 print(len(recorder.buffer))
-print(pickle.loads(bytes.fromhex(sys.argv[1])) if sys.argv[1:] else pickle.dumps(params).hex())
+print(pickle.loads(bytes.fromhex(sys.argv[1])) if sys.argv[1:2] else pickle.dumps(params).hex())
 """
 MINE = "import helpers\ndef grown(x, a):\n    return helpers.push(a * x)\n"
 
@@ -187,9 +222,13 @@ def test_an_edited_helper_never_gives_an_old_number(tmp_path):
     numbers, count, pickled = run()
     assert (numbers, count > 0) == ([3.0, -3.0], True)
     assert run(pickled) == ([3.0, -3.0], 0, "grown(a=2.0)")
-    (tmp_path / "helpers.py").write_text("def push(x):\n    return x + 2.0\n")
+    push = "def push(x):\n    return x + {}\n"
+    (tmp_path / "helpers.py").write_text(push.format(2.0))
     numbers, count, _ = run()
     assert (numbers, count > 0) == ([4.0, -3.0], True)
+    # edited between import and use: what is kept under the new text is never the old code
+    assert run(pickled, push.format(3.0))[0] == [4.0, -3.0]
+    assert run()[0] == [5.0, -3.0]
 
 
 def test_an_atlas_knows_the_file_of_the_functions():
@@ -212,6 +251,10 @@ def nested():
 
 def two_defaults(x, slope=2.0):
     return slope * x
+
+
+def worded(x, mode="fast"):
+    return x
 
 
 def late(x, a, y):
@@ -307,6 +350,7 @@ REFUSED = {
         lambda: ls.map(pieces=(left, two_defaults), margin=beyond),
         "the default of slope in two_defaults is 2.0; allowed: 1.8",
     ),
+    "a default that is no number": (lambda: ls.map(worded), "the value of mode is 'fast'"),
 }
 
 

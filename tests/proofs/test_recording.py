@@ -243,7 +243,8 @@ TEXTS = {
     "max(x0 + a, atan2(x0, 2))": [X, P, ["add", 0, 1], ["c", "2"], ["atan2", 0, 3], ["max", 2, 4]],
 }
 TEXTS |= {
-    f"p.{name} + x0": [["p", name], X, ["add", 0, 1]] for name in ("x1", "t2", "exp", "margin", "pi", "p.a")
+    f"p.{name} + x0": [["p", name], X, ["add", 0, 1]]
+    for name in ("x", "x1", "t2", "exp", "margin", "pi", "p.a")
 }
 
 

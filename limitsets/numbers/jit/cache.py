@@ -113,18 +113,18 @@ def _reached(function: Callable[..., Any], seen: dict[str, bytes], named: set[ty
     function = getattr(function, "py_func", function)
     if not isinstance(function, python_types.FunctionType):
         raise _UnknownSourceError
-    module = function.__module__ or ""
-    if module.split(".")[0] in COMPILED:
+    if is_known(function):
         return
     if hasattr(function, "methods"):  # a generic function: more methods may come
         raise _UnknownSourceError
     file = inspect.getsourcefile(function)
-    mark = f"{module}.{function.__qualname__}"
+    mark = f"{function.__module__}.{function.__qualname__}"
     if file is None or not Path(file).is_file():
         raise _UnknownSourceError
     if mark in seen:
         return
-    seen[mark] = Path(file).read_bytes()
+    # the code too: the file may have been edited since it was imported
+    seen[mark] = Path(file).read_bytes() + _code_of(function)
     names = names_in(function)
     scope = {name: function.__globals__[name] for name in names if name in function.__globals__}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
@@ -135,13 +135,29 @@ def _reached(function: Callable[..., Any], seen: dict[str, bytes], named: set[ty
 
 def names_in(function: Callable[..., Any]) -> set[str]:
     """Global names and attributes that a function names."""
-    names: set[str] = set()
+    return {name for code in _codes_in(function) for name in code.co_names}
+
+
+def _codes_in(function: Callable[..., Any]) -> list[python_types.CodeType]:
+    """Code of a function and of those defined in it."""
     codes = [function.__code__]
-    while codes:
-        code = codes.pop()
-        names.update(code.co_names)
+    for code in codes:  # which grows meanwhile
         codes.extend(const for const in code.co_consts if isinstance(const, python_types.CodeType))
-    return names
+    return codes
+
+
+def _code_of(function: Callable[..., Any]) -> bytes:
+    """Write down what a function does, apart from the values of its globals."""
+    return repr(
+        [
+            (
+                code.co_code,
+                code.co_names,
+                [v for v in code.co_consts if not isinstance(v, python_types.CodeType)],
+            )
+            for code in _codes_in(function)
+        ]
+    ).encode()
 
 
 def _reached_value(mark: str, value: Any, names: set[str], seen: dict[str, bytes], named: set[type]) -> None:
@@ -168,6 +184,42 @@ def _reached_value(mark: str, value: Any, names: set[str], seen: dict[str, bytes
         named.add(value)
     elif getattr(value, "__module__", None) != "builtins" or not callable(value):
         _reached(value, seen, named)
+
+
+def is_known(value: Any) -> bool:
+    """Whether a value is of the package, or of one that numba knows."""
+    return (getattr(value, "__module__", None) or "").split(".")[0] in COMPILED
+
+
+def meaning(value: Any, alive: list[Any], names: frozenset[str] = frozenset()) -> Any:
+    """Tell what compiled code would make of a value: equal for two values only if it is the same.
+
+    `names` are those by which the function around reads attributes; `alive` collects what is told by its place in
+    memory (functions that numba compiled, with options of their own), and functions met before, which may call
+    themselves.
+    """
+    if isinstance(value, python_types.FunctionType) and not is_known(value):
+        if any(value is each for each in alive):
+            return "again", [each is value for each in alive].index(True)
+        alive.append(value)
+        used, scope = frozenset(names_in(value)), value.__globals__
+        inside = tuple((name, meaning(scope[name], alive, used)) for name in sorted(used & scope.keys()))
+        cells = tuple(meaning(cell.cell_contents, alive, used) for cell in value.__closure__ or ())
+        defaults = value.__defaults__, tuple((value.__kwdefaults__ or {}).items())
+        return value.__code__, meaning(defaults, alive, used), inside, cells
+    if isinstance(value, python_types.ModuleType) and value.__name__.split(".")[0] not in COMPILED:
+        own = vars(value)
+        return value.__name__, tuple(
+            (name, meaning(own[name], alive, names)) for name in sorted(names & own.keys())
+        )
+    if isinstance(value, bool | int | float | complex | str | bytes | None | np.generic):
+        return type(value), repr(value)
+    if isinstance(value, np.ndarray) and value.dtype != object:
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, tuple):
+        return type(value), tuple(meaning(entry, alive, names) for entry in value)
+    alive.append(value)
+    return "at", id(value)
 
 
 def cover_foreign_class(cls: type, functions: list[Callable[..., Any]]) -> None:

@@ -15,7 +15,16 @@ from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
 
 from limitsets.base import LimitsetsError, MapError
-from limitsets.numbers.jit.cache import CACHE, COMPILED, FOREIGN, PACKAGE, classes_in, names_in
+from limitsets.numbers.jit.cache import (
+    CACHE,
+    COMPILED,
+    FOREIGN,
+    PACKAGE,
+    classes_in,
+    is_known,
+    meaning,
+    names_in,
+)
 
 # ----------------------------------------------------------------
 # How kernels are compiled: with contraction or without, with the widest vectors.
@@ -49,15 +58,16 @@ OVERLOAD = ("error_model", "fastmath")  # what an overload takes of these
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-# Plain functions that kernels from outside call, compiled: (function, whether for proofs) -> what stands in its place.
-_HELPERS: dict[tuple[Any, bool], Any] = {}
+# Plain functions that kernels from outside call: (meaning, whether for proofs) -> what is compiled in their place, and
+# what the meaning tells by its place in memory.
+_HELPERS: dict[tuple[Any, bool], tuple[Any, list[Any]]] = {}
 
 
 def _is_plain(value: Any) -> bool:
     """Whether a value is a function that numba knows nothing of."""
     if not isinstance(value, python_types.FunctionType) or hasattr(value, "methods"):
         return False
-    if (value.__module__ or "").split(".")[0] in COMPILED:
+    if is_known(value):
         return False
     cpu_target.typing_context.refresh()
     try:
@@ -97,11 +107,13 @@ def _in_scope(function: Callable[..., Any], scope: dict[str, Any]) -> Any:
 
 
 def _helper(function: Callable[..., Any], proof: bool) -> Any:
-    if (function, proof) not in _HELPERS:
+    alive: list[Any] = []
+    key = meaning(function, alive), proof
+    if key not in _HELPERS:
         scope = dict(function.__globals__)
-        _HELPERS[function, proof] = compiled(_in_scope(function, scope), PROOF if proof else ESTIMATE, False)
+        _HELPERS[key] = compiled(_in_scope(function, scope), PROOF if proof else ESTIMATE, False), alive
         scope.update(_compiled_helpers(function, proof))  # last: a helper may call itself
-    return _HELPERS[function, proof]
+    return _HELPERS[key][0]
 
 
 def with_helpers(function: Callable[..., Any], proof: bool) -> Callable[..., Any]:

@@ -50,7 +50,7 @@ NUMPY: dict[str, Callable[..., Any]] = {
 }  # fmt: skip
 
 # A parameter that could be read as something else is printed with "p." before it.
-AMBIGUOUS = re.compile(rf"[xt]\d+|{'|'.join(NUMPY)}|pow|margin|branch|side|pi|tau|p\..*")
+AMBIGUOUS = re.compile(rf"[xt]\d*|{'|'.join(NUMPY)}|pow|margin|branch|side|pi|tau|p\..*")
 
 
 # ---------------------------------------------------------------- the table

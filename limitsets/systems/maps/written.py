@@ -12,13 +12,13 @@ import inspect
 import math
 from collections import namedtuple
 from collections.abc import Callable
-from types import FunctionType, ModuleType
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 
 from limitsets.base import MapError, shown
-from limitsets.numbers.jit.cache import COMPILED, names_in
+from limitsets.numbers.jit.cache import is_known, meaning
 from limitsets.systems.maps.contract import register
 
 # Kernels of a map of one function, and of two with a margin.
@@ -94,7 +94,7 @@ def map(  # noqa: A001  # limitsets.map, as limitsets.maps
     """
     functions = _functions_of(formula, pieces, margin)
     takes = {name: tuple(_parameters_of(f)) for name, f in functions.items()}
-    values = {**_defaults_of(functions), **values}
+    values = _defaults_of(functions, values) | values
     coordinates = _coordinates_of(functions, takes, values)
     fields = tuple(dict.fromkeys(name for names in takes.values() for name in names if name in values))
     numbers = {name: _number(name, values[name]) for name in fields}
@@ -154,25 +154,26 @@ def _parameters_of(f: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     return parameters
 
 
-def _defaults_of(functions: dict[str, Callable[..., Any]]) -> dict[str, Any]:
-    """Values of parameters that the functions bring themselves."""
-    defaults: dict[str, Any] = {}
+def _defaults_of(functions: dict[str, Callable[..., Any]], values: dict[str, float]) -> dict[str, float]:
+    """Values that the functions bring themselves, of parameters to which none is given."""
+    defaults: dict[str, float] = {}
     for f in functions.values():
         for name, parameter in _parameters_of(f).items():
-            if parameter.default is parameter.empty:
+            if parameter.default is parameter.empty or name in values:
                 continue
-            if defaults.setdefault(name, parameter.default) != parameter.default:
+            value = _number(name, parameter.default)
+            if defaults.setdefault(name, value) != value:
                 raise MapError(
                     f"the default of {name} in {f.__name__}",
-                    shown(parameter.default),
-                    f"{shown(defaults[name])}, as in the function before",
-                    "give a parameter one default",
+                    value,
+                    f"{defaults[name]}, as in the function before",
+                    f"pass {name}=..., or give it one default",
                 )
     return defaults
 
 
 def _coordinates_of(
-    functions: dict[str, Callable[..., Any]], takes: dict[str, tuple[str, ...]], values: dict[str, Any]
+    functions: dict[str, Callable[..., Any]], takes: dict[str, tuple[str, ...]], values: dict[str, float]
 ) -> tuple[str, ...]:
     """Names of the coordinates: those without a value, which come first."""
     first = functions["first"].__name__
@@ -220,7 +221,7 @@ def _require_results(
     for start in TRIED:
         try:
             with np.errstate(all="ignore"):
-                result = f(*[start] * len(names), *arguments)
+                result = f(*(start + 0.25 * k for k in range(len(names))), *arguments)
             break
         except (ArithmeticError, ValueError):  # not defined there
             continue
@@ -266,7 +267,7 @@ def _class_of(
 ) -> Any:
     """Return the class of a map, registered once."""
     alive: list[Any] = []
-    key = (fields, *(_meaning(f, frozenset(), alive) for f in functions.values()))
+    key = (fields, *(meaning(f, alive) for f in functions.values()))
     if key not in _CLASSES:
         _CLASSES[key] = _registered(functions, takes, coordinates, fields), alive
     return _CLASSES[key][0]
@@ -341,46 +342,10 @@ def _with_values(self: Any, **values: float) -> Any:
     return self._replace(**{name: _number(name, value) for name, value in values.items()})
 
 
-def _of_user(f: Callable[..., Any]) -> Any:
-    """Copy a function, named after its line too: two in one file may bear one name, and what is kept goes by names."""
-    plain: Any = f
-    copy = FunctionType(plain.__code__, plain.__globals__, plain.__name__, plain.__defaults__)
-    copy.__qualname__ = f"{plain.__qualname__}:{plain.__code__.co_firstlineno}"
-    # An example in a docstring of this package is a user's too.
-    copy.__module__ = "__main__" if _is_ours(f) else plain.__module__
+def _of_user(f: Any) -> Any:
+    """Return a function as one from outside the package: an example in a docstring of ours is a user's too."""
+    if not is_known(f):
+        return f
+    copy = FunctionType(f.__code__, f.__globals__, f.__name__, f.__defaults__)
+    copy.__module__ = "__main__"
     return copy
-
-
-def _is_ours(value: Any) -> bool:
-    return (getattr(value, "__module__", None) or "").split(".")[0] in COMPILED
-
-
-def _meaning(value: Any, names: frozenset[str], alive: list[Any]) -> Any:
-    """Tell what compiled code would make of a value: equal for two values only if it is the same.
-
-    `names` are those by which the function around reads attributes; `alive` collects what is told by its place in
-    memory, and functions met before, which may call themselves.
-    """
-    value = getattr(value, "py_func", value)
-    if isinstance(value, FunctionType) and not _is_ours(value):
-        if any(value is each for each in alive):
-            return "again", [each is value for each in alive].index(True)
-        alive.append(value)
-        used, scope = frozenset(names_in(value)), value.__globals__
-        inside = tuple((name, _meaning(scope[name], used, alive)) for name in sorted(used & scope.keys()))
-        cells = tuple(_meaning(cell.cell_contents, used, alive) for cell in value.__closure__ or ())
-        defaults = value.__defaults__, tuple((value.__kwdefaults__ or {}).items())
-        return value.__code__, _meaning(defaults, used, alive), inside, cells
-    if isinstance(value, ModuleType) and value.__name__.split(".")[0] not in COMPILED:
-        own = vars(value)
-        return value.__name__, tuple(
-            (name, _meaning(own[name], names, alive)) for name in sorted(names & own.keys())
-        )
-    if isinstance(value, bool | int | float | complex | str | bytes | None | np.generic):
-        return type(value), repr(value)
-    if isinstance(value, np.ndarray) and value.dtype != object:
-        return value.dtype.str, value.shape, value.tobytes()
-    if isinstance(value, tuple):
-        return type(value), tuple(_meaning(entry, names, alive) for entry in value)
-    alive.append(value)
-    return "at", id(value)
