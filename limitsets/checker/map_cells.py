@@ -1,4 +1,4 @@
-"""The cells of a map in one to three coordinates: their arrays, their labels, and how they are shared out.
+"""The cells of a map in one to three coordinates: arrays, labels, and how they are shared among processes.
 
 docs/certificates.md, "Certificates of any map": the arrays of a box, and the two rules that labels follow.
 """
@@ -58,6 +58,11 @@ class MapCells:
         at = np.unravel_index(cells - self.start[side], tuple(self.counts[side]))
         columns = [e[k + shift] for e, k in zip(self.edges[side], at, strict=True) for shift in (0, 1)]
         return np.stack(columns, axis=1)
+
+    def boxes(self, chosen: Array, side: int) -> Array:
+        """Return the ends of the chosen cells of a side (n, axes, 2); `chosen` is by cell."""
+        own = self.start[side] + np.flatnonzero(chosen[self.start[side] : self.start[side + 1]])
+        return self.ends(own, side).reshape(len(own), len(self.edges[side]), 2)
 
     def box(self, cell: int) -> tuple[int, list[Pair]]:
         """Return side and ends of one cell."""

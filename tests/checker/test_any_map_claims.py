@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from limitsets.checker import show
+from limitsets.checker.map_cells import box_max
 from tests.checker import map_examples as known
 from tests.checker.maps_in_files import (
     Example,
@@ -226,6 +227,18 @@ def test_attracts_all_with_the_ball_of_a_cycle(tmp_path):
     assert words_of(certificate.recheck(tmp_path)) == {**dict.fromkeys(claims, "proved"), "ends-in": "failed"}
     certificate.claims()["cycles"]["cycles"][0]["radius"] = hexed(1.5)
     assert words_of(certificate.recheck(tmp_path))["attracts-all"] == "failed"
+
+
+@pytest.mark.parametrize("shape", [(40,), (13, 9), (5, 6, 7)])
+def test_the_largest_label_of_a_box_of_cells(shape):
+    generator = np.random.default_rng(len(shape))
+    table = generator.integers(-1, 1000, shape)
+    ends = np.sort([generator.integers(0, n, (2, 300)) for n in shape], axis=1)
+    first, last = ends[:, 0].T, ends[:, 1].T
+    slices = [
+        tuple(slice(a, b + 1) for a, b in zip(*box, strict=True)) for box in zip(first, last, strict=True)
+    ]
+    assert box_max(table, first, last).tolist() == [table[box].max() for box in slices]
 
 
 # ------------------------------------------------------------------------------ true or not, not proved
