@@ -80,16 +80,15 @@ def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], cre
     assert c is not None
     attracting = (c.component >= 0) & ~final
     bad = check_drawn(part, c, cycles) or c.check_labels(final)
-    if not bad and not (attracting.any() or part.drawn):
-        bad = "there are no attracting cells"
     if bad:
         return dict.fromkeys(claims, bad)
     hulls = [hull for _, k in part.drawn for hull in cycles[k].hulls]
-    failed = {}
-    if not attracting.any():
-        failed = dict.fromkeys(
-            {"invariant", "trapping", "expanding"} & set(claims), "there are no attracting cells"
-        )
+    needing = set() if attracting.any() else {"invariant", "trapping", "expanding"}
+    needing |= set() if attracting.any() or part.drawn else {"basin", "attracts-all", "ends-in"}
+    failed = dict.fromkeys(needing & set(claims), "there are no attracting cells")
+    if "escapes" in claims:
+        bad = c.check_exits()
+        failed |= {"escapes": bad} if bad else {}
     if "attracts-all" in claims:
         bad = check_everywhere(c, part.max_rank, hulls)
         failed |= {"attracts-all": bad} if bad else {}
@@ -97,7 +96,7 @@ def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], cre
         assert file.goal is not None
         bad = check_ends_in(c, attracting, hulls, file.goal)
         failed |= {"ends-in": bad} if bad else {}
-    chosen = np.flatnonzero((c.rank >= 0) & ~final)
+    chosen = np.flatnonzero(((c.rank >= 0) & ~final) | (c.exit >= 0))
     strict = attracting & ("trapping" in claims)
     failure = crew.run(list(tasks_of(c, number, chosen, strict, np.where(attracting, part.least, 0.0))))
     if failure is None:
@@ -155,7 +154,7 @@ def check_ends_in(c: MapCells, attracting: Array, hulls: Regions, goal: Goal) ->
 def check_map_file(file: MapFile, workers: int, progress: Any) -> tuple[list[Outcome], int]:
     """Check a file; what became of each box of parameters, and the number of pieces of cells."""
     with_cells = [(part.cells, final_cells(part)) for part in file.parts if part.cells is not None]
-    work = sum(int(((c.rank >= 0) & ~final).sum()) for c, final in with_cells)
+    work = sum(int((((c.rank >= 0) & ~final) | (c.exit >= 0)).sum()) for c, final in with_cells)
     advance = None if progress is None else (lambda done: progress(min(done, work), work))
     setup = file.shape, [part.parameters for part in file.parts]
     crew = Crew(setup, workers, advance, prepare=prepare_map, check=check_map_task)

@@ -185,6 +185,11 @@ def cycle_moved(c):
     moved(cycle_of(c), 3, 1e-7)
 
 
+@false(known.seven)
+def cycle_moved_back(c):
+    moved(cycle_of(c), 3, -1e-7)
+
+
 @false(known.seven, "differ")
 def cycle_listed_twice(c):
     c.claims()["cycles"]["cycles"] *= 2
