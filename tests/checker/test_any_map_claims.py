@@ -300,6 +300,17 @@ def test_components_are_compared_from_below_and_from_above(tmp_path):
         assert "lead out of its component" in report.reason
 
 
+def test_an_image_that_reaches_the_border_is_invariant_and_no_trap(tmp_path):
+    one = cells_with([0, 1], [[[0, 0]]], [0], [0])
+    for image in (lambda x, *_: x[0], lambda x, *_: 0.5 * x[0], lambda x, *_: 0.5 + 0.5 * x[0]):
+        assert small(image, one, claims={"invariant": {}}).recheck(tmp_path).verdict == "proved"
+        assert small(image, one, claims={"trapping": {}}).recheck(tmp_path).verdict == "failed"
+    assert (
+        small(lambda x, *_: 0.25 + 0.5 * x[0], one, claims={"trapping": {}}).recheck(tmp_path).verdict
+        == "proved"
+    )
+
+
 def test_a_map_without_a_fixed_point(tmp_path):
     """x' = x + x^2 + 1e-12 comes near to itself, and has none."""
     near = small(

@@ -519,6 +519,9 @@ def test_slopes_are_of_one_dimension_and_refutations_name_their_starts(tmp_path)
     margin.header["goal"]["starts"] = None
     assert "name its starts" in margin.recheck(tmp_path).reason
     margin = known.ricker().copy()
+    margin.claim("basin", box=1)
+    assert "with cycles alone" in margin.recheck(tmp_path).reason
+    margin = known.ricker().copy()
     margin.header["goal"] = None
     assert "no goal" in margin.recheck(tmp_path).reason
     cells = known.ricker().copy()
