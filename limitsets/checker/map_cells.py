@@ -89,20 +89,23 @@ class MapCells:
         """Whether a box lies in the domain."""
         return all(e[0] <= lo and hi <= e[-1] for e, (lo, hi) in zip(self.edges[side], box, strict=True))
 
-    def largest(self, labels: Array, branch: int, cells: Array) -> Array:
-        """Return the largest label among the target cells of each of some cells, -1 where all lie beyond the grid.
+    def extremes(self, labels: Array, branch: int, cells: Array) -> tuple[Array, Array]:
+        """Return the least and the largest label among the target cells of each of some cells.
 
-        The branch is possible from these cells.
+        The branch is possible from these cells.  Where all targets lie beyond the grid the two are 0 and -1, which hold
+        no label back.
         """
-        out, side = np.full(len(cells), -1, dtype=np.int64), self.side_of(cells)
+        least, most, side = np.zeros(len(cells), np.int64), np.full(len(cells), -1), self.side_of(cells)
         for s in np.unique(side).tolist():
             to, own = self.to[branch][s], np.flatnonzero(side == s)
             table = labels[self.start[to] : self.start[to + 1]].reshape(tuple(self.counts[to]))
             first, last = np.hsplit(self.target[branch][cells[own]].astype(np.int64), 2)
             first, last = np.maximum(first, 0), np.minimum(last, self.counts[to] - 1)
             met = (first <= last).all(axis=1)
-            out[own[met]] = box_max(table.astype(np.int64), first[met], last[met])
-        return out
+            whole = table.astype(np.int64)
+            least[own[met]] = -box_max(-whole, first[met], last[met])
+            most[own[met]] = box_max(whole, first[met], last[met])
+        return least, most
 
     def check_labels(self, final: Array) -> str:
         """Check the two rules by whole numbers, off the final cells; "" or the reason.
@@ -118,15 +121,12 @@ class MapCells:
             use = checked & (target[:, 0] >= 0)
             cells = np.flatnonzero(use & attracting)
             own = self.component[cells]
-            highest, lowest = (
-                self.largest(self.component, branch, cells),
-                -self.largest(-self.component, branch, cells),
-            )
+            lowest, highest = self.extremes(self.component, branch, cells)
             bad = cells[(highest != own) | (lowest != own)]
             if len(bad):
                 return f"{self.name(int(bad[0]))}: branch {branch} may lead out of its component"
             cells = np.flatnonzero(use & ~attracting)
-            highest, lowest = self.largest(self.rank, branch, cells), -self.largest(-self.rank, branch, cells)
+            lowest, highest = self.extremes(self.rank, branch, cells)
             bad = cells[(lowest < 0) | (highest >= self.rank[cells])]
             if len(bad):
                 return f"{self.name(int(bad[0]))}: the rank does not fall along branch {branch}"
@@ -138,10 +138,7 @@ class MapCells:
             return "no cell has an exit"
         for branch, target in enumerate(self.target):
             cells = np.flatnonzero((self.exit >= 0) & (target[:, 0] > -2))
-            highest, lowest = (
-                self.largest(self.exit, branch, cells),
-                -self.largest(-self.exit, branch, cells),
-            )
+            lowest, highest = self.extremes(self.exit, branch, cells)
             bad = cells[(lowest < 0) | (highest >= self.exit[cells])]
             if len(bad):
                 return f"{self.name(int(bad[0]))}: the exit does not fall along branch {branch}"
@@ -184,9 +181,7 @@ class MapTask(NamedTuple):
     side: int
     cells: Array
     ends: Array  # (n, 2 d)
-    targets: list[
-        Array
-    ]  # by branch (n, 2 d): the ends of the target cells, nan where the branch is impossible
+    targets: list[Array]  # by branch (n, 2 d): their ends, nan where the branch is impossible
     strict: list[Array]  # by branch: whether the image has to lie strictly inside
     least: Array  # the size that the slope has to have, 0 where none is claimed
 

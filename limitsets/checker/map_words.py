@@ -135,18 +135,16 @@ class Proved:
 
     def leaving(self) -> str:
         """Say from which starts orbits leave the domain."""
-        share, steps = (
-            share_in_words(self.cells, self.shape, self.cells.exit >= 0),
-            int(self.cells.exit.max()) + 1,
-        )
+        share = share_in_words(self.cells, self.shape, self.cells.exit >= 0)
+        steps = int(self.cells.exit.max()) + 1
         return f"every start in cells that cover {share} leaves it within {steps} step{'' if steps == 1 else 's'}"
 
 
 SENTENCES: dict[str, Callable[[Proved], str]] = {
     "cycles": Proved.cycle_list,
     "converges": Proved.converging,
-    "invariant": lambda proved: f"mapped into itself: {proved.components()}",
-    "trapping": lambda proved: f"mapped into its interior: {proved.components()}",
+    "invariant": lambda proved: f"each component is mapped into itself: {proved.components()}",
+    "trapping": lambda proved: f"each component is mapped into its interior: {proved.components()}",
     "basin": Proved.covered,
     "attracts-all": lambda proved: (
         f"every start in the domain, which no orbit leaves, {proved.comes(proved.part.max_rank)}"
@@ -176,9 +174,8 @@ def component_in_words(c: MapCells, component: int) -> str:
 
 def share_in_words(c: MapCells, shape: Shape, chosen: Array) -> str:
     """Write the share of the domain that lies in the chosen cells, rounded down."""
-    domain = (
-        box_in_words([(float(e[0]), float(e[-1])) for e in c.edges[0]]) if shape.sides == 1 else "the domain"
-    )
+    first = [(float(e[0]), float(e[-1])) for e in c.edges[0]]
+    domain = box_in_words(first) if shape.sides == 1 else "the domain"
     if chosen.all():
         return f"all of {domain}"
     held = whole = 0.0

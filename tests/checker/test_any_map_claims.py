@@ -77,7 +77,12 @@ def test_henon(tmp_path):
 
 
 def test_leslie_has_two_blocks(tmp_path):
-    assert [text.count("component") for text in known.two_ages().recheck(tmp_path).statement] == [2, 0]
+    trapping, basin = known.two_ages().recheck(tmp_path).statement
+    assert (
+        trapping.count("component 1 (165 cells"),
+        trapping.count("component 2"),
+        basin.count("component"),
+    ) == (1, 1, 0)
 
 
 def test_sentences_say_for_which_parameters(tmp_path, capsys):
@@ -309,6 +314,13 @@ def test_an_image_that_reaches_the_border_is_invariant_and_no_trap(tmp_path):
         small(lambda x, *_: 0.25 + 0.5 * x[0], one, claims={"trapping": {}}).recheck(tmp_path).verdict
         == "proved"
     )
+
+
+def test_a_fixed_point_at_the_end_of_the_domain_of_a_formula(tmp_path):
+    """sqrt(x) has no slope at 0, and floor(x) + x / 2 jumps there."""
+    claims = {"cycles": {"cycles": [cycle([0.0], width=1e-3)]}}
+    for image in (lambda x, *_: np.sqrt(x[0]), lambda x, *_: np.floor(x[0]) + 0.5 * x[0]):
+        assert "singular" in small(image, None, claims=claims).recheck(tmp_path).reason
 
 
 def test_a_map_without_a_fixed_point(tmp_path):
