@@ -116,7 +116,7 @@ class Map:
 
 
 def floats_around(x: Arb) -> Pair:
-    """Return a float below a ball and one above it."""
+    """Return a float below a ball and one above it: a conversion is off by less than the step to the next float."""
     return math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
 
 

@@ -50,9 +50,8 @@ def show_map(report: Report, of: dict[str, Any], *, whole: bool) -> None:
     print("\n".join(lines))
     for k, box in enumerate(of["boxes"]):
         title = [f"box {k} of parameters"] if len(of["boxes"]) > 1 else []
-        said = [f"{name}: {WORDS[word]} - {text}" for name, word, text in box["claims"]] or [
-            "nothing is claimed"
-        ]
+        said = [f"{name}: {WORDS[word]} - {text}" for name, word, text in box["claims"]]
+        said = said or ["nothing is claimed"]
         print("\n".join([*title, *box["parameters"], *filter(None, [box["holds_for"]]), *said]))
     print(f"relying on: {'; '.join(report.relied_on)}")
     print(f"{counted(report.cells, 'cell')}, {report.seconds:.1f} s")

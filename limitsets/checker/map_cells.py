@@ -1,4 +1,4 @@
-"""The cells of a map in one to three coordinates: their arrays, their labels, and how they are shared out.
+"""The cells of a map in one to three coordinates: arrays, labels, and how they are shared among processes.
 
 docs/certificates.md, "Certificates of any map": the arrays of a box, and the two rules that labels follow.
 """
@@ -22,9 +22,12 @@ MOST_CELLS = 2**31
 
 
 class MapCells:
-    """The arrays of one box of parameters; cells of all sides one after another, the last axis fastest."""
+    """The arrays of one box of parameters; cells of all sides one after another, the last axis fastest.
 
-    def __init__(self, arrays: Arrays, prefix: str, shape: Shape):
+    `exits`: whether there are cells from which orbits leave the domain.
+    """
+
+    def __init__(self, arrays: Arrays, prefix: str, shape: Shape, *, exits: bool):
         sides, d = range(shape.sides), shape.dimension
         self.edges = [[arrays.read(f"{prefix}edges.{s}.{a}", "<f8") for a in range(d)] for s in sides]
         ascending = all(len(e) > 1 and bool((e[1:] > e[:-1]).all()) for axes in self.edges for e in axes)
@@ -34,20 +37,27 @@ class MapCells:
         require(sum(sizes) <= MOST_CELLS, "there are more than 2^31 cells")
         self.target = [arrays.read(f"{prefix}target.{b}", "<i4", 2 * d) for b in range(shape.branches)]
         self.rank, self.component = (arrays.read(prefix + name, "<i4") for name in ("rank", "component"))
-        alike = all(len(one) == sum(sizes) for one in (*self.target, self.rank, self.component))
+        # without a claim of it no array of the file is read, and no cell has an exit
+        self.exit = arrays.read(f"{prefix}exit", "<i4") if exits else np.minimum(self.rank, -1)
+        labels = (self.rank, self.component, self.exit)
+        alike = all(len(one) == sum(sizes) for one in (*self.target, *labels))
         require(alike, "the arrays do not have one row for each cell")
-        labelled = bool((self.rank >= -1).all() and (self.component >= -1).all())
-        require(labelled, "a rank or a component is below -1")
+        require(all(bool((one >= -1).all()) for one in labels), "a rank, a component or an exit is below -1")
         self.counts = np.array(counts, dtype=np.int64)
         self.start = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)  # the first cell of each side
         self.to = [[shape.to[s, b] for s in sides] for b in range(shape.branches)]
+        self.require_targets()
+
+    def require_targets(self) -> None:
+        """Require that targets are cells; from cells with an exit they may lie beyond the grid too, as -1 and n."""
+        beyond = ((self.exit >= 0) & (self.rank < 0)).astype(np.int64)
         for b, target in enumerate(self.target):
-            for s in sides:
-                own = target[self.start[s] : self.start[s + 1]]
-                first, last = own[:, :d], own[:, d:]
-                inside = (first >= 0) & (first <= last) & (last < self.counts[self.to[b][s]])
-                fits = bool((inside.all(axis=1) | (own == -2).all(axis=1)).all())
-                require(fits, f"side {s}, branch {b}: target cells are out of range")
+            for s, to in enumerate(self.to[b]):
+                cells = slice(int(self.start[s]), int(self.start[s + 1]))
+                (first, last), far = np.hsplit(target[cells], 2), beyond[cells, None]
+                fits = (first >= -far) & (first <= last) & (last < self.counts[to] + far)
+                sound = bool((fits.all(axis=1) | (target[cells] == -2).all(axis=1)).all())
+                require(sound, f"side {s}, branch {b}: target cells are out of range")
 
     def side_of(self, cells: Array) -> Array:
         """Return the side of each of some cells."""
@@ -58,6 +68,11 @@ class MapCells:
         at = np.unravel_index(cells - self.start[side], tuple(self.counts[side]))
         columns = [e[k + shift] for e, k in zip(self.edges[side], at, strict=True) for shift in (0, 1)]
         return np.stack(columns, axis=1)
+
+    def boxes(self, chosen: Array, side: int) -> Array:
+        """Return the ends of the chosen cells of a side (n, axes, 2); `chosen` is by cell."""
+        own = self.start[side] + np.flatnonzero(chosen[self.start[side] : self.start[side + 1]])
+        return self.ends(own, side).reshape(len(own), len(self.edges[side]), 2)
 
     def box(self, cell: int) -> tuple[int, list[Pair]]:
         """Return side and ends of one cell."""
@@ -74,16 +89,23 @@ class MapCells:
         """Whether a box lies in the domain."""
         return all(e[0] <= lo and hi <= e[-1] for e, (lo, hi) in zip(self.edges[side], box, strict=True))
 
-    def largest(self, labels: Array, branch: int, cells: Array) -> Array:
-        """Return the largest label among the target cells of each of some cells; the branch is possible there."""
-        d, out = self.counts.shape[1], np.zeros(len(cells), dtype=np.int64)
-        side = self.side_of(cells)
+    def extremes(self, labels: Array, branch: int, cells: Array) -> tuple[Array, Array]:
+        """Return the least and the largest label among the target cells of each of some cells.
+
+        The branch is possible from these cells.  Where all targets lie beyond the grid the two are 0 and -1, which hold
+        no label back.
+        """
+        least, most, side = np.zeros(len(cells), np.int64), np.full(len(cells), -1), self.side_of(cells)
         for s in np.unique(side).tolist():
-            to, own = self.to[branch][s], side == s
+            to, own = self.to[branch][s], np.flatnonzero(side == s)
             table = labels[self.start[to] : self.start[to + 1]].reshape(tuple(self.counts[to]))
-            target = self.target[branch][cells[own]].astype(np.int64)
-            out[own] = box_max(table.astype(np.int64), target[:, :d], target[:, d:])
-        return out
+            first, last = np.hsplit(self.target[branch][cells[own]].astype(np.int64), 2)
+            first, last = np.maximum(first, 0), np.minimum(last, self.counts[to] - 1)
+            met = (first <= last).all(axis=1)
+            whole = table.astype(np.int64)
+            least[own[met]] = -box_max(-whole, first[met], last[met])
+            most[own[met]] = box_max(whole, first[met], last[met])
+        return least, most
 
     def check_labels(self, final: Array) -> str:
         """Check the two rules by whole numbers, off the final cells; "" or the reason.
@@ -99,18 +121,27 @@ class MapCells:
             use = checked & (target[:, 0] >= 0)
             cells = np.flatnonzero(use & attracting)
             own = self.component[cells]
-            highest, lowest = (
-                self.largest(self.component, branch, cells),
-                -self.largest(-self.component, branch, cells),
-            )
+            lowest, highest = self.extremes(self.component, branch, cells)
             bad = cells[(highest != own) | (lowest != own)]
             if len(bad):
                 return f"{self.name(int(bad[0]))}: branch {branch} may lead out of its component"
             cells = np.flatnonzero(use & ~attracting)
-            highest, lowest = self.largest(self.rank, branch, cells), -self.largest(-self.rank, branch, cells)
+            lowest, highest = self.extremes(self.rank, branch, cells)
             bad = cells[(lowest < 0) | (highest >= self.rank[cells])]
             if len(bad):
                 return f"{self.name(int(bad[0]))}: the rank does not fall along branch {branch}"
+        return ""
+
+    def check_exits(self) -> str:
+        """Check that the exit falls along every target inside the domain; "" or the reason."""
+        if not (self.exit >= 0).any():
+            return "no cell has an exit"
+        for branch, target in enumerate(self.target):
+            cells = np.flatnonzero((self.exit >= 0) & (target[:, 0] > -2))
+            lowest, highest = self.extremes(self.exit, branch, cells)
+            bad = cells[(lowest < 0) | (highest >= self.exit[cells])]
+            if len(bad):
+                return f"{self.name(int(bad[0]))}: the exit does not fall along branch {branch}"
         return ""
 
 
@@ -150,30 +181,38 @@ class MapTask(NamedTuple):
     side: int
     cells: Array
     ends: Array  # (n, 2 d)
-    targets: list[
-        Array
-    ]  # by branch (n, 2 d): the ends of the target cells, nan where the branch is impossible
-    strict: Array  # whether the image has to lie strictly inside
+    targets: list[Array]  # by branch (n, 2 d): their ends, nan where the branch is impossible
+    strict: list[Array]  # by branch: whether the image has to lie strictly inside
     least: Array  # the size that the slope has to have, 0 where none is claimed
 
 
 def tasks_of(c: MapCells, box: int, chosen: Array, strict: Array, least: Array) -> Iterator[MapTask]:
     """Cut the chosen cells, which ascend, into tasks of one side each; `strict` and `least` are by cell of the box."""
-    d, side = c.counts.shape[1], c.side_of(chosen)
+    side = c.side_of(chosen)
     for s in np.unique(side).tolist():
         own = chosen[side == s]
         for part in np.array_split(own, max(1, -(-len(own) // CHUNK))):
-            targets = []
-            for branch, target in enumerate(c.target):
-                rows, to = target[part], c.edges[c.to[branch][s]]
-                ends = np.full((len(part), 2 * d), math.nan)
-                use = rows[:, 0] >= 0
-                for a, e in enumerate(to):
-                    ends[use, 2 * a], ends[use, 2 * a + 1] = e[rows[use, a]], e[rows[use, d + a] + 1]
-                targets.append(ends)
-            yield MapTask(
-                box, s, part, c.ends(part, s), targets=targets, strict=strict[part], least=least[part]
-            )
+            both = [ends_of_targets(c.edges[c.to[b][s]], target[part]) for b, target in enumerate(c.target)]
+            targets, alone = [ends for ends, _ in both], [strict[part] | beyond for _, beyond in both]
+            yield MapTask(box, s, part, c.ends(part, s), targets=targets, strict=alone, least=least[part])
+
+
+def ends_of_targets(edges: list[Array], rows: Array) -> tuple[Array, Array]:
+    """Return the ends of target cells, nan where the branch is impossible; and whether an image is beyond the grid.
+
+    It is where along an axis all targets are; then it has to be so strictly, since the last edge belongs to the domain,
+    and the other axes do not matter.  Where a part of them is beyond the grid there is no end.
+    """
+    (first, last), n = np.hsplit(rows, 2), np.array([len(e) - 1 for e in edges])
+    alone = (last == -1) | (first == n)
+    beyond = alone.any(axis=1)
+    free = beyond[:, None] & ~alone
+    lower = np.stack([e[np.maximum(k, 0)] for e, k in zip(edges, first.T, strict=True)], axis=1)
+    upper = np.stack([e[np.clip(k + 1, 0, len(e) - 1)] for e, k in zip(edges, last.T, strict=True)], axis=1)
+    lower[free | (first < 0)], upper[free | (last == n)] = -math.inf, math.inf
+    ends = np.stack([lower, upper], axis=2).reshape(len(rows), -1)
+    ends[rows[:, 0] == -2] = math.nan
+    return ends, beyond
 
 
 # Balls cannot be sent to another process: each keeps the texts of all boxes, and the map of the box that it is at.
@@ -195,8 +234,9 @@ def check_map_task(task: MapTask) -> tuple[int, Failure | None, int]:
         MAPS[task.box] = Map(SETUP[0], SETUP[1][task.box])
     total = 0
     for i, cell in enumerate(task.cells.tolist()):
-        ends, strict, least = task.ends[i].tolist(), bool(task.strict[i]), float(task.least[i])
-        bounds = [bounds_of(target[i].tolist(), strict) for target in task.targets]
+        ends, least = task.ends[i].tolist(), float(task.least[i])
+        pairs = zip(task.targets, task.strict, strict=True)
+        bounds = [bounds_of(target[i].tolist(), bool(strict[i])) for target, strict in pairs]
         box = list(zip(ends[::2], ends[1::2], strict=True))
         claimed = Claimed(task.side, box, bounds, arb(least) if least > 0 else None)
         failure, pieces = check_cell(MAPS[task.box], claimed)

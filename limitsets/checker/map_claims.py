@@ -9,17 +9,12 @@ from typing import Any
 import numpy as np
 
 from .any_map import Map
-from .balls import Array, Pair
+from .balls import Array
 from .cells import Crew
 from .map_cells import MapCells, check_map_task, prepare_map, tasks_of
 from .map_cycles import Cycle
 from .map_file import Goal, MapFile, Part, Regions
 from .map_words import Outcome, box_in_words, outcome_of
-
-
-def within(box: list[Pair], other: list[Pair]) -> bool:
-    """Whether a box lies in another, closed one."""
-    return all(b <= lo and hi <= e for (lo, hi), (b, e) in zip(box, other, strict=True))
 
 
 def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[dict[str, str], list[Cycle]]:
@@ -81,34 +76,38 @@ def check_refuted(cycles: list[Cycle], goal: Goal) -> str:
 
 def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], crew: Crew) -> dict[str, str]:
     """Check the claims about cells: first by whole numbers, then the images; those that fail with the reasons."""
-    c, claims = part.cells, [name for name in part.claims if name not in ("cycles", "refuted")]
+    c, claims, final = part.cells, [name for name in part.claims if name != "cycles"], final_cells(part)
     assert c is not None
-    final = np.isin(c.component, [component for component, _ in part.drawn])
     attracting = (c.component >= 0) & ~final
     bad = check_drawn(part, c, cycles) or c.check_labels(final)
-    if not bad and not (attracting.any() or part.drawn):
-        bad = "there are no attracting cells"
     if bad:
         return dict.fromkeys(claims, bad)
     hulls = [hull for _, k in part.drawn for hull in cycles[k].hulls]
-    failed = {}
-    if not attracting.any():
-        failed = dict.fromkeys(
-            {"invariant", "trapping", "expanding"} & set(claims), "there are no attracting cells"
-        )
+    needing = set() if attracting.any() else {"invariant", "trapping", "expanding"}
+    needing |= set() if attracting.any() or part.drawn else {"basin", "attracts-all", "ends-in"}
+    failed = dict.fromkeys(needing & set(claims), "there are no attracting cells")
+    if "escapes" in claims:
+        bad = c.check_exits()
+        failed |= {"escapes": bad} if bad else {}
     if "attracts-all" in claims:
         bad = check_everywhere(c, part.max_rank, hulls)
         failed |= {"attracts-all": bad} if bad else {}
     if "ends-in" in claims:
         assert file.goal is not None
-        bad = check_ends_in(c, np.flatnonzero(attracting), hulls, file.goal)
+        bad = check_ends_in(c, attracting, hulls, file.goal)
         failed |= {"ends-in": bad} if bad else {}
-    chosen = np.flatnonzero((c.rank >= 0) & ~final)
+    chosen = np.flatnonzero(((c.rank >= 0) & ~final) | (c.exit >= 0))
     strict = attracting & ("trapping" in claims)
     failure = crew.run(list(tasks_of(c, number, chosen, strict, np.where(attracting, part.least, 0.0))))
     if failure is None:
         return failed
     return dict.fromkeys(claims, f"{c.name(failure[0])}: {failure[1].text}") | failed
+
+
+def final_cells(part: Part) -> Array:
+    """Find the cells whose orbits are known from there on: `converges` names their component."""
+    assert part.cells is not None
+    return np.isin(part.cells.component, [component for component, _ in part.drawn])
 
 
 def check_drawn(part: Part, c: MapCells, cycles: list[Cycle]) -> str:
@@ -133,24 +132,29 @@ def check_everywhere(c: MapCells, max_rank: int, hulls: Regions) -> str:
 
 def check_ends_in(c: MapCells, attracting: Array, hulls: Regions, goal: Goal) -> str:
     """Check that attracting cells and balls lie in the goal's ends, and its starts in cells with a rank."""
-    for side, box in [*map(c.box, attracting.tolist()), *hulls]:
-        if not any(s == side and within(box, end) for s, end in goal.ends):
-            return f"side {side}, {box_in_words(box)}: it does not lie in one of the ends of the goal"
+    for side in range(len(c.edges)):
+        own = [np.array(box) for s, box in goal.ends if s == side]
+        balls = [np.array([box]) for s, box in hulls if s == side]
+        for boxes in (c.boxes(attracting, side), *balls):
+            held = np.zeros(len(boxes), dtype=bool)
+            for end in own:
+                held |= ((end[:, 0] <= boxes[:, :, 0]) & (boxes[:, :, 1] <= end[:, 1])).all(axis=1)
+            if not held.all():
+                outside = box_in_words(boxes[int(np.argmin(held))].tolist())
+                return f"side {side}, {outside}: it does not lie in one of the ends of the goal"
     for side, start in goal.starts or []:
         if not c.in_domain(side, start):
             return "a start of the goal lies outside the domain"
-    for cell in np.flatnonzero(c.rank < 0).tolist() if goal.starts else []:
-        side, box = c.box(cell)
-        for s, start in goal.starts or []:
-            if s == side and all(lo < e and hi > b for (lo, hi), (b, e) in zip(box, start, strict=True)):
-                return f"{c.name(cell)}: it holds starts of the goal, and has no rank"
+        boxes, (lo, hi) = c.boxes(c.rank < 0, side), np.array(start).T
+        if ((boxes[:, :, 0] < hi) & (boxes[:, :, 1] > lo)).all(axis=1).any():
+            return f"side {side}, {box_in_words(start)}: starts of the goal lie in cells that have no rank"
     return ""
 
 
 def check_map_file(file: MapFile, workers: int, progress: Any) -> tuple[list[Outcome], int]:
     """Check a file; what became of each box of parameters, and the number of pieces of cells."""
-    cells = [part.cells for part in file.parts if part.cells is not None]
-    work = sum(int((c.rank >= 0).sum()) for c in cells)
+    with_cells = [(part.cells, final_cells(part)) for part in file.parts if part.cells is not None]
+    work = sum(int((((c.rank >= 0) & ~final) | (c.exit >= 0)).sum()) for c, final in with_cells)
     advance = None if progress is None else (lambda done: progress(min(done, work), work))
     setup = file.shape, [part.parameters for part in file.parts]
     crew = Crew(setup, workers, advance, prepare=prepare_map, check=check_map_task)

@@ -22,6 +22,7 @@ CLAIMS = {  # the claims that are known, and the keys of their sections
     "attracts-all": "max_rank",
     "ends-in": "",
     "expanding": "least",
+    "escapes": "",
     "refuted": "",
 }
 OF_ORBITS = ("cycles", "converges", "refuted")  # the others are about cells; these hold for fixed parameters
@@ -116,7 +117,8 @@ def read_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: Arra
         )
     cycles = read_cycles(known["cycles"]["cycles"], shape, where) if "cycles" in known else []
     drawn = read_drawn(known["converges"], cycles, where) if "converges" in known else []
-    cells = MapCells(arrays, box["prefix"], shape) if set(known) - {"cycles", "refuted"} else None
+    about_cells, exits = set(known) - {"cycles", "refuted"}, "escapes" in known
+    cells = MapCells(arrays, box["prefix"], shape, exits=exits) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS]
     numbers = read_numbers(known, shape, where)
     return Part(parameters, known, unknown, cycles, drawn=drawn, **numbers, cells=cells)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .any_map import Shape, parameter_in_words
-from .balls import Pair
+from .balls import Array, Pair
 from .claims import entropy_of
 from .file import plain
 from .map_cells import MapCells
@@ -130,21 +130,28 @@ class Proved:
 
     def covered(self) -> str:
         """Say from which starts orbits come into the attracting cells."""
-        share = share_in_words(self.cells, self.shape)
+        share = share_in_words(self.cells, self.shape, self.cells.rank >= 0)
         return f"every start in cells that cover {share} {self.comes(int(self.cells.rank.max(initial=0)))}"
+
+    def leaving(self) -> str:
+        """Say from which starts orbits leave the domain."""
+        share = share_in_words(self.cells, self.shape, self.cells.exit >= 0)
+        steps = int(self.cells.exit.max()) + 1
+        return f"every start in cells that cover {share} leaves it within {steps} step{'' if steps == 1 else 's'}"
 
 
 SENTENCES: dict[str, Callable[[Proved], str]] = {
     "cycles": Proved.cycle_list,
     "converges": Proved.converging,
-    "invariant": lambda proved: f"mapped into itself: {proved.components()}",
-    "trapping": lambda proved: f"mapped into its interior: {proved.components()}",
+    "invariant": lambda proved: f"each component is mapped into itself: {proved.components()}",
+    "trapping": lambda proved: f"each component is mapped into its interior: {proved.components()}",
     "basin": Proved.covered,
     "attracts-all": lambda proved: (
         f"every start in the domain, which no orbit leaves, {proved.comes(proved.part.max_rank)}"
     ),
     "ends-in": Proved.of_goal,
     "expanding": Proved.growth,
+    "escapes": Proved.leaving,
     "refuted": lambda proved: (
         f"an open set of starts, around a point of a cycle, violates: {proved.of_goal()}"
     ),
@@ -165,12 +172,11 @@ def component_in_words(c: MapCells, component: int) -> str:
     return f"component {component} ({len(cells)} cells in {where}{elsewhere})"
 
 
-def share_in_words(c: MapCells, shape: Shape) -> str:
-    """Write the share of the domain that lies in cells with a rank, rounded down."""
-    domain = (
-        box_in_words([(float(e[0]), float(e[-1])) for e in c.edges[0]]) if shape.sides == 1 else "the domain"
-    )
-    if bool((c.rank >= 0).all()):
+def share_in_words(c: MapCells, shape: Shape, chosen: Array) -> str:
+    """Write the share of the domain that lies in the chosen cells, rounded down."""
+    first = [(float(e[0]), float(e[-1])) for e in c.edges[0]]
+    domain = box_in_words(first) if shape.sides == 1 else "the domain"
+    if chosen.all():
         return f"all of {domain}"
     held = whole = 0.0
     with np.errstate(all="ignore"):
@@ -178,7 +184,7 @@ def share_in_words(c: MapCells, shape: Shape) -> str:
             volume = np.diff(axes[0])
             for e in axes[1:]:
                 volume = np.multiply.outer(volume, np.diff(e))
-            own = c.rank[c.start[side] : c.start[side + 1]].reshape(volume.shape) >= 0
+            own = chosen[c.start[side] : c.start[side + 1]].reshape(volume.shape)
             held, whole = held + float(volume[own].sum()), whole + float(volume.sum())
     # sums of at most 2^31 terms are right to 1e-6; where they leave the range of doubles nothing is said
     fits = 1e-290 < whole < math.inf

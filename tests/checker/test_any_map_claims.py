@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from limitsets.checker import show
+from limitsets.checker.map_cells import box_max
 from tests.checker import map_examples as known
 from tests.checker.maps_in_files import (
     Example,
@@ -76,7 +77,12 @@ def test_henon(tmp_path):
 
 
 def test_leslie_has_two_blocks(tmp_path):
-    assert [text.count("component") for text in known.two_ages().recheck(tmp_path).statement] == [2, 0]
+    trapping, basin = known.two_ages().recheck(tmp_path).statement
+    assert (
+        trapping.count("component 1 (165 cells"),
+        trapping.count("component 2"),
+        basin.count("component"),
+    ) == (1, 1, 0)
 
 
 def test_sentences_say_for_which_parameters(tmp_path, capsys):
@@ -226,6 +232,117 @@ def test_attracts_all_with_the_ball_of_a_cycle(tmp_path):
     assert words_of(certificate.recheck(tmp_path)) == {**dict.fromkeys(claims, "proved"), "ends-in": "failed"}
     certificate.claims()["cycles"]["cycles"][0]["radius"] = hexed(1.5)
     assert words_of(certificate.recheck(tmp_path))["attracts-all"] == "failed"
+
+
+def fourfold(image=lambda x, *_: 4.0 * x[0]):
+    """x' = 4 x on [-1, 1]: every start leaves, but those near 0, within two steps; -1/4 -> -1 is still inside."""
+    low = [[-1, -1], [-1, -1], [-1, 0], [-2, -2]]
+    targets = [[*low, [-2, -2], [7, 8], [8, 8], [8, 8]]]
+    cells = cells_with(np.linspace(-1, 1, 9), targets, rank=[-1] * 8, component=[-1] * 8)
+    cells["exit"] = np.array([0, 0, 1, -1, -1, 1, 0, 0], np.int32)
+    return small(image, cells, claims={"escapes": {}})
+
+
+def test_orbits_that_leave_the_domain(tmp_path):
+    report = fourfold().recheck(tmp_path)
+    assert report.verdict == "proved"
+    words = "every start in cells that cover 74.9 % of [-1.0, 1.0] leaves it within 2 steps"
+    assert report.statement == [f"escapes: {words}"]
+
+
+def put_exit(certificate, cell, **changed):
+    for name, value in changed.items():
+        certificate.arrays[f"0.{name.replace('target', 'target.0')}"][cell] = value
+    return certificate
+
+
+@pytest.mark.parametrize(
+    ("forge", "verdict", "why"),
+    [
+        (lambda: put_exit(fourfold(), 2, exit=0), "failed", "exit does not fall"),
+        (
+            lambda: put_exit(fourfold(), 2, exit=0, target=-1),
+            "failed",
+            "image on branch 0",
+        ),  # -1 is in the domain
+        (lambda: put_exit(fourfold(), 5, exit=0, target=8), "failed", "image on branch 0"),
+        (lambda: put_exit(fourfold(), 3, exit=2, target=[-1, 3]), "failed", "exit does not fall"),
+        (lambda: put_exit(fourfold(), 3, exit=2, target=[0, 2]), "failed", "image on branch 0"),
+        (lambda: put_exit(fourfold(), 0, exit=1, target=[3, 3]), "failed", "exit does not fall"),
+        (lambda: put_exit(fourfold(), slice(None), exit=-1, target=-2), "failed", "no cell has an exit"),
+        (lambda: put_exit(fourfold(), 0, exit=-1), "bad file", "out of range"),
+        (lambda: put_exit(fourfold(), 0, rank=0), "bad file", "out of range"),
+        (lambda: put_exit(fourfold(), 0, exit=-2), "bad file", "below -1"),
+        (lambda: put_exit(fourfold(), 0, target=[-2, -1]), "bad file", "out of range"),
+        (lambda: put_exit(fourfold(), 7, target=[8, 9]), "bad file", "out of range"),
+        (
+            lambda: fourfold(lambda x, *_: 4.0 * x[0] + np.log(x[0] - 0.7) * 0.0),
+            "failed",
+            "image on branch 0",
+        ),
+    ],
+)
+def test_exits_that_are_false(forge, verdict, why, tmp_path):
+    report = forge().recheck(tmp_path)
+    assert report.verdict == verdict
+    assert why in report.reason
+
+
+@pytest.mark.parametrize(("other", "verdict"), [(lambda y: 0.5 * y, "proved"), (np.log, "failed")])
+def test_who_leaves_along_one_axis_may_be_anywhere_along_another_but_somewhere(other, verdict, tmp_path):
+    cells = {f"edges.0.{a}": np.array([0.0, 1.0]) for a in (0, 1)}
+    cells |= {"target.0": np.array([[1, 0, 1, 0]], np.int32), "exit": np.zeros(1, np.int32)}
+    cells |= dict.fromkeys(("rank", "component"), np.full(1, -1, np.int32))
+    out = small(lambda x, *_: (x[0] + 2.0, other(x[1])), cells, claims={"escapes": {}}, dimension=2)
+    assert out.recheck(tmp_path).verdict == verdict
+
+
+def test_components_are_compared_from_below_and_from_above(tmp_path):
+    """Of the identity on two cells, one of which is said to lead into the other component too."""
+    for rows in ([[0, 1], [1, 1]], [[0, 0], [0, 1]]):
+        cells = cells_with([0, 1, 2], [rows], [0, 0], [0, 1])
+        report = small(lambda x, *_: x[0], cells, claims={"invariant": {}}).recheck(tmp_path)
+        assert "lead out of its component" in report.reason
+
+
+def test_an_image_that_reaches_the_border_is_invariant_and_no_trap(tmp_path):
+    one = cells_with([0, 1], [[[0, 0]]], [0], [0])
+    for image in (lambda x, *_: x[0], lambda x, *_: 0.5 * x[0], lambda x, *_: 0.5 + 0.5 * x[0]):
+        assert small(image, one, claims={"invariant": {}}).recheck(tmp_path).verdict == "proved"
+        assert small(image, one, claims={"trapping": {}}).recheck(tmp_path).verdict == "failed"
+    assert (
+        small(lambda x, *_: 0.25 + 0.5 * x[0], one, claims={"trapping": {}}).recheck(tmp_path).verdict
+        == "proved"
+    )
+
+
+def test_a_fixed_point_at_the_end_of_the_domain_of_a_formula(tmp_path):
+    """sqrt(x) has no slope at 0, and floor(x) + x / 2 jumps there."""
+    claims = {"cycles": {"cycles": [cycle([0.0], width=1e-3)]}}
+    for image in (lambda x, *_: np.sqrt(x[0]), lambda x, *_: np.floor(x[0]) + 0.5 * x[0]):
+        assert "singular" in small(image, None, claims=claims).recheck(tmp_path).reason
+
+
+def test_a_map_without_a_fixed_point(tmp_path):
+    """x' = x + x^2 + 1e-12 comes near to itself, and has none."""
+    near = small(
+        lambda x, *_: x[0] + x[0] ** 2 + 1e-12,
+        None,
+        claims={"cycles": {"cycles": [cycle([0.0], width=1e-3)]}},
+    )
+    assert near.recheck(tmp_path).verdict == "failed"
+
+
+@pytest.mark.parametrize("shape", [(40,), (13, 9), (5, 6, 7)])
+def test_the_largest_label_of_a_box_of_cells(shape):
+    generator = np.random.default_rng(len(shape))
+    table = generator.integers(-1, 1000, shape)
+    ends = np.sort([generator.integers(0, n, (2, 300)) for n in shape], axis=1)
+    first, last = ends[:, 0].T, ends[:, 1].T
+    slices = [
+        tuple(slice(a, b + 1) for a, b in zip(*box, strict=True)) for box in zip(first, last, strict=True)
+    ]
+    assert box_max(table, first, last).tolist() == [table[box].max() for box in slices]
 
 
 # ------------------------------------------------------------------------------ true or not, not proved

@@ -120,6 +120,16 @@ def rank_lowered(c):
     c.arrays["0.rank"][a_cell(c, rank=1)] = 0
 
 
+@false(known.two_ages, "rank does not fall")
+def target_without_a_rank(c):
+    """A cell of rank 1, which is a target of one of rank 2, loses its rank."""
+    rank = c.arrays["0.rank"]
+    first = c.arrays["0.target.0"][:, :2]
+    grid = rank.reshape(256, 256)
+    cell = next(k for k in np.flatnonzero(rank == 2) if grid[tuple(first[k])] == 1)
+    rank[np.ravel_multi_index(tuple(first[cell]), (256, 256))] = -1
+
+
 @false(known.two_ages)
 def ranks_invented(c):
     c.arrays["0.rank"][c.arrays["0.rank"] < 0] = 60
@@ -173,6 +183,11 @@ def slope(c):
 @false(known.seven)
 def cycle_moved(c):
     moved(cycle_of(c), 3, 1e-7)
+
+
+@false(known.seven)
+def cycle_moved_back(c):
+    moved(cycle_of(c), 3, -1e-7)
 
 
 @false(known.seven, "differ")
@@ -253,7 +268,7 @@ def starts_beyond_the_domain(c):
     c.header["goal"]["starts"] = [region((0.01, 2.6))]
 
 
-@false(known.ricker, "has no rank")
+@false(known.ricker, "have no rank")
 def starts_without_a_rank(c):
     c.arrays["0.rank"][a_cell(c, rank=1)] = -1
     del c.header["boxes"][0]["claims"][0]
@@ -503,6 +518,9 @@ def test_slopes_are_of_one_dimension_and_refutations_name_their_starts(tmp_path)
     margin = known.ricker().copy()
     margin.header["goal"]["starts"] = None
     assert "name its starts" in margin.recheck(tmp_path).reason
+    margin = known.ricker().copy()
+    margin.claim("basin", box=1)
+    assert "with cycles alone" in margin.recheck(tmp_path).reason
     margin = known.ricker().copy()
     margin.header["goal"] = None
     assert "no goal" in margin.recheck(tmp_path).reason
