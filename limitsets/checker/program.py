@@ -265,9 +265,14 @@ def summed(first: Arb, u: Arb | None, second: Arb, v: Arb | None) -> Arb | None:
 # ----------------------------------------------------------------
 # Printing.
 
-INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
-WORDS = "|".join([*BINARY, *UNARY, "pow", "margin", "pi", "tau", "e", "inf", "nan", "if", "else", "mod"])
-MISLEADING = re.compile(rf"[xt][0-9]+(\..*)?|p\..*|{WORDS}", re.IGNORECASE)
+SIGNS = {"add": ("+", 1), "sub": ("-", 1), "mul": ("*", 2), "div": ("/", 2)}
+WORDS = "|".join(
+    [*BINARY, *UNARY, "pow", "margin", "branch", "side", "pi", "tau", "e", "inf", "nan", "if", "else", "mod"]
+)
+MISLEADING = re.compile(rf"[xt][0-9]*(\..*)?|p\..*|{WORDS}", re.IGNORECASE)
+Written = tuple[
+    str, int
+]  # a text, and how strongly it binds: 1 sums and signs, 2 products, 3 powers and numbers, 4 names
 
 
 def named(name: str) -> str:
@@ -275,35 +280,39 @@ def named(name: str) -> str:
     return f"p.{name}" if MISLEADING.fullmatch(name) else name
 
 
-def bare(text: str) -> str:
-    """Leave out the brackets around a whole text: only sums, products and negations stand in such."""
-    return text[1:-1] if text[0] == "(" and text[-1] == ")" else text
-
-
 def in_words(formulas: Formulas, names: list[str]) -> list[str]:
     """Write the formulas as they are checked; what is used twice, or is long, has a line of its own."""
-    inner = list(itertools.chain.from_iterable(one.entries for one in formulas.operations))
-    uses = np.bincount(np.array(inner, dtype=np.int64), minlength=len(formulas.operations)).tolist()
+    used = itertools.chain(formulas.out, *(one.entries for one in formulas.operations))
+    uses = np.bincount(np.array(list(used), dtype=np.int64), minlength=len(formulas.operations)).tolist()
     lines: list[str] = []
-    shown: list[str] = []
+    shown: list[Written] = []
     for k, one in enumerate(formulas.operations):
-        text = operation_in_words(one, [shown[j] for j in one.entries], formulas.operations)
-        if one.entries and (uses[k] > 1 or len(text) > LONGEST_LINE):
-            lines.append(f"t{len(lines) + 1} = {bare(text)}")
-            text = f"t{len(lines)}"
-        shown.append(text)
-    return lines + [f"{name} = {bare(shown[k])}" for name, k in zip(names, formulas.out, strict=True)]
+        text, level = operation_in_words(one, shown)
+        long = len(text) > LONGEST_LINE and k not in formulas.out
+        if one.entries and (uses[k] > 1 or long):
+            lines.append(f"t{len(lines) + 1} = {text}")
+            text, level = f"t{len(lines)}", 4
+        shown.append((text, level))
+    return lines + [f"{name} = {shown[k][0]}" for name, k in zip(names, formulas.out, strict=True)]
 
 
-def operation_in_words(one: Operation, parts: list[str], before: list[Operation]) -> str:
-    """Write one operation on parts that are written."""
-    if one.word in INFIX:
-        return f"({parts[0]} {INFIX[one.word]} {parts[1]})"
+def operation_in_words(one: Operation, shown: list[Written]) -> Written:
+    """Write one operation on parts that are written, in brackets where they bind less strongly."""
+
+    def part(k: int, least: int) -> str:
+        text, level = shown[one.entries[k]]
+        return text if level >= least else f"({text})"
+
+    if one.word in SIGNS:
+        sign, level = SIGNS[one.word]
+        return f"{part(0, level)} {sign} {part(1, level + 1)}", level
     if one.word == "neg":
-        return f"(-({parts[0]}))" if parts[0].startswith("-") else f"(-{parts[0]})"
+        return f"-{part(0, 3)}", 1
     if one.word == "pow":  # (x0^2)^3 is not x0^2^3, nor is (-2)^2 -2^2
-        closed = before[one.entries[0]].word in ("pow", "c")
-        return f"({parts[0]})^{one.what}" if closed else f"{parts[0]}^{one.what}"
+        power = str(one.what) if int(str(one.what)) > 0 else f"({one.what})"
+        return f"{part(0, 4)}^{power}", 3
+    if one.word == "c":
+        return str(one.what), 1 if str(one.what).startswith("-") else 3
     if one.entries:
-        return f"{one.word}({', '.join(map(bare, parts))})"
-    return f"x{one.what}" if one.word == "x" else named(one.what) if one.word == "p" else str(one.what)
+        return f"{one.word}({', '.join(shown[j][0] for j in one.entries)})", 4
+    return (f"x{one.what}" if one.word == "x" else named(str(one.what))), 4

@@ -219,7 +219,8 @@ def test_formulas_of_written_maps():
     assert str(ls.formulas(gap, ls.grid([(-1.3, 1.2)], cells=8))) == (
         "side 0, branch 0, to side 0:\n    x0' = alpha * x0 + 0.9\n"
         "side 0, branch 1, to side 0:\n    x0' = alpha * x0 - 1\n"
-        "side 0, branch 1 if and only if margin > 0, else branch 0:\n    margin = x0"
+        "side 0: branch 1 if and only if margin > 0, else branch 0\n    margin = x0\n"
+        "the proof is of these formulas, not of the function image"
     )
 
 
@@ -435,6 +436,19 @@ def step(p, x, side):
     return 0.5 * x, side, 0
 
 
+class TwoFormulas(NamedTuple):
+    a: float
+
+
+def two_formulas(p, x, side):
+    return p.a * x, side, 0
+
+
+def two_formulas_on(p, x, side, branch):
+    return p.a * x * (1 + branch), side
+
+
+ls.register(TwoFormulas, image=two_formulas, image_on=two_formulas_on, branches=("one", "two"))
 ls.register(Flagged, image=step)
 ls.register(ThreeNames, image=step)
 
@@ -444,14 +458,19 @@ ls.register(ThreeNames, image=step)
     [
         (Flagged(True), "the parameter flag is True"),
         (ThreeNames(1.0), "the parameter is 'größe'"),
-        (ls.maps.Logistic(3.2), "Logistic, of 2 branches without image_on and margin"),
-        (TwoState(), "TwoState, of 2 branches without image_on and margin"),
+        (TwoState(), "'>= of x or a parameter'"),
+        (TwoFormulas(0.5), "TwoFormulas, of 2 branches, without margin"),
         (ls.load("paper-designed").map, "which has on_side"),
     ],
 )
 def test_maps_that_no_certificate_speaks_of(params, words):
     with pytest.raises((AnswerError, MapError), match=re.escape(words)):
         recorded_map(params, 1)
+
+
+def test_branches_that_are_names_alone_are_one_in_the_file():
+    table = recorded_map(ls.maps.Logistic(3.2), 1)
+    assert (table["branches"], len(table["programs"]), table["margins"]) == (1, 1, [])
 
 
 def asks_its_kind(x, a):

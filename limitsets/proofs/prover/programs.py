@@ -36,7 +36,7 @@ MOST_SIDES = 64
 WHOLE, ENDS = 40, 10
 
 # Letters from which on a part of a formula stands in a line of its own.
-LONG = 72
+LONG = 90
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.]{0,40}")
 
@@ -50,7 +50,10 @@ NUMPY: dict[str, Callable[..., Any]] = {
 }  # fmt: skip
 
 # A parameter that could be read as something else is printed with "p." before it.
-AMBIGUOUS = re.compile(rf"[xt]\d*|{'|'.join(NUMPY)}|pow|margin|branch|side|pi|tau|p\..*")
+AMBIGUOUS = re.compile(
+    rf"[xt]\d*(\..*)?|p\..*|{'|'.join(NUMPY)}|pow|margin|branch|side|pi|tau|e|inf|nan|if|else|mod",
+    re.IGNORECASE,
+)
 
 
 # ---------------------------------------------------------------- the table
@@ -303,9 +306,13 @@ class Formulas:
             lines += [f"side {program['side']}, branch {program['branch']}, to side {program['to']}:"]
             lines += _lines(program, names)
         for program in self.table["margins"]:
-            lines += [f"side {program['side']}, branch 1 if and only if margin > 0, else branch 0:"]
+            lines += [f"side {program['side']}: branch 1 if and only if margin > 0, else branch 0"]
             lines += _lines(program, ["margin"])
-        return lines
+        return (
+            [*lines, "the proof is of these formulas, not of the function image"]
+            if self.table["margins"]
+            else lines
+        )
 
     def __str__(self) -> str:
         """Write the lines that a report has."""
