@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
-from limitsets.checker import show
+from limitsets.checker import cells, recheck, show
 from limitsets.checker.map_cells import box_max
 from tests.checker import map_examples as known
 from tests.checker.maps_in_files import (
@@ -106,6 +106,18 @@ def test_refutations_alone_are_refuted(tmp_path):
     certificate.arrays.clear()
     report = certificate.recheck(tmp_path)
     assert (report.verdict, words_of(report)) == ("refuted", {"cycles": "proved", "refuted": "refuted"})
+
+
+def test_processes_that_share_the_work_come_to_the_same_verdict(tmp_path, monkeypatch):
+    monkeypatch.setattr(cells, "SMALL", 10)
+    certificate = known.delayed().copy()
+    file = certificate.write(tmp_path / "map.proof.zip")
+    done = []
+    report = recheck(file, workers=2, progress=lambda *counts: done.append(counts))
+    assert report.verdict == "proved"
+    assert done[-1][0] == done[-1][1] == report.boxes
+    certificate.header["boxes"][0]["parameters"]["alpha"] = ["0.6", "0.605"]
+    assert recheck(certificate.write(file), workers=2).reason == certificate.recheck(tmp_path).reason != ""
 
 
 def test_command_line(tmp_path):
@@ -269,6 +281,7 @@ def put_exit(certificate, cell, **changed):
         (lambda: put_exit(fourfold(), 3, exit=2, target=[-1, 3]), "failed", "exit does not fall"),
         (lambda: put_exit(fourfold(), 3, exit=2, target=[0, 2]), "failed", "image on branch 0"),
         (lambda: put_exit(fourfold(), 0, exit=1, target=[3, 3]), "failed", "exit does not fall"),
+        (lambda: put_exit(fourfold(), 7, exit=-1, target=-2), "failed", "exit does not fall"),
         (lambda: put_exit(fourfold(), slice(None), exit=-1, target=-2), "failed", "no cell has an exit"),
         (lambda: put_exit(fourfold(), 0, exit=-1), "bad file", "out of range"),
         (lambda: put_exit(fourfold(), 0, rank=0), "bad file", "out of range"),

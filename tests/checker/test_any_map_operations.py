@@ -1,5 +1,6 @@
 """Operations of formulas in the checker: balls and gradients hold what mpmath computes; kinks, cuts, poles; print."""
 
+import operator
 import random
 
 import mpmath
@@ -11,7 +12,7 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 import flint
 from flint import arb
 
-from limitsets.checker.any_map import Map, map_in_words, read_map
+from limitsets.checker.any_map import Map, Piece, map_in_words, read_map, slopes_unless
 from limitsets.checker.balls import PRECISION
 from limitsets.checker.file import BadFileError
 from limitsets.checker.program import Program, in_words, number, read_formulas
@@ -215,6 +216,64 @@ def test_deep_programs_are_evaluated_and_printed_without_recursion():
     assert len(in_words(formulas, ["x0'"])) > 100
     with pytest.raises(BadFileError):
         read_formulas({"ops": [*deep["ops"], ["neg", 0]], "out": [0]}, 1, [], 1, "a test")
+
+
+def random_formulas(generator):
+    """A program of twelve operations on two coordinates, a parameter and a constant."""
+    ops = [["x", 0], ["x", 1], ["p", "a"], ["c", generator.choice(("0.1", "-2", "3.7"))]]
+    for _ in range(12):
+        name, _, exponent = generator.choice(list(EXACT)).partition(":")
+        entries = [generator.randrange(max(0, len(ops) - 6), len(ops)) for _ in range(1 + (name in TWO))]
+        ops.append([name, *entries, *([max(-3, min(3, int(exponent)))] if exponent else [])])
+    return ops
+
+
+def value_of(ops, x, a):
+    """Evaluate a program by mpmath; None where it is not defined over the reals."""
+    values = []
+    for name, *rest in ops:
+        if name in ("x", "p", "c"):
+            values.append(x[rest[0]] if name == "x" else a if name == "p" else mpmath.mpf(rest[0]))
+        elif name == "pow":
+            if values[rest[0]] == 0 and rest[1] < 0:
+                return None
+            values.append(values[rest[0]] ** rest[1])
+        else:
+            numbers = [values[k] for k in rest]
+            defined = {"sqrt": numbers[0] >= 0, "log": numbers[0] > 0, "div": numbers[-1] != 0}.get(
+                name, True
+            )
+            if not defined or abs(numbers[0]) > 1e4:
+                return None
+            values.append(EXACT[name](*numbers))
+    return values[-1]
+
+
+def test_bounds_that_are_proved_hold_at_random_places():
+    """Ends just inside the sampled range are never proved, ends some way outside often are, by each enclosure."""
+    generator, proved, tried = random.Random(3), 0, 0
+    while tried < 150:
+        ops = random_formulas(generator)
+        formulas = read_formulas({"ops": ops, "out": [len(ops) - 1]}, 2, ["a"], 1, "a test")
+        box = [
+            (v, v + 10.0 ** generator.uniform(-3, 0)) for v in (generator.uniform(-2, 2) for _ in range(3))
+        ]
+        places = [[mpmath.mpf(generator.uniform(*ends)) for ends in box] for _ in range(12)]
+        places += [[mpmath.mpf(ends[generator.randrange(2)]) for ends in box] for _ in range(4)]
+        values = [value_of(ops, place[:2], place[2]) for place in places]
+        if any(v is None or abs(v) > 1e9 for v in values):
+            continue
+        tried += 1
+        program, piece = Program(formulas, 2, {"a": hull(*box[2])}, ["a"]), Piece(box)
+        low, high = min(values), max(values)
+        off = (high - low) * 0.3 + abs(high) * 1e-6 + mpmath.mpf(10) ** -9
+        for relation, end, beyond in ((operator.le, high, -1), (operator.ge, low, 1)):
+            inside = close(end) + beyond * arb(1e-12) * (1 + abs(close(end)))
+            if low < high:
+                assert slopes_unless(program, piece, [(0, relation, inside)]) is not None
+            outside = close(end - beyond * off)
+            proved += slopes_unless(program, piece, [(0, relation, outside)]) is None
+    assert proved > 100
 
 
 # ----------------------------------------------------------------- the printed formulas
