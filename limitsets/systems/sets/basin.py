@@ -357,7 +357,9 @@ def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | N
     reached = f"from {100 * share:.3g} % of the starts a recurrent set that is not closed can be reached"
     spread = _spread_over_a_side(graph)
     if spread.size:
-        jumps = f"from {100 * _share_reaching(graph, spread):.3g} % a cell whose enclosed image is a whole side"
+        jumps = (
+            f"from {100 * _share_reaching(graph, spread):.3g} % a cell whose enclosed image is a whole side"
+        )
         return (
             f"{reached}, {jumps}: the map jumps there "
             "within a branch (a floor), and finer cells decide few more starts; give it one branch before the jump and "
