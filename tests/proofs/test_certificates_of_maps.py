@@ -128,7 +128,7 @@ def test_a_certificate_of_other_formulas_is_denied_and_kept(tmp_path, monkeypatc
 
 def test_cells_of_which_nothing_is_claimed_have_no_rank():
     lower = ls.map(logistic, r=3.2)
-    arrays = certificate_of_map.cells_of(lower, lower, ls.grid([(-0.1, 0.9)], cells=500), 1)
+    arrays = certificate_of_map.cells_of(lower, lower, ls.grid([(-0.1, 0.9)], cells=500))
     middle = np.linspace(-0.1, 0.9, 501)[:-1] + 0.001
     rank, component = arrays["rank"], arrays["component"]
     assert (rank[middle < -0.01] == -1).all()  # they leave
@@ -139,6 +139,54 @@ def test_cells_of_which_nothing_is_claimed_have_no_rank():
     first, last = arrays["target.0"][rank > 0].T
     highest = np.array([rank[a : b + 1].max() for a, b in zip(first, last, strict=True)])
     assert (highest < rank[rank > 0]).all()
+
+
+ENDS, STARTS = [[(0.35, 1.65)]], [[(0.02, 2.6)]]
+
+
+@pytest.mark.parametrize(
+    ("how", "reason"),
+    [
+        ({"ends": ENDS, "starts": STARTS}, ""),
+        ({"ends": ENDS}, ""),
+        ({"ends": (0.35, 1.65), "starts": {0: [(0.5, 2.0)]}}, ""),
+        ({"ends": [[(0.35, 0.9)], [(1.1, 1.65)]]}, ""),
+        # the unstable fixed point 1 is a start, and does not end there
+        (
+            {"ends": [[(0.35, 0.9)], [(1.1, 1.65)]], "starts": STARTS},
+            "starts whose orbits are not proved to end",
+        ),
+        ({"ends": [[(0.8, 1.65)]]}, "no cells in the ends are proved to stay there"),
+    ],
+)
+def test_where_starts_end(how, reason, tmp_path):
+    """Orbits of Ricker's map end in [0.35, 1.65] for every r in [2.3, 2.35]: its 2-cycle lies in [0.37, 1.63]."""
+    lower = ls.map(ricker, r=2.3)
+    proof = ls.certify(lower, ls.grid([(0.02, 2.6)], cells=1000), upper=lower.with_values(r=2.35), **how)
+    assert [each.claim for each in proof.claims] == ["ends-in"]
+    assert proof.claims[0].reason.startswith(reason)
+    assert proof.proved is (not reason)
+    if not reason:
+        report = ls.recheck(proof.save(tmp_path / "ricker.proof.zip"))
+        assert (report.verdict, report.claims) == ("proved", [("ends-in", "proved", "")])
+
+
+@pytest.mark.parametrize(
+    ("claims", "how", "words"),
+    [
+        (["ends-in"], {}, "the claims is 'ends-in'"),
+        (["trapping"], {"ends": ENDS}, "ends-in by itself"),
+        (None, {"ends": [[(1.0, 0.5)]]}, "the argument ends of certify"),
+        (None, {"ends": [[(0.0, 1.0), (0.0, 1.0)]]}, "boxes of 1 pairs"),
+        (None, {"ends": {1: ENDS}}, "on side 1"),
+        (None, {"ends": "all"}, "the argument ends of certify is 'all"),
+        (None, {"ends": ENDS, "starts": [[(0.0, 3.0)]]}, "boxes in the domain of the grid"),
+    ],
+)
+def test_boxes_that_cannot_be(claims, how, words):
+    with pytest.raises(AnswerError) as error:
+        ls.certify(ls.map(ricker, r=2.3), ls.grid([(0.02, 2.6)], cells=100), claims, **how)
+    assert words in str(error.value)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,8 @@ from limitsets.proofs.prover.programs import recorded_map, require_same
 from limitsets.proofs.prover.recording import decimal, names_of
 from limitsets.systems.cells import Grid
 from limitsets.systems.graph.components import attracting_of, ranks, reach, strong_components
-from limitsets.systems.graph.ranges import build
+from limitsets.systems.graph.ranges import Ranges, build
+from limitsets.systems.maps import kind_of
 from limitsets.systems.maps.derived import NEVER, UNKNOWN, branch_boxes
 
 VERSION = 3
@@ -44,7 +45,7 @@ NO_CLAIM = -1  # the rank of cells of which nothing is claimed
 IMPOSSIBLE = -2  # the target of a branch that is not taken
 
 
-def cells_of(lower: Any, upper: Any, grid: Grid, branches: int) -> Arrays:
+def cells_of(lower: Any, upper: Any, grid: Grid, ends: NDArray[np.bool_] | None = None) -> Arrays:
     """Find the arrays of one box of parameters.
 
     Parameters
@@ -53,8 +54,9 @@ def cells_of(lower: Any, upper: Any, grid: Grid, branches: int) -> Arrays:
         Corners of the parameters.
     grid : Grid
         The cells.
-    branches : int
-        How many the map has.
+    ends : ndarray of bool, shape (n_cells,), optional
+        Cells in which orbits shall end: those of them from which none leaves these then stand in place of the
+        attracting components, as one.
 
     Returns
     -------
@@ -63,6 +65,7 @@ def cells_of(lower: Any, upper: Any, grid: Grid, branches: int) -> Arrays:
         enclosed, or may come to recurrent cells that do not attract, has rank -1.
     """
     count, dimension = grid.n_cells, grid.dimension
+    branches = len(kind_of(lower).branches) if kind_of(lower).has_margin else 1
     target = np.full((branches, count, 2 * dimension), IMPOSSIBLE, np.int32)
     to, lost = np.zeros((branches, count), np.int32), np.zeros(count, dtype=bool)
     for side, branch in np.ndindex(grid.sides, branches):
@@ -74,7 +77,7 @@ def cells_of(lower: Any, upper: Any, grid: Grid, branches: int) -> Arrays:
         lost[mine[(boxes.state != NEVER) & ~inside]] = True
         chosen = (boxes.state != NEVER) & inside
         target[branch, mine[chosen]], to[branch, mine] = cells[chosen], boxes.side
-    component, rank = _labels(grid, target, to, lost)
+    component, rank = _labels(_ranges_of(grid, target, to, lost), lost, ends)
     edges = {f"edges.{s}.{axis}": e for s, axes in enumerate(grid.edges) for axis, e in enumerate(axes)}
     targets = {f"target.{branch}": each for branch, each in enumerate(target)}
     return {"component": component, "rank": rank, **edges, **targets}
@@ -89,24 +92,33 @@ def _target_cells(grid: Grid, side: int, lo: Array, hi: Array) -> Ints:
     return np.stack([*first, *last], axis=1)
 
 
-def _labels(grid: Grid, target: Numbers, to: Numbers, lost: NDArray[np.bool_]) -> tuple[Numbers, Numbers]:
-    """Find component and rank of each cell, in the graph of the targets."""
-    dimension = grid.dimension
+def _ranges_of(grid: Grid, target: Numbers, to: Numbers, lost: NDArray[np.bool_]) -> Ranges:
+    """Make the graph of the targets; `to` has the side that each branch leads to."""
     cell, branch = np.nonzero(target[:, :, 0].T != IMPOSSIBLE)
     boxes, sides = target[branch, cell], to[branch, cell]
     begin = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=grid.n_cells))])
-    first, last = (np.ascontiguousarray(boxes[:, part]) for part in np.split(np.arange(2 * dimension), 2))
-    ranges = build(grid, begin, sides, first, last, lost.astype(np.uint8))
+    first, last = (np.ascontiguousarray(part) for part in np.hsplit(boxes, 2))
+    return build(grid, begin, sides, first, last, lost.astype(np.uint8))
+
+
+def _labels(
+    ranges: Ranges, lost: NDArray[np.bool_], ends: NDArray[np.bool_] | None
+) -> tuple[Numbers, Numbers]:
+    """Find component and rank of each cell."""
     parts = strong_components(ranges)
-    sets = [np.flatnonzero(parts.label == k).astype(np.int32) for k in np.flatnonzero(parts.recurrent)]
-    attracts = attracting_of(ranges, parts, sets)
-    component, open_ends = np.full(grid.n_cells, -1, np.int32), lost.astype(np.uint8)
-    for cells in (each for each, good in zip(sets, attracts, strict=True) if not good):
-        open_ends[cells] = 1
-    for number, cells in enumerate(each for each, good in zip(sets, attracts, strict=True) if good):
-        component[cells] = number
-    rank = ranks(ranges, parts, np.asarray(parts.recurrent))
-    rank[reach(ranges, parts, open_ends) > 0] = NO_CLAIM
+    component = np.full(lost.size, -1, np.int32)
+    if ends is None:
+        sets = [np.flatnonzero(parts.label == k).astype(np.int32) for k in np.flatnonzero(parts.recurrent)]
+        attracts = attracting_of(ranges, parts, sets)
+        for number, cells in enumerate(each for each, good in zip(sets, attracts, strict=True) if good):
+            component[cells] = number
+    else:
+        component[reach(ranges, parts, (lost | ~ends).astype(np.uint8)) == 0] = 0
+    settled = np.zeros(parts.count, dtype=bool)
+    settled[parts.label[component >= 0]] = True
+    stays_elsewhere = (parts.recurrent & ~settled)[parts.label]
+    rank = ranks(ranges, parts, settled | np.asarray(parts.recurrent))
+    rank[reach(ranges, parts, (lost | stays_elsewhere).astype(np.uint8)) > 0] = NO_CLAIM
     rank[component >= 0] = 0
     return component, rank
 
@@ -190,11 +202,12 @@ def _section(claim: str, arrays: Arrays, known: Mapping[str, Any]) -> dict[str, 
 
 def write_map(
     path: str | Path,
-    lower: Any,
-    upper: Any,
+    corners: tuple[Any, Any],
     grid: Grid,
     claims: Mapping[str, Mapping[str, Any]],
     *,
+    arrays: Arrays,
+    goal: Mapping[str, Any] | None,
     recheck: bool = True,
     workers: int | None = 1,
 ) -> float | None:
@@ -204,12 +217,16 @@ def write_map(
     ----------
     path : str or Path
         The file.
-    lower, upper : NamedTuple
-        Corners of the parameters.
+    corners : tuple of NamedTuple
+        The lower and the upper one of the parameters.
     grid : Grid
         The cells.
     claims : mapping of str to mapping
         What is claimed, with the numbers that the prover knows: `least_slope` of expanding, `cycles` of cycles.
+    arrays : dict of str to ndarray
+        From `cells_of`; empty where no claim is about cells.
+    goal : mapping, or None
+        The goal of "ends-in", as the file has it.
     recheck : bool
         Whether to check it first.
     workers : int, optional
@@ -227,17 +244,16 @@ def write_map(
     DeniedError
         The checker does not confirm it: it is kept as NAME.denied.zip.
     """
-    table = recorded_map(lower, grid.sides)
-    require_same(lower, upper, table, grid.domain)
-    arrays = {} if set(claims) == {"cycles"} else cells_of(lower, upper, grid, table["branches"])
+    table = recorded_map(corners[0], grid.sides)
+    require_same(*corners, table, grid.domain)
     sections = [{"claim": word, "section": _section(word, arrays, known)} for word, known in claims.items()]
     arrays = {f"0.{name}": np.ascontiguousarray(each) for name, each in arrays.items()}
     header = {
         "format": FORMAT,
         "version": VERSION,
         "map": table,
-        "boxes": [{"parameters": _parameters(lower, upper), "prefix": "0.", "claims": sections}],
-        "goal": None,
+        "boxes": [{"parameters": _parameters(*corners), "prefix": "0.", "claims": sections}],
+        "goal": goal,
         "plane": None,
     }
     return written(path, header, arrays, dict.fromkeys(claims, "proved"), recheck=recheck, workers=workers)

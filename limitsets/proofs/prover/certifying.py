@@ -215,6 +215,8 @@ def certify(
     claims: Sequence[str] | None = None,
     *,
     upper: Any = None,
+    ends: Any = None,
+    starts: Any = None,
     progress: Progress | None = None,
 ) -> ProofOfMap: ...
 def certify(
@@ -226,6 +228,8 @@ def certify(
     tolerance: Mapping[str, str] | None = None,
     laid: LaidLike | None = None,
     upper: Any = None,
+    ends: Any = None,
+    starts: Any = None,
     progress: Progress | None = None,
 ) -> Proof | ProofOfMap:
     """Prove claims about a scene, ``certify(scene, claims)``, or about any map, ``certify(map, grid, claims)``.
@@ -255,6 +259,10 @@ def certify(
     upper : NamedTuple, optional
         Of a map alone: the upper corner of a box of parameters, whose lower corner is `scene`; the claims are then
         proved for every map between.
+    ends, starts : sequence of boxes, optional
+        Of a map alone, for its claim "ends-in": every start in a box of `starts` (default: in all cells that are proved
+        to lead there) ends in the boxes of `ends` and stays.  A box is a list of (lo, hi) per axis; a dict gives lists
+        by side.
     progress : callable, optional
         Called with what is tried, how much of it is done, and of how much, before each attempt.
 
@@ -283,9 +291,11 @@ def certify(
     """
     if isinstance(scene, tuple | type):
         _require_none({"noise": noise, "tolerance": tolerance, "laid": laid}, "beside a map")
-        return certify_map(scene, grid, claims, upper=upper, progress=progress)
+        return certify_map(scene, grid, claims, upper=upper, ends=ends, starts=starts, progress=progress)
     twice = isinstance(grid, Grid) or claims is not None  # else the claims stand in its place
-    _require_none({"upper": upper, "grid": grid if twice else None}, "beside a scene")
+    _require_none(
+        {"upper": upper, "ends": ends, "starts": starts, "grid": grid if twice else None}, "beside a scene"
+    )
     return certify_scene(
         scene,
         claims if grid is None else grid,

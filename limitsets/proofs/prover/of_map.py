@@ -6,6 +6,8 @@ the interior of the component, relative to the domain.
 cells, cut finer, do not recur.  Then the rank of a cell, the longest path to an attracting cell, falls along every
 orbit outside, but for the stays where orbits pass, which are bounded.
 *Basin*: orbits from the cells all of whose paths end in attracting cells enter these, and stay.
+*Ends in*: the cells of some boxes from which no path leaves these boxes are mapped into each other; from the cells with
+the starts every path leads there.
 *Expanding*, in one dimension: |dx'/dx| > 1 on every attracting cell, on every branch that is possible there; refuted
 where it is below 1 on all of them.
 *Cycles*: for the points x_0 .. x_p-1 of an orbit along an itinerary, F_k = f(x_k) - x_k+1 and boxes X_k around them,
@@ -19,6 +21,7 @@ For two corners of parameters all of it holds for each of the maps between.
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -42,10 +45,11 @@ from limitsets.base import (
     picked,
     shown_in_notebooks,
 )
-from limitsets.base.arrays import Array, Ints
+from limitsets.base.arrays import Array, Arrays, Ints
 from limitsets.numbers.interval import guard
 from limitsets.proofs.prover.attraction import components_of
-from limitsets.proofs.prover.certificate_of_map import cycle_in_file, write_map
+from limitsets.proofs.prover.certificate_of_map import cells_of, cycle_in_file, write_map
+from limitsets.proofs.prover.goal_of_map import GoalOfMap, missing, read_goal, within_ends
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.proof import Claim
 from limitsets.systems.cells import CellSet, Grid
@@ -120,6 +124,8 @@ class ProofOfMap(Tabled):
         The periodic orbits that are proved, if "cycles" was asked for.
     seconds : float
         Time it took.
+    goal : GoalOfMap or None
+        What "ends-in" says, if boxes were given.
     """
 
     map: Any
@@ -129,6 +135,7 @@ class ProofOfMap(Tabled):
     claims: tuple[Claim, ...]
     cycles: tuple[CycleOfMap, ...]
     seconds: float
+    goal: GoalOfMap | None = None
 
     @property
     def proved(self) -> bool:
@@ -144,6 +151,13 @@ class ProofOfMap(Tabled):
     def enters(self) -> CellSet:
         """The cells all of whose points are proved to enter the attracting cells."""
         return CellSet(self.graph.grid, self.graph.condensation().destinations(passing(self.graph)) >= 0)
+
+    @functools.cached_property
+    def arrays(self) -> Arrays:
+        """The arrays of a certificate: target cells, ranks, components (docs/certificates.md)."""
+        grid = self.graph.grid
+        ends = None if self.goal is None else within_ends(self.goal, grid)
+        return cells_of(self.map, self.upper, grid, ends)
 
     def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
         """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
@@ -174,7 +188,16 @@ class ProofOfMap(Tabled):
             )
         if "cycles" in claims:
             claims["cycles"] = {"cycles": [_in_file(self, cycle) for cycle in self.cycles]}
-        write_map(path, self.map, self.upper, self.graph.grid, claims, recheck=recheck, workers=workers)
+        write_map(
+            path,
+            (self.map, self.upper),
+            self.graph.grid,
+            claims,
+            arrays={} if set(claims) == {"cycles"} else self.arrays,
+            goal=self.goal.in_file() if self.goal and "ends-in" in claims else None,
+            recheck=recheck,
+            workers=workers,
+        )
         return Path(path)
 
     def functions(self, claim: str) -> str:
@@ -255,6 +278,12 @@ def _invariant(proof: ProofOfMap) -> Claim:
     if not len(proof.cells):
         return Claim("invariant", "undecided", "there are no attracting cells", {})
     return Claim("invariant", "proved", "", {})
+
+
+def _ends_in(proof: ProofOfMap) -> Claim:
+    assert proof.goal is not None
+    reason = missing(proof.goal, proof.graph.grid, proof.arrays)
+    return Claim("ends-in", "undecided" if reason else "proved", reason, {})
 
 
 def _attracts_all(proof: ProofOfMap) -> Claim:
@@ -508,6 +537,7 @@ def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[
 
 PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "attracts-all": _attracts_all,
+    "ends-in": _ends_in,
     "expanding": _expanding,
     "invariant": _invariant,
     "basin": lambda proof: replace(_invariant(proof), claim="basin"),
@@ -536,6 +566,8 @@ def certify_map(
     claims: Sequence[str] | None = None,
     *,
     upper: Any = None,
+    ends: Any = None,
+    starts: Any = None,
     progress: Progress | None = None,
 ) -> ProofOfMap:
     """Prove claims about the attracting cells of any map; called by `limitsets.certify`.
@@ -547,9 +579,12 @@ def certify_map(
     grid : Grid
         The cells; finer ones prove more.
     claims : sequence of str, optional
-        Of `CLAIMS_OF_MAP`; default ("attracts-all",).
+        Of `CLAIMS_OF_MAP`; default ("attracts-all",), or ("ends-in",) where `ends` are given.
     upper : NamedTuple, optional
         The upper corner of the parameters; default `map`.
+    ends, starts : sequence of boxes, optional
+        Of the claim "ends-in": every start in a box of `starts` (default: in all cells that are proved to lead there)
+        ends in the boxes of `ends` and stays.  A box is a list of (lo, hi) per axis; a dict gives lists by side.
     progress : callable, optional
         Called with the step, how much of it is done, and of how much.
 
@@ -567,13 +602,17 @@ def certify_map(
     """
     begin = time.perf_counter()
     kind_of(map)
-    wanted = tuple(dict.fromkeys(claims or ("attracts-all",)))
+    wanted = tuple(dict.fromkeys(claims or (("attracts-all",) if ends is None else ("ends-in",))))
     for claim in wanted:
         if claim not in CLAIMS_OF_MAP:
             raise AnswerError("the claim about a map", claim, ", ".join(CLAIMS_OF_MAP), "correct the word")
     if grid is None:
         way = "limitsets.certify(map, limitsets.grid([(lo, hi)], cells=1024))"
         raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
+    if (ends is None) is ("ends-in" in wanted) or (ends is not None and len(wanted) > 1):
+        way = 'ask so: limitsets.certify(map, grid, ["ends-in"], ends=[[(lo, hi)]])'
+        raise AnswerError("the claims", ", ".join(wanted), "ends-in by itself, with its boxes ends=", way)
+    goal = None if ends is None else read_goal(ends, starts, grid.domain)
     guard()
     _require_provable(map)
     lower = coerce(map)
@@ -582,7 +621,7 @@ def certify_map(
         progress("transitions", 0, 1)
     graph = transitions(lower, grid, "boxes", upper=upper)
     proof = ProofOfMap(
-        lower, upper, graph, component=components_of(graph)[0], claims=(), cycles=(), seconds=0.0
+        lower, upper, graph, component=components_of(graph)[0], claims=(), cycles=(), seconds=0.0, goal=goal
     )
     orbits: tuple[CycleOfMap, ...] = ()
     answers = []
