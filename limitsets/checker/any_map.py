@@ -17,7 +17,7 @@ from .cells import Failure
 from .file import plain, read_side, require, rows, table
 from .program import Formulas, Program, in_words, is_whole, named, number, rational, read_formulas
 
-MOST_PIECES = 4_000  # of one cell: a certificate that needs more is refused
+MOST_PIECES_OF_CELL = 4_000  # of one cell: a certificate that needs more is refused
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.]{0,40}")
 
 # ----------------------------------------------------------------
@@ -110,9 +110,9 @@ class Map:
         self.image = {key: Program(f, self.dimension, values, wide) for key, f in shape.images.items()}
         self.margin = [Program(f, self.dimension, values, wide) for f in shape.margins]
 
-    def piece(self, box: list[Pair]) -> "Piece":
+    def piece(self, box: list[Pair]) -> "CellPiece":
         """Return the piece of all x in a box and all parameters."""
-        return Piece([*box, *self.ranges])
+        return CellPiece([*box, *self.ranges])
 
 
 def floats_around(x: Arb) -> Pair:
@@ -131,7 +131,7 @@ AT_MOST: list[Bound] = [(0, operator.le, ZERO)]
 ABOVE: list[Bound] = [(0, operator.gt, ZERO)]
 
 
-class Piece:
+class CellPiece:
     """All x and all parameters with a range in a box, closed."""
 
     def __init__(self, box: list[Pair]):
@@ -145,7 +145,7 @@ class Piece:
             for slope, (lo, hi), ball in zip(slopes, self.box, self.balls, strict=True)
         ]
 
-    def halves(self, slopes: list[Arb]) -> list["Piece"]:
+    def halves(self, slopes: list[Arb]) -> list["CellPiece"]:
         """Halve along the number that moves a result most; [] where no float lies between its ends."""
         widths = [
             (float(abs(slope).upper()) if slope.is_finite() else math.inf, hi - lo)
@@ -159,10 +159,10 @@ class Piece:
         middle = 0.5 * lo + 0.5 * hi
         if not lo < middle < hi:
             return []
-        return [Piece([*self.box[:j], half, *self.box[j + 1 :]]) for half in ((lo, middle), (middle, hi))]
+        return [CellPiece([*self.box[:j], half, *self.box[j + 1 :]]) for half in ((lo, middle), (middle, hi))]
 
 
-def slopes_unless(program: Program, piece: Piece, bounds: list[Bound]) -> list[Arb] | None:
+def slopes_unless(program: Program, piece: CellPiece, bounds: list[Bound]) -> list[Arb] | None:
     """Return None if all bounds are proved on a piece, else the gradient of a result whose bound is not.
 
     Three enclosures are tried: operation by operation; by the mean value theorem; with every number by which the result
@@ -186,7 +186,7 @@ def slopes_unless(program: Program, piece: Piece, bounds: list[Bound]) -> list[A
     return None
 
 
-def possible(the_map: Map, side: int, piece: Piece) -> tuple[tuple[int, ...], list[Arb] | None]:
+def possible(the_map: Map, side: int, piece: CellPiece) -> tuple[tuple[int, ...], list[Arb] | None]:
     """Return the branches that are not excluded on a piece, and where both are the gradient of the margin."""
     if not the_map.margin:
         return (0,), None
@@ -196,7 +196,7 @@ def possible(the_map: Map, side: int, piece: Piece) -> tuple[tuple[int, ...], li
     return ((1,), None) if slopes is None else ((0, 1), slopes)
 
 
-class Claimed(NamedTuple):
+class CellClaim(NamedTuple):
     """What is claimed of one cell: by branch the bounds of its image, None where the branch is impossible."""
 
     side: int
@@ -205,7 +205,7 @@ class Claimed(NamedTuple):
     least: Arb | None  # of the size of the slope
 
 
-def check_cell(the_map: Map, claimed: Claimed) -> tuple[Failure | None, int]:
+def check_map_cell(the_map: Map, claimed: CellClaim) -> tuple[Failure | None, int]:
     """Prove what is claimed of a cell, for all parameters; the failure or None, and the number of pieces."""
     stack, pieces = [the_map.piece(claimed.box)], 0
     while stack:
@@ -215,13 +215,15 @@ def check_cell(the_map: Map, claimed: Claimed) -> tuple[Failure | None, int]:
         if failure is None:
             continue
         halves = [] if slopes is None else piece.halves(slopes)
-        if not halves or pieces + len(stack) > MOST_PIECES:
+        if not halves or pieces + len(stack) > MOST_PIECES_OF_CELL:
             return failure, pieces
         stack += halves
     return None, pieces
 
 
-def check_piece(the_map: Map, claimed: Claimed, piece: Piece) -> tuple[Failure | None, list[Arb] | None]:
+def check_piece(
+    the_map: Map, claimed: CellClaim, piece: CellPiece
+) -> tuple[Failure | None, list[Arb] | None]:
     """Check a piece of a cell; where that fails also a gradient, which tells where to halve."""
     branches, of_margin = possible(the_map, claimed.side, piece)
     for branch in branches:

@@ -13,12 +13,12 @@ import flint
 import numpy as np
 from flint import arb
 
-from .any_map import Bound, Claimed, Map, Shape, check_cell
+from .any_map import Bound, CellClaim, Map, Shape, check_map_cell
 from .balls import PRECISION, Array, Pair
 from .cells import CHUNK, Failure
 from .file import Arrays, require
 
-MOST_CELLS = 2**31
+MOST_CELLS_OF_MAP = 2**31
 
 
 class MapCells:
@@ -34,7 +34,7 @@ class MapCells:
         require(ascending, "the edges of the cells do not ascend")
         counts = [[len(e) - 1 for e in axes] for axes in self.edges]
         sizes = [math.prod(along) for along in counts]
-        require(sum(sizes) <= MOST_CELLS, "there are more than 2^31 cells")
+        require(sum(sizes) <= MOST_CELLS_OF_MAP, "there are more than 2^31 cells")
         self.target = [arrays.read(f"{prefix}target.{b}", "<i4", 2 * d) for b in range(shape.branches)]
         self.rank, self.component = (arrays.read(prefix + name, "<i4") for name in ("rank", "component"))
         # without a claim of it no array of the file is read, and no cell has an exit
@@ -186,7 +186,7 @@ class MapTask(NamedTuple):
     least: Array  # the size that the slope has to have, 0 where none is claimed
 
 
-def tasks_of(c: MapCells, box: int, chosen: Array, strict: Array, least: Array) -> Iterator[MapTask]:
+def map_tasks(c: MapCells, box: int, chosen: Array, strict: Array, least: Array) -> Iterator[MapTask]:
     """Cut the chosen cells, which ascend, into tasks of one side each; `strict` and `least` are by cell of the box."""
     side = c.side_of(chosen)
     for s in np.unique(side).tolist():
@@ -216,14 +216,14 @@ def ends_of_targets(edges: list[Array], rows: Array) -> tuple[Array, Array]:
 
 
 # Balls cannot be sent to another process: each keeps the texts of all boxes, and the map of the box that it is at.
-SETUP: list[Any] = []
+MAP_SETUP: list[Any] = []
 MAPS: dict[int, Map] = {}
 
 
 def prepare_map(shape: Shape, parameters: list[dict[str, tuple[str, str]]]) -> None:
     """Set up a process that checks cells of a map."""
     flint.ctx.prec = PRECISION
-    SETUP[:] = shape, parameters
+    MAP_SETUP[:] = shape, parameters
     MAPS.clear()
 
 
@@ -231,15 +231,15 @@ def check_map_task(task: MapTask) -> tuple[int, Failure | None, int]:
     """Return the first cell of a task that is not proved (-1 if all are), the reason, and the number of pieces."""
     if task.box not in MAPS:
         MAPS.clear()
-        MAPS[task.box] = Map(SETUP[0], SETUP[1][task.box])
+        MAPS[task.box] = Map(MAP_SETUP[0], MAP_SETUP[1][task.box])
     total = 0
     for i, cell in enumerate(task.cells.tolist()):
         ends, least = task.ends[i].tolist(), float(task.least[i])
         pairs = zip(task.targets, task.strict, strict=True)
         bounds = [bounds_of(target[i].tolist(), bool(strict[i])) for target, strict in pairs]
         box = list(zip(ends[::2], ends[1::2], strict=True))
-        claimed = Claimed(task.side, box, bounds, arb(least) if least > 0 else None)
-        failure, pieces = check_cell(MAPS[task.box], claimed)
+        claimed = CellClaim(task.side, box, bounds, arb(least) if least > 0 else None)
+        failure, pieces = check_map_cell(MAPS[task.box], claimed)
         total += pieces
         if failure is not None:
             return cell, failure, total

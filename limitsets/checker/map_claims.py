@@ -11,7 +11,7 @@ import numpy as np
 from .any_map import Map
 from .balls import Array
 from .cells import Crew
-from .map_cells import MapCells, check_map_task, prepare_map, tasks_of
+from .map_cells import MapCells, check_map_task, map_tasks, prepare_map
 from .map_cycles import Cycle
 from .map_file import Goal, MapFile, Part, Regions
 from .map_words import Outcome, box_in_words, outcome_of
@@ -27,7 +27,7 @@ def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[dict
     failed = dict.fromkeys(resting, bad) if bad else {}
     if "refuted" in part.claims and not bad:
         assert file.goal is not None
-        why = check_refuted(cycles, file.goal)
+        why = check_leaving_cycle(cycles, file.goal)
         failed |= {"refuted": why} if why else {}
     if part.cells is not None and not (bad and part.drawn):
         failed |= check_cells(part, number, file, cycles, crew)
@@ -50,7 +50,7 @@ def check_cycles(cycles: list[Cycle]) -> str:
     return ""
 
 
-def check_refuted(cycles: list[Cycle], goal: Goal) -> str:
+def check_leaving_cycle(cycles: list[Cycle], goal: Goal) -> str:
     """Find an attracting cycle with a point inside the starts and one apart from the ends; "" or the reason.
 
     Orbits from near the first point tend to the cycle, so that an open set of starts violates the goal.
@@ -90,7 +90,7 @@ def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], cre
         bad = c.check_exits()
         failed |= {"escapes": bad} if bad else {}
     if "attracts-all" in claims:
-        bad = check_everywhere(c, part.max_rank, hulls)
+        bad = check_whole_domain(c, part.max_rank, hulls)
         failed |= {"attracts-all": bad} if bad else {}
     if "ends-in" in claims:
         assert file.goal is not None
@@ -98,7 +98,7 @@ def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], cre
         failed |= {"ends-in": bad} if bad else {}
     chosen = np.flatnonzero(((c.rank >= 0) & ~final) | (c.exit >= 0))
     strict = attracting & ("trapping" in claims)
-    failure = crew.run(list(tasks_of(c, number, chosen, strict, np.where(attracting, part.least, 0.0))))
+    failure = crew.run(list(map_tasks(c, number, chosen, strict, np.where(attracting, part.least, 0.0))))
     if failure is None:
         return failed
     return dict.fromkeys(claims, f"{c.name(failure[0])}: {failure[1].text}") | failed
@@ -121,7 +121,7 @@ def check_drawn(part: Part, c: MapCells, cycles: list[Cycle]) -> str:
     return ""
 
 
-def check_everywhere(c: MapCells, max_rank: int, hulls: Regions) -> str:
+def check_whole_domain(c: MapCells, max_rank: int, hulls: Regions) -> str:
     """Check that all cells have a rank of at most `max_rank`, and that balls lie in the domain; "" or the reason."""
     bad = np.flatnonzero((c.rank < 0) | (c.rank > max_rank))
     if len(bad):

@@ -13,7 +13,7 @@ from .map_cells import MapCells
 from .map_cycles import Listed, read_box, read_cycles
 from .program import is_whole
 
-CLAIMS = {  # the claims that are known, and the keys of their sections
+CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "cycles": "cycles",
     "converges": "components cycles",
     "invariant": "",
@@ -26,7 +26,7 @@ CLAIMS = {  # the claims that are known, and the keys of their sections
     "refuted": "",
 }
 OF_ORBITS = ("cycles", "converges", "refuted")  # the others are about cells; these hold for fixed parameters
-MOST_BOXES = 100_000
+MOST_PARAMETER_BOXES = 100_000
 Regions = list[tuple[int, list[Pair]]]  # side and box
 
 
@@ -67,15 +67,15 @@ def read_map_file(header: dict[str, Any], entries: dict[str, memoryview]) -> Map
     table(header, "header.json", "format version map boxes goal plane arrays", "producer")
     require(header["plane"] is None, "plane: this checker does not know regions of a map's parameters")
     shape = read_map(header["map"])
-    goal = None if header["goal"] is None else read_goal(header["goal"], shape)
-    boxes = rows(header["boxes"], "boxes", 1, MOST_BOXES)
+    goal = None if header["goal"] is None else read_map_goal(header["goal"], shape)
+    boxes = rows(header["boxes"], "boxes", 1, MOST_PARAMETER_BOXES)
     prefixes = [table(box, "a box", "parameters prefix claims")["prefix"] for box in boxes]
     plain_ones = all(isinstance(prefix, str) and re.fullmatch(r"[0-9]{1,6}\.", prefix) for prefix in prefixes)
     require(
         plain_ones and len(set(prefixes)) == len(boxes), "the prefixes of the boxes are not as they should be"
     )
     arrays = Arrays(header["arrays"], entries)
-    parts = [read_part(box, shape, goal, arrays, f"box {k}") for k, box in enumerate(boxes)]
+    parts = [read_map_part(box, shape, goal, arrays, f"box {k}") for k, box in enumerate(boxes)]
     require(any(part.claims or part.unknown for part in parts), "nothing is claimed")
     if not any(part.unknown for part in parts):  # which may need arrays
         arrays.require_no_others(
@@ -84,7 +84,7 @@ def read_map_file(header: dict[str, Any], entries: dict[str, memoryview]) -> Map
     return MapFile(shape, goal, parts)
 
 
-def read_goal(raw: object, shape: Shape) -> Goal:
+def read_map_goal(raw: object, shape: Shape) -> Goal:
     """Read the goal of a file."""
     known = table(raw, "goal", "starts ends")
 
@@ -98,7 +98,7 @@ def read_goal(raw: object, shape: Shape) -> Goal:
     return Goal(None if known["starts"] is None else regions("starts"), regions("ends"))
 
 
-def read_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: Arrays, where: str) -> Part:
+def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: Arrays, where: str) -> Part:
     """Read a box of parameters."""
     parameters = read_parameters(box["parameters"], shape.names, f"{where}: parameters")
     claims: dict[str, Any] = {}
@@ -106,9 +106,9 @@ def read_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: Arra
         name = table(claim, f"{where}: a claim", "claim section")["claim"]
         require(isinstance(name, str) and name not in claims, f"{where}: a claim is no text, or made twice")
         claims[name] = claim["section"]
-    known = {name: section for name, section in claims.items() if name in CLAIMS}
+    known = {name: section for name, section in claims.items() if name in CLAIMS_OF_MAP}
     for name, section in known.items():
-        table(section, f"{where}: section of {name}", CLAIMS[name])
+        table(section, f"{where}: section of {name}", CLAIMS_OF_MAP[name])
     require(goal is not None or not {"ends-in", "refuted"} & set(known), f"{where}: there is no goal")
     if "refuted" in known:
         require(set(claims) == {"refuted", "cycles"}, f"{where}: a refutation has to stand with cycles alone")
@@ -119,7 +119,7 @@ def read_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: Arra
     drawn = read_drawn(known["converges"], cycles, where) if "converges" in known else []
     about_cells, exits = set(known) - {"cycles", "refuted"}, "escapes" in known
     cells = MapCells(arrays, box["prefix"], shape, exits=exits) if about_cells else None
-    unknown = [name for name in claims if name not in CLAIMS]
+    unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
     numbers = read_numbers(known, shape, where)
     return Part(parameters, known, unknown, cycles, drawn=drawn, **numbers, cells=cells)
 

@@ -12,7 +12,7 @@ from .claims import entropy_of
 from .file import plain
 from .map_cells import MapCells
 from .map_cycles import Cycle, interval_in_words
-from .map_file import CLAIMS, OF_ORBITS, Goal, Part, Regions
+from .map_file import CLAIMS_OF_MAP, OF_ORBITS, Goal, Part, Regions
 from .program import named
 
 MOST_NAMED = 6
@@ -32,7 +32,7 @@ def outcome_of(
 ) -> Outcome:
     """Put in words what became of a box of parameters; `failed` has the reasons of the claims that fail."""
     claims = []
-    for name in [name for name in CLAIMS if name in part.claims]:
+    for name in [name for name in CLAIMS_OF_MAP if name in part.claims]:
         word = "failed" if name in failed else "refuted" if name == "refuted" else "proved"
         claims.append((name, word, failed.get(name) or SENTENCES[name](Proved(part, shape, goal, cycles))))
     claims += [
@@ -47,7 +47,7 @@ def outcome_of(
 def holds_for(part: Part) -> str:
     """Say which claims hold for parameters that are fixed, and which also where they change at every step."""
     wide = [named(name) for name, (lo, hi) in part.parameters.items() if lo != hi]
-    names = [name for name in CLAIMS if name in part.claims]
+    names = [name for name in CLAIMS_OF_MAP if name in part.claims]
     # who ends in the ball of a cycle tends to it, and stays, for one value only
     fixed = {*OF_ORBITS, *(("attracts-all", "ends-in") if part.drawn else ())}
     groups = (

@@ -23,7 +23,7 @@ LARGEST_POWER = 200
 LONGEST_LINE = 90  # signs of a formula: a longer part of it is printed as a line of its own
 NAN = arb("nan")
 ALL_SIGNS = arb(0, 1)
-DECIMAL = re.compile(r"-?[0-9]{1,40}(\.[0-9]{1,40})?(e[+-]?[0-9]{1,2})?")
+SHORT_DECIMAL = re.compile(r"-?[0-9]{1,40}(\.[0-9]{1,40})?(e[+-]?[0-9]{1,2})?")
 Gradient = list[Arb | None]  # by x0, x1, ... and the parameters with a range; None is exactly 0
 
 # ----------------------------------------------------------------
@@ -32,7 +32,7 @@ Gradient = list[Arb | None]  # by x0, x1, ... and the parameters with a range; N
 
 def rational(text: object, where: str) -> Fraction:
     """Read a decimal."""
-    fits = isinstance(text, str) and DECIMAL.fullmatch(text) is not None
+    fits = isinstance(text, str) and SHORT_DECIMAL.fullmatch(text) is not None
     require(fits, f"{where} is not a decimal of at most 40 digits on each side of the point")
     return Fraction(str(text))
 
@@ -86,7 +86,7 @@ def by_least(x: Arb, y: Arb, largest: Arb) -> tuple[Arb, Arb]:
     return second, first
 
 
-def by_angle(y: Arb, x: Arb, _: Arb) -> tuple[Arb, Arb]:
+def by_atan2(y: Arb, x: Arb, _: Arb) -> tuple[Arb, Arb]:
     """Return those of atan2(y, x); nan where the box meets the cut: y = 0 and x <= 0."""
     whole = x * x + y * y if x > 0 or y > 0 or y < 0 else NAN
     return x / whole, -y / whole
@@ -101,7 +101,7 @@ BINARY: dict[str, tuple[Function, Partials]] = {
     "div": (operator.truediv, by_quotient),
     "min": (arb.min, by_least),
     "max": (arb.max, by_largest),
-    "atan2": (arb.atan2, by_angle),
+    "atan2": (arb.atan2, by_atan2),
 }
 """Operations on two numbers, and their partial derivatives at x, y, from the value too."""
 
@@ -266,10 +266,10 @@ def summed(first: Arb, u: Arb | None, second: Arb, v: Arb | None) -> Arb | None:
 # Printing.
 
 SIGNS = {"add": ("+", 1), "sub": ("-", 1), "mul": ("*", 2), "div": ("/", 2)}
-WORDS = "|".join(
+RESERVED = "|".join(
     [*BINARY, *UNARY, "pow", "margin", "branch", "side", "pi", "tau", "e", "inf", "nan", "if", "else", "mod"]
 )
-MISLEADING = re.compile(rf"[xt][0-9]*(\..*)?|p\..*|{WORDS}", re.IGNORECASE)
+MISLEADING = re.compile(rf"[xt][0-9]*(\..*)?|p\..*|{RESERVED}", re.IGNORECASE)
 Written = tuple[
     str, int
 ]  # a text, and how strongly it binds: 1 sums and signs, 2 products, 3 powers and numbers, 4 names

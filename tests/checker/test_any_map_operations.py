@@ -12,7 +12,7 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 import flint
 from flint import arb
 
-from limitsets.checker.any_map import Map, Piece, map_in_words, read_map, slopes_unless
+from limitsets.checker.any_map import CellPiece, Map, map_in_words, read_map, slopes_unless
 from limitsets.checker.balls import PRECISION
 from limitsets.checker.file import BadFileError
 from limitsets.checker.program import Program, in_words, number, read_formulas
@@ -264,7 +264,7 @@ def test_bounds_that_are_proved_hold_at_random_places():
         if any(v is None or abs(v) > 1e9 for v in values):
             continue
         tried += 1
-        program, piece = Program(formulas, 2, {"a": hull(*box[2])}, ["a"]), Piece(box)
+        program, piece = Program(formulas, 2, {"a": hull(*box[2])}, ["a"]), CellPiece(box)
         low, high = min(values), max(values)
         off = (high - low) * 0.3 + abs(high) * 1e-6 + mpmath.mpf(10) ** -9
         for relation, end, beyond in ((operator.le, high, -1), (operator.ge, low, 1)):
