@@ -153,7 +153,7 @@ def noisy(within=None, **more):
 
 def entries_of(forged, tmp_path):
     path = forged.write(tmp_path / "x.proof.zip")
-    return checker.report.open_and_look(path)
+    return checker.report.open_certificate(path)
 
 
 @pytest.fixture(scope="module")

@@ -269,7 +269,7 @@ def chain_of(speed, landing, strata, tmp_path):
     )
     path = forged.write(tmp_path / "x.proof.zip")
     brackets, links = of_checker("brackets"), of_checker("links")
-    claim = brackets.read_chances(*checker.report.open_and_look(path))
+    claim = brackets.read_chances(*checker.report.open_certificate(path))
     whole = brackets.mesh_of(claim.edges)
     chain = links.chain_of(claim.noisy, whole, *brackets.kinds_of(claim, whole), lambda more: None)
     return chain, [slice(*whole.first[k : k + 2]) for k in range(3)]
