@@ -12,7 +12,7 @@ import io
 import json
 import math
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
@@ -375,6 +375,14 @@ def pack(
     }
     verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
     return written(path, header, arrays, verdicts, recheck=recheck, workers=workers)
+
+
+def require_proved(claims: Collection[Any]) -> None:
+    """Refuse to write a certificate of nothing."""
+    if not claims:
+        raise AnswerError(
+            "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
+        )
 
 
 def written(

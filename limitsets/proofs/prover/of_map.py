@@ -48,6 +48,7 @@ from limitsets.base import (
 from limitsets.base.arrays import Array, Arrays, Ints
 from limitsets.numbers.interval import guard
 from limitsets.proofs.prover.attraction import components_of
+from limitsets.proofs.prover.certificate import require_proved
 from limitsets.proofs.prover.certificate_of_map import cells_of, cycle_in_file, write_map
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, missing, read_goal, within_ends
 from limitsets.proofs.prover.numbers import Intervals
@@ -182,10 +183,7 @@ class ProofOfMap(Tabled):
             The checker does not confirm it: it is kept as NAME.denied.zip.
         """
         claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
-        if not claims:
-            raise AnswerError(
-                "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
-            )
+        require_proved(claims)
         if "cycles" in claims:
             claims["cycles"] = {"cycles": [_in_file(self, cycle) for cycle in self.cycles]}
         write_map(

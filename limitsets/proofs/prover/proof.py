@@ -16,7 +16,7 @@ from limitsets.feeder.scene import Model, Scene
 from limitsets.feeder.scene.quantities import text_at, texts
 from limitsets.feeder.scene.units import convert, parse
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.certificate import write
+from limitsets.proofs.prover.certificate import require_proved, write
 from limitsets.proofs.prover.end_points import union_of
 from limitsets.proofs.prover.goals import State, hexed, rechecked
 from limitsets.proofs.prover.parameters import whole
@@ -439,10 +439,7 @@ class Proof(Tabled):
             for claim in self.claims
             if claim.written
         ]
-        if not good:
-            raise AnswerError(
-                "the certificate", "without a proved claim", "at least one", "see the reasons in .claims"
-            )
+        require_proved(good)
         write(
             path,
             self.attractions,
