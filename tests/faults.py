@@ -47,7 +47,15 @@ Place = tuple[int, int, int, int, str]  # line and column, line and column of th
 def places(source: str) -> list[Place]:
     """List every fault that one change of an operator, a number, a condition or a statement can make in a file."""
     tree = ast.parse(source)
-    return sorted(place for node in ast.walk(tree) for place in _places(node, source))
+    flags = {id(node.value) for node in ast.walk(tree) if _is_flag(node)}
+    return sorted(
+        place for node in ast.walk(tree) if id(node) not in flags for place in _places(node, source)
+    )
+
+
+def _is_flag(node: ast.AST) -> bool:
+    """Whether an argument states what holds anyway: ``strict`` of zip, and those of dataclasses."""
+    return isinstance(node, ast.keyword) and node.arg in ("strict", "frozen", "eq", "slots", "kw_only")
 
 
 def _places(node: ast.AST, source: str) -> Iterator[Place]:
