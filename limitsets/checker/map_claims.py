@@ -13,7 +13,8 @@ from .balls import Array
 from .cells import Crew
 from .map_cells import MapCells, check_map_task, map_tasks, prepare_map
 from .map_cycles import Cycle
-from .map_file import Goal, MapFile, Part, Regions
+from .map_file import OF_ORBITS, Goal, MapFile, Part, Regions
+from .map_orbits import check_every
 from .map_words import Outcome, box_in_words, outcome_of
 
 
@@ -23,8 +24,11 @@ def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[dict
     cycles = [Cycle(the_map, listed) for listed in part.cycles]
     bad = check_cycles(cycles)
     # without the cycles it is not known which cells are final, hence nothing about the others
-    resting = part.claims if part.drawn else {"cycles", "refuted"} & set(part.claims)
+    resting = part.claims if part.drawn else set(OF_ORBITS) & set(part.claims)
     failed = dict.fromkeys(resting, bad) if bad else {}
+    if part.every is not None and not bad:
+        why = check_every(the_map, part.every, cycles)
+        failed |= {"all-cycles": why} if why else {}
     if "refuted" in part.claims and not bad:
         assert file.goal is not None
         why = check_leaving_cycle(cycles, file.goal)
@@ -76,7 +80,11 @@ def check_leaving_cycle(cycles: list[Cycle], goal: Goal) -> str:
 
 def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], crew: Crew) -> dict[str, str]:
     """Check the claims about cells: first by whole numbers, then the images; those that fail with the reasons."""
-    c, claims, final = part.cells, [name for name in part.claims if name != "cycles"], final_cells(part)
+    c, claims, final = (
+        part.cells,
+        [name for name in part.claims if name not in ("cycles", "all-cycles")],
+        final_cells(part),
+    )
     assert c is not None
     attracting = (c.component >= 0) & ~final
     bad = check_drawn(part, c, cycles) or c.check_labels(final)

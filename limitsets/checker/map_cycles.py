@@ -121,34 +121,14 @@ class Cycle:
         return "" if attracts or not self.listed.attracts else "that it attracts is not proved"
 
     def krawczyk(self, slopes: list[list[list[Arb]]]) -> str:
-        """Prove that K(X), of all points together, lies in the interior of X, and store it; "" or the reason.
-
-        With F_k = f(x_k) - x_k+1: K(X) = m - C F(m) + (1 - C DF(X)) (X - m) for the middle m and any matrix C.
-        """
-        p, d = self.period, self.map.dimension
-        pieces = [self.map.piece(box) for box in self.listed.boxes]
-        middle = [ball.mid() for piece in pieces for ball in piece.balls[:d]]
-        off = [ball - ball.mid() for piece in pieces for ball in piece.balls[:d]]
-        newton, residual = derivative_of_gaps(slopes), []
-        for k, piece in enumerate(pieces):
-            program = self.map.image[self.listed.side[k], self.listed.branch[k]]
-            images = program.at(middle[k * d : k * d + d] + piece.balls[d:])
-            after = (k + 1) % p * d
-            residual += [[image - m] for image, m in zip(images, middle[after : after + d], strict=True)]
-        near = np.array([[float(v.mid()) for v in row] for row in newton])
-        if not np.isfinite(near).all() or not np.linalg.cond(near) < WORST_MATRIX:
+        """Prove that K(X), of all points together, lies in the interior of X, and store it; "" or the reason."""
+        d, boxes = self.map.dimension, self.listed.boxes
+        entries = newton_image(self.map, (self.listed.side, self.listed.branch), boxes, slopes)
+        if not entries:
             return "Newton's matrix is singular, or nearly so"
-        c, one = matrix(np.linalg.inv(near).tolist()), matrix(np.eye(p * d).tolist())
-        moved = (
-            matrix([[v] for v in middle])
-            - c * matrix(residual)
-            + (one - c * matrix(newton)) * matrix([[v] for v in off])
-        )
-        ends = [pair for box in self.listed.boxes for pair in box]
-        entries = moved.entries()
-        if not all(v > lo and v < hi for v, (lo, hi) in zip(entries, ends, strict=True)):
+        if not all(v > lo and v < hi for v, (lo, hi) in zip(entries, itertools.chain(*boxes), strict=True)):
             return "that K(X) lies in the interior of X is not proved"
-        self.points = [entries[k * d : k * d + d] for k in range(p)]
+        self.points = [entries[k * d : k * d + d] for k in range(self.period)]
         return ""
 
     def stretches(self, slopes: list[list[list[Arb]]]) -> list[Arb]:
@@ -203,6 +183,35 @@ class Cycle:
         where = " x ".join(interval_in_words(floats_around(v)) for v in self.points[0])
         side = f", side {self.listed.side[0]}" if self.map.shape.sides > 1 else ""
         return f"period {self.period} in {where}{side}{', attracting' if self.listed.attracts else ''}"
+
+
+def newton_image(
+    the_map: Map, word: tuple[list[int], list[int]], boxes: Boxes, slopes: list[list[list[Arb]]]
+) -> list[Arb]:
+    """Return K(X) of all points of an orbit together, along the sides and branches of a word; [] if none is found.
+
+    With F_k = f(x_k) - x_k+1: K(X) = m - C F(m) + (1 - C DF(X)) (X - m) for the middle m and any matrix C.
+    """
+    p, d = len(boxes), the_map.dimension
+    newton, residual = derivative_of_gaps(slopes), []
+    near = np.array([[float(v.mid()) for v in row] for row in newton])
+    if not np.isfinite(near).all() or not np.linalg.cond(near) < WORST_MATRIX:
+        return []
+    pieces = [the_map.piece(box) for box in boxes]
+    middle = [ball.mid() for piece in pieces for ball in piece.balls[:d]]
+    off = [ball - ball.mid() for piece in pieces for ball in piece.balls[:d]]
+    for k, (side, branch, piece) in enumerate(zip(*word, pieces, strict=True)):
+        images = the_map.image[side, branch].at(middle[k * d : k * d + d] + piece.balls[d:])
+        after = (k + 1) % p * d
+        residual += [[image - m] for image, m in zip(images, middle[after : after + d], strict=True)]
+    c, one = matrix(np.linalg.inv(near).tolist()), matrix(np.eye(p * d).tolist())
+    moved = (
+        matrix([[v] for v in middle])
+        - c * matrix(residual)
+        + (one - c * matrix(newton)) * matrix([[v] for v in off])
+    )
+    entries: list[Arb] = moved.entries()
+    return entries
 
 
 def derivative_of_gaps(slopes: list[list[list[Arb]]]) -> list[list[Arb]]:

@@ -11,10 +11,12 @@ from .balls import Pair
 from .file import Arrays, hex_float, read_side, require, rows, table
 from .map_cells import MapCells
 from .map_cycles import Listed, read_box, read_cycles
+from .map_orbits import Every, read_every
 from .program import is_whole
 
 CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "cycles": "cycles",
+    "all-cycles": "period domain",
     "converges": "components cycles",
     "invariant": "",
     "trapping": "",
@@ -25,7 +27,12 @@ CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "escapes": "",
     "refuted": "",
 }
-OF_ORBITS = ("cycles", "converges", "refuted")  # the others are about cells; these hold for fixed parameters
+OF_ORBITS = (
+    "cycles",
+    "all-cycles",
+    "converges",
+    "refuted",
+)  # the others are about cells; these hold for fixed parameters
 MOST_PARAMETER_BOXES = 100_000
 Regions = list[tuple[int, list[Pair]]]  # side and box
 
@@ -44,6 +51,7 @@ class Part(NamedTuple):
     claims: dict[str, Any]  # those that are known, with their sections
     unknown: list[str]
     cycles: list[Listed]
+    every: Every | None  # what `all-cycles` says
     drawn: list[tuple[int, int]]  # by `converges`: component and cycle
     max_rank: int
     least: float  # the slope of `expanding`, 0 where that is not claimed
@@ -117,11 +125,12 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
         )
     cycles = read_cycles(known["cycles"]["cycles"], shape, where) if "cycles" in known else []
     drawn = read_drawn(known["converges"], cycles, where) if "converges" in known else []
-    about_cells, exits = set(known) - {"cycles", "refuted"}, "escapes" in known
+    every = read_every(known["all-cycles"], shape, where) if "all-cycles" in known else None
+    about_cells, exits = set(known) - {"cycles", "all-cycles", "refuted"}, "escapes" in known
     cells = MapCells(arrays, box["prefix"], shape, exits=exits) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
     numbers = read_numbers(known, shape, where)
-    return Part(parameters, known, unknown, cycles, drawn=drawn, **numbers, cells=cells)
+    return Part(parameters, known, unknown, cycles, every=every, drawn=drawn, **numbers, cells=cells)
 
 
 def read_numbers(known: dict[str, Any], shape: Shape, where: str) -> dict[str, Any]:

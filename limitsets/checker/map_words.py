@@ -108,6 +108,13 @@ class Proved:
         listed = "; ".join([*(cycle.in_words() for cycle in self.cycles[:MOST_NAMED]), *more])
         return f"{count} periodic orbit{'' if count == 1 else 's'}: {listed}"
 
+    def every_cycle(self) -> str:
+        """Say that the orbits are all."""
+        every, listed = self.part.every, "these are" if self.cycles else "there is no orbit, hence"
+        assert every is not None
+        domain = regions_in_words(list(enumerate(every.domain)), self.shape.sides)
+        return f"{listed} all periodic orbits of periods up to {every.period} whose points lie in {domain}"
+
     def converging(self) -> str:
         """Say which cells tend to which cycle."""
         drawn = self.part.drawn[:MOST_NAMED]
@@ -142,6 +149,7 @@ class Proved:
 
 SENTENCES: dict[str, Callable[[Proved], str]] = {
     "cycles": Proved.cycle_list,
+    "all-cycles": Proved.every_cycle,
     "converges": Proved.converging,
     "invariant": lambda proved: f"each component is mapped into itself: {proved.components()}",
     "trapping": lambda proved: f"each component is mapped into its interior: {proved.components()}",

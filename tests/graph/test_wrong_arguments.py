@@ -256,7 +256,7 @@ def test_a_scene_or_a_map_in_the_wrong_place_is_told_what_goes_there(error, aske
 
 
 def test_what_certify_takes_is_shown_and_taken_by_name():
-    names = "scene grid claims noise tolerance laid upper ends starts progress"
+    names = "scene grid claims noise tolerance laid upper ends starts period progress"
     assert set(names.split()) == set(inspect.signature(ls.certify).parameters)
     assert ls.certify(scene="paper-designed", claims=["invariant"]).proved
     assert ls.certify(scene=maps.Logistic(2.5), grid=ls.grid([(0.1, 0.9)], cells=512), upper=None).proved

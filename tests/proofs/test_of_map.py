@@ -11,7 +11,8 @@ import pytest
 import limitsets as ls
 from limitsets import maps
 from limitsets.base.errors import AnswerError
-from limitsets.proofs.prover.of_map import MOST_WORDS, _prove
+from limitsets.proofs.prover.of_map import MOST_WORDS
+from limitsets.proofs.prover.orbits_of_map import prove_orbit
 from limitsets.systems.sets import Cycle, cycles
 from tests.maps_of_tests import Tent
 
@@ -165,13 +166,13 @@ def test_an_orbit_that_is_not_there_for_all_parameters_is_not_proved(low, high):
     grid = ls.grid([(0.0, 1.0)], cells=64)
     proof = ls.certify(Parabola(low), grid, ["invariant"], upper=Parabola(high))
     here = Cycle(np.array([0.5]), np.zeros(1, np.int64), np.zeros(1, np.int64), 1.0, 0.0, True)
-    assert isinstance(_prove(proof, here), str)
+    assert isinstance(prove_orbit((proof.map, proof.upper), here, lambda *_: True), str)
 
 
 def test_an_orbit_found_badly_is_proved_in_a_box_that_holds_it():
     proof = ls.certify(Ricker(2.3), ls.grid([(0.2, 1.7)], cells=4096), ["invariant"])
     (true,) = cycles(proof.graph, 2, proof.cells)
-    found = _prove(proof, replace(true, x=true.x + 1e-3))
+    found = prove_orbit((proof.map, proof.map), replace(true, x=true.x + 1e-3), lambda *_: True)
     assert not isinstance(found, str)
     assert (found.lo[:, 0] <= true.x).all()
     assert (true.x <= found.hi[:, 0]).all()

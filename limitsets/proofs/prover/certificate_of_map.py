@@ -126,9 +126,9 @@ def _labels(
 # ---------------------------------------------------------------- sections
 
 
-def _hexed(values: Array) -> Any:
+def hexed(values: Array) -> Any:
     """Write floats of an array of any shape in hexadecimal."""
-    return float(values).hex() if np.ndim(values) == 0 else [_hexed(each) for each in values]
+    return float(values).hex() if np.ndim(values) == 0 else [hexed(each) for each in values]
 
 
 def cycle_in_file(lo: Array, hi: Array, side: Ints, branches: Ints, slopes: Array | None) -> dict[str, Any]:
@@ -145,11 +145,11 @@ def cycle_in_file(lo: Array, hi: Array, side: Ints, branches: Ints, slopes: Arra
     """
     wide = MORE * (hi - lo) + LEAST * np.maximum(np.maximum(np.abs(lo), np.abs(hi)), 1.0)
     return {
-        "boxes": _hexed(np.stack([lo - wide, hi + wide], axis=-1)),
+        "boxes": hexed(np.stack([lo - wide, hi + wide], axis=-1)),
         "side": side.tolist(),
         "branch": branches.tolist(),
         "attracts": slopes is not None,
-        "frames": None if slopes is None else _hexed(frames(slopes)),
+        "frames": None if slopes is None else hexed(frames(slopes)),
         "radius": None,
     }
 
@@ -197,7 +197,7 @@ def _section(claim: str, arrays: Arrays, known: Mapping[str, Any]) -> dict[str, 
         return {"max_rank": int(arrays["rank"].max())}
     if claim == "expanding":
         return {"least": (float.fromhex(known["least_slope"]) * (1.0 - LESS)).hex()}
-    return dict(known) if claim == "cycles" else {}
+    return dict(known) if claim in ("cycles", "all-cycles") else {}
 
 
 def write_map(

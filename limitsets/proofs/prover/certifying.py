@@ -217,6 +217,7 @@ def certify(
     upper: Any = None,
     ends: Any = None,
     starts: Any = None,
+    period: int | None = None,
     progress: Progress | None = None,
 ) -> ProofOfMap: ...
 def certify(
@@ -230,6 +231,7 @@ def certify(
     upper: Any = None,
     ends: Any = None,
     starts: Any = None,
+    period: int | None = None,
     progress: Progress | None = None,
 ) -> Proof | ProofOfMap:
     """Prove claims about a scene, ``certify(scene, claims)``, or about any map, ``certify(map, grid, claims)``.
@@ -263,6 +265,9 @@ def certify(
         Of a map alone, for its claim "ends-in": every start in a box of `starts` (default: in all cells that are proved
         to lead there) ends in the boxes of `ends` and stays.  A box is a list of (lo, hi) per axis; a dict gives lists
         by side.
+    period : int, optional
+        Of a map alone, for its claim "all-cycles": every orbit of a period up to this one that lies in the domain is
+        proved and listed.
     progress : callable, optional
         Called with what is tried, how much of it is done, and of how much, before each attempt.
 
@@ -291,11 +296,12 @@ def certify(
     """
     if isinstance(scene, tuple | type):
         _require_none({"noise": noise, "tolerance": tolerance, "laid": laid}, "beside a map")
-        return certify_map(scene, grid, claims, upper=upper, ends=ends, starts=starts, progress=progress)
+        return certify_map(
+            scene, grid, claims, upper=upper, ends=ends, starts=starts, period=period, progress=progress
+        )
     twice = isinstance(grid, Grid) or claims is not None  # else the claims stand in its place
-    _require_none(
-        {"upper": upper, "ends": ends, "starts": starts, "grid": grid if twice else None}, "beside a scene"
-    )
+    of_maps = {"upper": upper, "ends": ends, "starts": starts, "period": period}
+    _require_none({**of_maps, "grid": grid if twice else None}, "beside a scene")
     return certify_scene(
         scene,
         claims if grid is None else grid,

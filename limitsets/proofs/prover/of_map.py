@@ -10,11 +10,7 @@ orbit outside, but for the stays where orbits pass, which are bounded.
 the starts every path leads there.
 *Expanding*, in one dimension: |dx'/dx| > 1 on every attracting cell, on every branch that is possible there; refuted
 where it is below 1 on all of them.
-*Cycles*: for the points x_0 .. x_p-1 of an orbit along an itinerary, F_k = f(x_k) - x_k+1 and boxes X_k around them,
-K(X) = m - C F(m) + (1 - C DF(X)) (X - m) lies in the interior of X.  Then F has one root in X, whatever the matrix C,
-and it is no multiple one (Krawczyk; Neumaier, "Interval Methods for Systems of Equations", 1990, section 5.1).  All
-points at once, and not the first one under f^p: so images of a box of parameters do not grow along the orbit.  On X
-every branch is proved to be taken.
+*Cycles*: `limitsets.proofs.prover.orbits_of_map`; *all cycles*: `limitsets.proofs.prover.every_orbit`.
 
 For two corners of parameters all of it holds for each of the maps between.
 """
@@ -25,10 +21,8 @@ import functools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
-from operator import add, mul
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,62 +43,31 @@ from limitsets.base.arrays import Array, Arrays, Ints
 from limitsets.numbers.interval import guard
 from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.certificate import require_proved
-from limitsets.proofs.prover.certificate_of_map import cells_of, cycle_in_file, write_map
+from limitsets.proofs.prover.certificate_of_map import cells_of, cycle_in_file, hexed, write_map
+from limitsets.proofs.prover.every_orbit import every_orbit
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, missing, read_goal, within_ends
-from limitsets.proofs.prover.numbers import Intervals
+from limitsets.proofs.prover.orbits_of_map import CycleOfMap, prove_orbit, slopes_of
 from limitsets.proofs.prover.proof import Claim
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph, transitions
 from limitsets.systems.graph.components import ranks
 from limitsets.systems.maps import coerce, has_slope, kernels, kind_of
 from limitsets.systems.maps.contract import between
-from limitsets.systems.maps.derived import NEVER, SURE, UNKNOWN, branch_boxes
-from limitsets.systems.sets import Cycle, Cycles, cycles, cycles_of
+from limitsets.systems.maps.derived import NEVER, UNKNOWN, branch_boxes
+from limitsets.systems.sets import Cycles, cycles, cycles_of
 from limitsets.systems.sets.basin import longest_stays, passing
 
-Matrix: TypeAlias = list[list[Intervals]]
-
 # Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
-OF_SLOPES = ("cycles", "expanding")
+OF_SLOPES = ("all-cycles", "cycles", "expanding")
 
 # Largest period of the search for cycles.
 UP_TO = 16
 
-# X is K(X) of the step before and so much more of its width, until it holds its own; relative to the point at first.
-MORE, FIRST, TRIES = 0.125, 2.0**-40, 24
+# Largest period of which all orbits are looked for: the checker reads cycles of so many points.
+MOST_PERIOD = 200
 
 # Itineraries of one length (in the plane: starts) beyond which no longer cycles are looked for.
 MOST_WORDS = 2000
-
-
-@dataclass(frozen=True, eq=False)
-class CycleOfMap:
-    """A periodic orbit that is proved to exist, alone in its boxes.
-
-    Attributes
-    ----------
-    lo, hi : ndarray, shape (p, d)
-        Boxes of its points in the order of the steps; the first is the one in which it is alone.
-    side, branches : ndarray of int, shape (p,)
-        The side of each point, and the branch taken from it.
-    slope_lo, slope_hi : ndarray, shape (d, d)
-        Enclosure of the derivative of F^p.
-    attracts : bool or None
-        Whether every eigenvalue of it is below 1 in modulus; None where that is open.
-    """
-
-    lo: Array
-    hi: Array
-    side: Ints
-    branches: Ints
-    slope_lo: Array
-    slope_hi: Array
-    attracts: bool | None
-
-    @property
-    def period(self) -> int:
-        """p, the smallest one."""
-        return int(self.side.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,14 +147,14 @@ class ProofOfMap(Tabled):
         """
         claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
         require_proved(claims)
-        if "cycles" in claims:
+        if self.cycles:
             claims["cycles"] = {"cycles": [_in_file(self, cycle) for cycle in self.cycles]}
         write_map(
             path,
             (self.map, self.upper),
             self.graph.grid,
             claims,
-            arrays={} if set(claims) == {"cycles"} else self.arrays,
+            arrays={} if set(claims) <= {"cycles", "all-cycles"} else self.arrays,
             goal=self.goal.in_file() if self.goal and "ends-in" in claims else None,
             recheck=recheck,
             workers=workers,
@@ -218,7 +181,7 @@ class ProofOfMap(Tabled):
                 cells=self.graph.n_cells,
                 attracting=len(self.cells),
                 section=claim.section or None,
-                cycles=self.cycles if claim.claim == "cycles" else None,
+                cycles=self.cycles if "cycles" in claim.claim else None,
                 timings={"certify": self.seconds},
             )
             for claim in self.claims
@@ -350,151 +313,36 @@ def _expanding(proof: ProofOfMap) -> Claim:
 # ---------------------------------------------------------------- cycles
 
 
-def _stepped(
-    proof: ProofOfMap, lo: Array, hi: Array, cycle: Cycle | CycleOfMap
-) -> tuple[Intervals, Intervals] | str:
-    """Enclose images (p, d) and slopes (p, d, d) of boxes around the points of an orbit; or say what is missing."""
-    image, slope = np.empty((2, *lo.shape)), np.empty((2, *lo.shape, lo.shape[1]))
-    for side, branch in sorted(set(zip(cycle.side.tolist(), cycle.branches.tolist(), strict=True))):
-        here = np.flatnonzero((cycle.side == side) & (cycle.branches == branch))
-        boxes = branch_boxes(proof.map, proof.upper, side, branch, lo[here], hi[here])
-        if (boxes.state == UNKNOWN).any():
-            return "its images are not bounded on the boxes that are tried"
-        if (boxes.state != SURE).any():
-            return f"the branch of point {here[np.argmax(boxes.state != SURE)]} is not proved"
-        if (cycle.side[(here + 1) % cycle.period] != boxes.side).any():
-            return "it ends on another side"
-        image[:, here], slope[:, here] = (boxes.lo, boxes.hi), (boxes.slope_lo, boxes.slope_hi)
-    return Intervals(*image), Intervals(*slope)
-
-
-def _matrix(lo: Array, hi: Array) -> Matrix:
-    return [[Intervals.of(a, b) for a, b in zip(*rows, strict=True)] for rows in zip(lo, hi, strict=True)]
-
-
-def _times(a: Matrix, b: Matrix) -> Matrix:
-    columns = list(zip(*b, strict=True))
-    return [[reduce(add, map(mul, row, column)) for column in columns] for row in a]
-
-
-def _ends(a: Matrix) -> tuple[Array, Array]:
-    lo, hi = (np.array([[getattr(entry, end)[0] for entry in row] for row in a]) for end in ("lo", "hi"))
-    return lo, hi
-
-
-def _slope(steps: Intervals) -> Matrix:
-    """Enclose the derivative of the steps together."""
-    each = map(_matrix, steps.lo, steps.hi)
-    return reduce(lambda total, step: _times(step, total), each)
-
-
-def _exactly(x: Array) -> Intervals:
-    return Intervals(x, x)
-
-
-def _sum(terms: Intervals) -> Intervals:
-    """Add along the last axis."""
-    return reduce(add, map(Intervals, np.moveaxis(terms.lo, -1, 0), np.moveaxis(terms.hi, -1, 0)))
-
-
-def _inverse(slope: Intervals) -> Array:
-    """Invert DF in floats; nan, which proves nothing, where it is singular."""
-    p, d = slope.lo.shape[:2]
-    derivative = np.zeros((p, d, p, d))
-    for k in range(p):
-        derivative[k, :, k] += 0.5 * (slope.lo[k] + slope.hi[k])
-        derivative[k, :, (k + 1) % p] -= np.eye(d)
-    try:
-        return np.asarray(np.linalg.inv(derivative.reshape(p * d, p * d)), dtype=np.float64)
-    except np.linalg.LinAlgError:
-        return np.full((p * d, p * d), np.nan)
-
-
 def _in_file(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
-    slopes = None
-    if cycle.attracts:
-        step = _stepped(proof, cycle.lo, cycle.hi, cycle)
-        assert not isinstance(step, str)  # it was proved on these boxes
-        slopes = 0.5 * (step[1].lo + step[1].hi)
+    slopes = slopes_of((proof.map, proof.upper), cycle) if cycle.attracts else None
     # branches that are names alone are one in the file
     branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
     return cycle_in_file(cycle.lo, cycle.hi, cycle.side, branches, slopes)
 
 
-def _krawczyk(middle: Array, c: Array, off: Intervals, slope: Intervals, wide: Intervals) -> Intervals:
-    """K(X), from F at the middles, the slopes on X, and X less the middles."""
-    p, d = middle.shape
-    of_points = c.reshape(p * d, p, d)
-    turned = Intervals(slope.lo.swapaxes(1, 2), slope.hi.swapaxes(1, 2))
-    product_ = _sum(_exactly(of_points[:, :, None, :]) * turned) - _exactly(np.roll(of_points, 1, axis=1))
-    rest = _exactly(np.eye(p * d).reshape(p * d, p, d)) - product_
-    newton, spread = (_sum(_sum(terms)) for terms in (_exactly(of_points) * off, rest * wide))
-    moved = _exactly(middle.ravel()) - newton + spread
-    return Intervals(moved.lo.reshape(p, d), moved.hi.reshape(p, d))
-
-
-def _attracts(slope: Matrix) -> bool | None:
-    """Whether every eigenvalue lies in the unit disc: of a 2 x 2 matrix by |det| < 1 and |trace| < 1 + det (Jury)."""
-    if len(slope) == 1:
-        size = slope[0][0].absolute()
-        return True if size.hi[0] < 1.0 else (False if size.lo[0] > 1.0 else None)
-    (a, b), (c, d) = slope
-    det, trace = a * d - b * c, (a + d).absolute()
-    room = det + 1.0 - trace
-    if det.absolute().hi[0] < 1.0 and room.lo[0] > 0.0:
-        return True
-    return False if det.absolute().lo[0] > 1.0 or room.hi[0] < 0.0 else None
-
-
-@np.errstate(all="ignore")  # a singular matrix or an overflow gives inf and nan, which prove nothing
-def _prove(proof: ProofOfMap, cycle: Cycle) -> CycleOfMap | str:
-    """Prove that there is one orbit near one found in floats; or say what is missing."""
-    middle = cycle.x.reshape(cycle.period, -1).astype(np.float64)
-    step = _stepped(proof, middle, middle, cycle)
-    if isinstance(step, str):
-        return step
-    c, least = _inverse(step[1]), FIRST * np.maximum(np.abs(middle), 1.0)
-    off, lo, hi = step[0] - _exactly(np.roll(middle, -1, axis=0)), middle, middle
-    for _ in range(TRIES):
-        held = _krawczyk(middle, c, off, step[1], Intervals(lo, hi) - _exactly(middle))
-        if ((lo < held.lo) & (held.hi < hi)).all():
-            return _proved(proof, held, cycle)
-        more = MORE * (held.hi - held.lo) + least
-        lo, hi = np.minimum(held.lo - more, middle), np.maximum(held.hi + more, middle)
-        if not np.isfinite([lo, hi]).all():
-            break
-        step = _stepped(proof, lo, hi, cycle)
-        if isinstance(step, str):
-            return step
-    return "no box is found that Newton's operator contracts"
-
-
-def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
-    """Prove the sides, branches and slope of an orbit that lies in boxes; or say what is missing."""
-    step = _stepped(proof, at.lo, at.hi, cycle)
-    if isinstance(step, str):
-        return step
-    if any(
-        ((at.lo[0] <= at.hi[k]) & (at.lo[k] <= at.hi[0])).all()
-        for k in range(1, cycle.period)
-        if cycle.period % k == 0 and cycle.side[k] == cycle.side[0]
-    ):
-        return "its period may be smaller"
-    if not _within(proof.cells, at.lo[0], at.hi[0], int(cycle.side[0])):
-        return "its box is not in the attracting cells"
-    slope = _slope(step[1])
-    return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
-
-
-def _within(cells: CellSet, lo: Array, hi: Array, side: int) -> bool:
-    """Whether the cells cover a box."""
+def _within(cells: CellSet, lo: Array, hi: Array, side: Ints) -> bool:
+    """Whether invariant cells cover the first box of an orbit, and so hold the orbit."""
     grid = cells.grid
-    corners = grid.index(np.array([lo, hi]), side)
+    corners = grid.index(np.array([lo[0], hi[0]]), int(side[0]))
     if (corners < 0).any():
         return False
-    first, last = np.transpose(grid.axes(corners, side))
-    mine = cells.mask[grid.of_side(side)].reshape(grid.shape[side])
+    first, last = np.transpose(grid.axes(corners, int(side[0])))
+    mine = cells.mask[grid.of_side(int(side[0]))].reshape(grid.shape[int(side[0])])
     return bool(mine[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))].all())
+
+
+def _every_cycle(
+    proof: ProofOfMap, period: int, progress: Progress | None
+) -> tuple[Claim, tuple[CycleOfMap, ...]]:
+    kind, domain = kind_of(proof.map), proof.graph.grid.domain
+    if (len(kind.branches) > 1 and not kind.has_margin) or not has_slope(proof.map):
+        reason = "it needs slopes, and `margin` where there are branches"
+        return Claim("all-cycles", "undecided", reason, {}, final=True), ()
+    proved, missing = every_orbit((proof.map, proof.upper), domain, period, progress)
+    boxes = np.stack([domain.lo, domain.hi], axis=-1)
+    sides = [{"side": side, "box": hexed(box)} for side, box in enumerate(boxes)]
+    section = {"period": period, "domain": sides}
+    return Claim("all-cycles", "undecided" if missing else "proved", missing, section), tuple(proved)
 
 
 def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
@@ -517,7 +365,7 @@ def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[
     for number, cycle in enumerate(candidates):
         if progress is not None:
             progress("cycles", number, len(candidates))
-        answer = _prove(proof, cycle)
+        answer = prove_orbit((proof.map, proof.upper), cycle, functools.partial(_within, proof.cells))
         if isinstance(answer, CycleOfMap):
             proved.append(answer)
         else:
@@ -541,7 +389,7 @@ PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "basin": lambda proof: replace(_invariant(proof), claim="basin"),
     "trapping": lambda proof: replace(_invariant(proof), claim="trapping"),
 }
-CLAIMS_OF_MAP = (*PROVERS, "cycles")
+CLAIMS_OF_MAP = (*PROVERS, "cycles", "all-cycles")
 """What can be claimed of any map."""
 
 
@@ -566,6 +414,7 @@ def certify_map(
     upper: Any = None,
     ends: Any = None,
     starts: Any = None,
+    period: int | None = None,
     progress: Progress | None = None,
 ) -> ProofOfMap:
     """Prove claims about the attracting cells of any map; called by `limitsets.certify`.
@@ -583,6 +432,8 @@ def certify_map(
     ends, starts : sequence of boxes, optional
         Of the claim "ends-in": every start in a box of `starts` (default: in all cells that are proved to lead there)
         ends in the boxes of `ends` and stays.  A box is a list of (lo, hi) per axis; a dict gives lists by side.
+    period : int, optional
+        Of the claim "all-cycles": every orbit of a period up to this one that lies in the domain is proved and listed.
     progress : callable, optional
         Called with the step, how much of it is done, and of how much.
 
@@ -610,6 +461,11 @@ def certify_map(
     if (ends is None) is ("ends-in" in wanted) or (ends is not None and len(wanted) > 1):
         way = 'ask so: limitsets.certify(map, grid, ["ends-in"], ends=[[(lo, hi)]])'
         raise AnswerError("the claims", ", ".join(wanted), "ends-in by itself, with its boxes ends=", way)
+    if (period is None) is ("all-cycles" in wanted) or (
+        period is not None and not 1 <= period <= MOST_PERIOD
+    ):
+        way = 'ask so: limitsets.certify(map, grid, ["all-cycles"], period=8)'
+        raise AnswerError("the period", period, f"1 to {MOST_PERIOD}, with the claim all-cycles", way)
     goal = None if ends is None else read_goal(ends, starts, grid.domain)
     guard()
     _require_provable(map)
@@ -622,10 +478,18 @@ def certify_map(
         lower, upper, graph, component=components_of(graph)[0], claims=(), cycles=(), seconds=0.0, goal=goal
     )
     orbits: tuple[CycleOfMap, ...] = ()
-    answers = []
-    for word in wanted:
-        if word == "cycles":
+    answers: list[Claim] = []
+    # all cycles first: the claim "cycles" is then of these
+    for word in sorted(wanted, key=lambda word: word != "all-cycles"):
+        if word == "all-cycles":
+            answer, orbits = _every_cycle(proof, period or 1, progress)
+        elif word == "cycles" and period is None:
             answer, orbits = _cycles(proof, progress)
+        elif word == "cycles":
+            complete = answers[0].verdict == "proved"
+            section = {"cycles": len(orbits), "missing": [], "complete": complete}
+            reason = "" if orbits else "none is proved"
+            answer = Claim(word, "proved" if orbits else "undecided", reason, section)
         else:
             answer = PROVERS[word](proof)
         answers.append(answer)

@@ -1,0 +1,182 @@
+"""All periodic orbits of a map in a domain: counted against theory, rechecked, and forged."""
+
+import itertools
+import json
+import zipfile
+from fractions import Fraction
+from typing import NamedTuple
+
+import pytest
+
+import limitsets as ls
+from limitsets.base.errors import AnswerError
+from tests.proofs.test_certificates_of_maps import gap, header_of, logistic
+
+
+def henon(x, y, a, b):
+    return 1 - a * x**2 + y, b * x
+
+
+def steep(x):
+    return 4 * x * (1 - x)
+
+
+def cube(x, y, z):
+    return 0.25 * y, 2 * z + 0.25, -x
+
+
+class Switch(NamedTuple):
+    slope: float
+
+
+def switched(p, x, side):
+    return (0.5 * x + 0.1 if side == 0 else p.slope * x + 1.0), 1 - side, 0
+
+
+ls.register(Switch, image=switched)
+
+RECTANGLE = [(-1.5, 1.5), (-0.5, 0.5)]
+
+
+def counts_of_words(period):
+    """Orbits of the map with a gap by period: each word of branches has one point, in fractions; kept if it follows."""
+    s, counts = Fraction(7, 5), {}
+    for p in range(1, period + 1):
+        orbits = set()
+        for word in itertools.product((0, 1), repeat=p):
+            shifts = [Fraction(9, 10) - Fraction(19, 10) * b for b in word]
+            total = sum(c * s ** (p - 1 - k) for k, c in enumerate(shifts))
+            points = [total / (1 - s**p)]
+            for c in shifts[:-1]:
+                points.append(s * points[-1] + c)
+            follows = all((x > 0) == bool(b) for x, b in zip(points, word, strict=True))
+            if follows and len(set(points)) == p and -1.3 <= min(points) <= max(points) <= 1.2:
+                orbits.add(frozenset(points))
+        counts[p] = len(orbits)
+    return counts
+
+
+# Map, upper corner's values, box, period, and the number of orbits by period.  Of Henon's map: Galias, "Interval
+# methods for rigorous investigations of periodic orbits", 2001, and the fixed point outside the attractor.
+# x' = 4 x (1 - x) has 2^p points with F^p(x) = x.
+CASES = {
+    "henon": (lambda: ls.map(henon, a=1.4, b=0.3), {}, RECTANGLE, 9, (2, 1, 0, 1, 0, 2, 4, 7, 6)),
+    "range": (lambda: ls.map(henon, a=1.3999, b=0.3), {"a": 1.4001}, RECTANGLE, 5, (2, 1, 0, 1, 0)),
+    "steep": (lambda: ls.map(steep), {}, [(-0.25, 1.25)], 7, (2, 1, 2, 3, 6, 9, 18)),
+    "gap": (gap, {}, [(-1.3, 1.2)], 8, tuple(counts_of_words(8).values())),
+    "cube": (lambda: ls.map(cube), {}, [(-2, 2)] * 3, 3, (1, 0, 0)),
+    "sides": (lambda: Switch(-1.5), {}, [(-2, 2)], 4, (0, 1, 0, 0)),
+    "none": (lambda: ls.map(henon, a=1.4, b=0.3), {}, [(0.7, 1.5), (-0.5, 0.5)], 4, (0, 0, 0, 0)),
+}
+
+
+def certified(name):
+    make, upper, box, period, _ = CASES[name]
+    lower = make()
+    domain = ls.cells.Domain([[-2.0]] * 2, [[2.0]] * 2) if name == "sides" else box
+    grid = ls.grid(domain, cells=8)
+    corner = lower.with_values(**upper) if upper else None
+    return ls.certify(
+        lower, grid, ["all-cycles", "cycles"][: 1 + (name == "gap")], upper=corner, period=period
+    )
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_orbits_are_as_many_as_theory_says_and_the_checker_finds_no_other(name, tmp_path):
+    proof, expected = certified(name), CASES[name][4]
+    assert proof.claims[0].verdict == "proved"
+    assert tuple(sum(c.period == p for c in proof.cycles) for p in range(1, len(expected) + 1)) == expected
+    report = ls.recheck(proof.save(tmp_path / "all.proof.zip"))
+    assert report.verdict == "proved"
+    assert f"all periodic orbits of periods up to {CASES[name][3]} whose points lie in" in str(report.map)
+    if name == "gap":
+        assert proof.claims[1].section["complete"]
+    if name == "sides":  # x = -1.5 (0.5 x + 0.1) + 1 on side 0
+        on_zero = int(proof.cycles[0].side[1] == 0)
+        assert proof.cycles[0].lo[on_zero, 0] <= 0.85 / 1.75 <= proof.cycles[0].hi[on_zero, 0]
+
+
+@pytest.mark.parametrize(
+    ("make", "box", "reason"),
+    [
+        (lambda: ls.map(steep), [(0, 1)], "border"),  # the fixed point 0
+        (
+            lambda: ls.map(logistic, r=3.0),
+            [(0.1, 0.9)],
+            "multiplier",
+        ),  # slope -1 at 2/3, where a 2-cycle is born
+        (lambda: ls.map(logistic, r=1.0), [(-0.5, 0.5)], "multiplier"),  # a double fixed point
+    ],
+)
+def test_what_cannot_be_told_apart_stays_open(make, box, reason):
+    claim = ls.certify(make(), ls.grid(box, cells=8), ["all-cycles"], period=2).claims[0]
+    assert claim.verdict == "undecided"
+    assert reason in claim.reason
+
+
+def test_the_period_stands_with_its_claim_alone():
+    grid = ls.grid(RECTANGLE, cells=8)
+    for claims, period in (
+        (["all-cycles"], None),
+        (["cycles"], 3),
+        (["all-cycles"], 0),
+        (["all-cycles"], 201),
+    ):
+        with pytest.raises(AnswerError, match="the period"):
+            ls.certify(ls.map(henon, a=1.4, b=0.3), grid, claims, period=period)
+
+
+def rewritten(file, change):
+    """Write a certificate without arrays again, with another header."""
+    header = header_of(file)
+    sections = {each["claim"]: each["section"] for each in header["boxes"][0]["claims"]}
+    change(sections)
+    with zipfile.ZipFile(file) as packed:
+        arrays = packed.read("arrays.npz")
+    with zipfile.ZipFile(file, "w") as packed:
+        packed.writestr("header.json", json.dumps(header))
+        packed.writestr("arrays.npz", arrays)
+    return ls.recheck(file)
+
+
+def wider(sections):
+    sections["all-cycles"]["domain"][0]["box"][0] = [(-1.5).hex(), (1.5).hex()]
+
+
+FORGED = {
+    "an orbit is left out": (lambda s: s["cycles"]["cycles"].pop(0), "not told apart from the listed"),
+    "one more period": (lambda s: s["all-cycles"].update(period=6), "not told apart from the listed"),
+    "a domain with another fixed point": (wider, "not told apart from the listed"),
+    "an orbit of a longer period": (lambda s: s["all-cycles"].update(period=3), "longer period"),
+    "a domain without an orbit": (
+        lambda s: s["all-cycles"]["domain"][0]["box"].__setitem__(0, [(0.5).hex(), (1.5).hex()]),
+        "lies in the domain is not proved",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_a_list_that_is_not_complete_is_denied(name, tmp_path):
+    change, reason = FORGED[name]
+    grid = ls.grid([(-1.0, 1.5), (-0.5, 0.5)], cells=8)
+    proof = ls.certify(ls.map(henon, a=1.4, b=0.3), grid, ["all-cycles"], period=4)
+    report = rewritten(proof.save(tmp_path / "all.proof.zip"), change)
+    assert report.verdict == "failed"
+    assert reason in {claim: text for claim, _, text in report.claims}["all-cycles"]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda section: section.update(period=2.5),
+        lambda section: section.update(period=0),
+        lambda section: section.update(domain=[]),
+        lambda section: section["domain"][0].update(side=1),
+        lambda section: section["domain"][0]["box"][0].reverse(),
+        lambda section: section.update(more=1),
+    ],
+)
+def test_an_odd_claim_is_a_bad_file(change, tmp_path):
+    proof = ls.certify(ls.map(henon, a=1.4, b=0.3), ls.grid(RECTANGLE, cells=8), ["all-cycles"], period=2)
+    report = rewritten(proof.save(tmp_path / "all.proof.zip"), lambda s: change(s["all-cycles"]))
+    assert report.verdict == "bad file"
