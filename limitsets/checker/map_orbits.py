@@ -182,11 +182,7 @@ def unlisted(the_map: Map, tube: Tube, cycles: list[Cycle]) -> Tube | None:
     Every orbit in a wider W lies in K(W); where that lies in the interior, W has exactly one orbit along these
     branches, which is the listed one if W holds that.
     """
-    size = max(abs(end) for box in tube.boxes for pair in box for end in pair)
-    wider = [
-        [(lo - WIDER * (hi - lo) - BY_SIZE * size, hi + WIDER * (hi - lo) + BY_SIZE * size) for lo, hi in box]
-        for box in tube.boxes
-    ]
+    wider = widened(tube.boxes)
     d = the_map.dimension
     slopes = [
         [g[:d] for g in the_map.image[step].gradients(the_map.piece(box).balls)]
@@ -206,6 +202,14 @@ def unlisted(the_map: Map, tube: Tube, cycles: list[Cycle]) -> Tube | None:
     if any(lo > hi for lo, hi in cut):
         return None
     return tube._replace(boxes=[cut[k * d : k * d + d] for k in range(len(tube.boxes))])
+
+
+def widened(boxes: Boxes) -> Boxes:
+    """Return W, in whose interior the boxes of a tube lie."""
+    tiny = BY_SIZE * max(abs(end) for box in boxes for pair in box for end in pair)
+    return [
+        [(lo - WIDER * (hi - lo) - tiny, hi + WIDER * (hi - lo) + tiny) for lo, hi in box] for box in boxes
+    ]
 
 
 def lies_in(cycle: Cycle, tube: Tube, wider: Boxes) -> bool:

@@ -333,16 +333,24 @@ def _within(cells: CellSet, lo: Array, hi: Array, side: Ints) -> bool:
 
 def _every_cycle(
     proof: ProofOfMap, period: int, progress: Progress | None
-) -> tuple[Claim, tuple[CycleOfMap, ...]]:
+) -> tuple[Claim, Claim, tuple[CycleOfMap, ...]]:
     kind, domain = kind_of(proof.map), proof.graph.grid.domain
     if (len(kind.branches) > 1 and not kind.has_margin) or not has_slope(proof.map):
         reason = "it needs slopes, and `margin` where there are branches"
-        return Claim("all-cycles", "undecided", reason, {}, final=True), ()
+        open_ = [Claim(word, "undecided", reason, {}, final=True) for word in ("all-cycles", "cycles")]
+        return open_[0], open_[1], ()
     proved, missing = every_orbit((proof.map, proof.upper), domain, period, progress)
     boxes = np.stack([domain.lo, domain.hi], axis=-1)
     sides = [{"side": side, "box": hexed(box)} for side, box in enumerate(boxes)]
     section = {"period": period, "domain": sides}
-    return Claim("all-cycles", "undecided" if missing else "proved", missing, section), tuple(proved)
+    listed = {"cycles": len(proved), "missing": [], "complete": not missing}
+    return (
+        Claim("all-cycles", "undecided" if missing else "proved", missing, section),
+        Claim("cycles", "proved", "", listed)
+        if proved
+        else Claim("cycles", "undecided", "none is proved", {}),
+        tuple(proved),
+    )
 
 
 def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
@@ -404,6 +412,24 @@ def _require_provable(lower: Any) -> None:
             raise AnswerError("the map", f"{kind.name}, which has {name}", allowed, way)
 
 
+def _wanted(claims: Sequence[str] | None, ends: Any, period: int | None) -> tuple[str, ...]:
+    """Return what is claimed, by default what the other arguments are for; refuse those without their claim."""
+    usual = "ends-in" if ends is not None else "attracts-all" if period is None else "all-cycles"
+    wanted = tuple(dict.fromkeys(claims or (usual,)))
+    for claim in wanted:
+        if claim not in CLAIMS_OF_MAP:
+            raise AnswerError("the claim about a map", claim, ", ".join(CLAIMS_OF_MAP), "correct the word")
+    if (ends is None) is ("ends-in" in wanted) or (ends is not None and len(wanted) > 1):
+        way = 'ask so: limitsets.certify(map, grid, ["ends-in"], ends=[[(lo, hi)]])'
+        raise AnswerError("the claims", ", ".join(wanted), "ends-in by itself, with its boxes ends=", way)
+    if ("all-cycles" in wanted and period is None) or (
+        period is not None and ("all-cycles" not in wanted or not 1 <= period <= MOST_PERIOD)
+    ):
+        way = 'ask so: limitsets.certify(map, grid, ["all-cycles"], period=8)'
+        raise AnswerError("the period", period, f"1 to {MOST_PERIOD}, with the claim all-cycles", way)
+    return wanted
+
+
 @shown_in_notebooks
 @arguments_checked_as("certify")
 def certify_map(
@@ -426,7 +452,8 @@ def certify_map(
     grid : Grid
         The cells; finer ones prove more.
     claims : sequence of str, optional
-        Of `CLAIMS_OF_MAP`; default ("attracts-all",), or ("ends-in",) where `ends` are given.
+        Of `CLAIMS_OF_MAP`; default ("attracts-all",), or ("ends-in",) and ("all-cycles",) where `ends` or a `period`
+        are given.
     upper : NamedTuple, optional
         The upper corner of the parameters; default `map`.
     ends, starts : sequence of boxes, optional
@@ -451,21 +478,10 @@ def certify_map(
     """
     begin = time.perf_counter()
     kind_of(map)
-    wanted = tuple(dict.fromkeys(claims or (("attracts-all",) if ends is None else ("ends-in",))))
-    for claim in wanted:
-        if claim not in CLAIMS_OF_MAP:
-            raise AnswerError("the claim about a map", claim, ", ".join(CLAIMS_OF_MAP), "correct the word")
+    wanted = _wanted(claims, ends, period)
     if grid is None:
         way = "limitsets.certify(map, limitsets.grid([(lo, hi)], cells=1024))"
         raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
-    if (ends is None) is ("ends-in" in wanted) or (ends is not None and len(wanted) > 1):
-        way = 'ask so: limitsets.certify(map, grid, ["ends-in"], ends=[[(lo, hi)]])'
-        raise AnswerError("the claims", ", ".join(wanted), "ends-in by itself, with its boxes ends=", way)
-    if (period is None) is ("all-cycles" in wanted) or (
-        period is not None and not 1 <= period <= MOST_PERIOD
-    ):
-        way = 'ask so: limitsets.certify(map, grid, ["all-cycles"], period=8)'
-        raise AnswerError("the period", period, f"1 to {MOST_PERIOD}, with the claim all-cycles", way)
     goal = None if ends is None else read_goal(ends, starts, grid.domain)
     guard()
     _require_provable(map)
@@ -477,20 +493,11 @@ def certify_map(
     proof = ProofOfMap(
         lower, upper, graph, component=components_of(graph)[0], claims=(), cycles=(), seconds=0.0, goal=goal
     )
+    of_orbits: dict[str, Claim] = {}
     orbits: tuple[CycleOfMap, ...] = ()
-    answers: list[Claim] = []
-    # all cycles first: the claim "cycles" is then of these
-    for word in sorted(wanted, key=lambda word: word != "all-cycles"):
-        if word == "all-cycles":
-            answer, orbits = _every_cycle(proof, period or 1, progress)
-        elif word == "cycles" and period is None:
-            answer, orbits = _cycles(proof, progress)
-        elif word == "cycles":
-            complete = answers[0].verdict == "proved"
-            section = {"cycles": len(orbits), "missing": [], "complete": complete}
-            reason = "" if orbits else "none is proved"
-            answer = Claim(word, "proved" if orbits else "undecided", reason, section)
-        else:
-            answer = PROVERS[word](proof)
-        answers.append(answer)
-    return replace(proof, claims=tuple(answers), cycles=orbits, seconds=time.perf_counter() - begin)
+    if period is not None:
+        of_orbits["all-cycles"], of_orbits["cycles"], orbits = _every_cycle(proof, period, progress)
+    elif "cycles" in wanted:
+        of_orbits["cycles"], orbits = _cycles(proof, progress)
+    answers = tuple(of_orbits[word] if word in of_orbits else PROVERS[word](proof) for word in wanted)
+    return replace(proof, claims=answers, cycles=orbits, seconds=time.perf_counter() - begin)
