@@ -337,8 +337,8 @@ def _every_cycle(
     kind, domain = kind_of(proof.map), proof.graph.grid.domain
     if (len(kind.branches) > 1 and not kind.has_margin) or not has_slope(proof.map):
         reason = "it needs slopes, and `margin` where there are branches"
-        open_ = [Claim(word, "undecided", reason, {}, final=True) for word in ("all-cycles", "cycles")]
-        return open_[0], open_[1], ()
+        undecided = [Claim(word, "undecided", reason, {}, final=True) for word in ("all-cycles", "cycles")]
+        return undecided[0], undecided[1], ()
     proved, missing = every_orbit((proof.map, proof.upper), domain, period, progress)
     boxes = np.stack([domain.lo, domain.hi], axis=-1)
     sides = [{"side": side, "box": hexed(box)} for side, box in enumerate(boxes)]
