@@ -8,6 +8,7 @@ import pytest
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
+from limitsets.checker.report import Report, on_cells_in_words
 from tests.proofs import forge
 from tests.proofs.test_probabilities import certificate, mesh, section_of
 from tests.proofs.test_recheck import verdict
@@ -51,6 +52,22 @@ def test_starts_that_overlap_are_refused(tmp_path):
     twice = {"right": np.array([[0.33, 0.34]])}
     touching = chances([[2, "15 in", "17 in"], [2, "17 in", "18 in"]], 17.0, twice)
     assert verdict(touching, tmp_path).verdict == "proved"
+
+
+@pytest.mark.parametrize(
+    ("starts", "laid", "said"),
+    [
+        ("cells", False, "starts in the cells only, 12.5 % of the arm or more"),
+        ({"from": {"0": 1.0}}, False, "starts from some x on only, 12.5 % of the arm or more"),
+        (
+            "cells",
+            True,
+            "starts in the cells only, 12.5 % of the ranges in which parts are laid down or more",
+        ),
+    ],
+)
+def test_a_goal_that_is_not_proved_for_all_starts_says_for_which(starts, laid, said):
+    assert said in on_cells_in_words(Report(starts=starts, share=0.125), laid=laid)
 
 
 # strata, and what is said that is false; cells under a single stratum have no bounds, and one that is a third as wide

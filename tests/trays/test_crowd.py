@@ -52,6 +52,32 @@ def test_parts_that_pass_through_each_other_fill_a_depression_as_single_ones_do(
     assert same >= 37  # the plates lie at different x, and rounding decides some bounces
 
 
+@pytest.mark.parametrize(("depressions", "over"), [(1, True), (2, False)])
+def test_a_part_comes_above_what_is_in_its_way_and_no_higher_than_it_would(
+    asked, monkeypatch, depressions, over
+):
+    tray = _Strewn(Pouring(asked, 2, depressions, 1, 0), between=True)
+    came = [asked.arrival(np.random.default_rng(k)) for k in range(2)]
+    boxes, drop = [], tray.crowd.drop
+
+    def seen(number, pose):
+        drop(number, pose)
+        xs, ys = zip(*tray.crowd.members[number].world(), strict=True)
+        boxes.append((pose[1], min(xs), max(xs), min(ys), max(ys)))
+
+    monkeypatch.setattr(tray.crowd, "drop", seen)
+    monkeypatch.setattr(tray, "_settle", lambda: None)
+    tray.pour(0, came)
+    (first, *one), (second, *other) = boxes
+    assert first == came[0][0].y
+    assert (one[0] < other[1] and other[0] < one[1]) is over
+    if over:
+        assert other[2] == pytest.approx(max(one[3], other[2]), rel=1e-12)
+        assert second > came[1][0].y
+    else:
+        assert second == came[1][0].y
+
+
 @pytest.mark.parametrize("each", [1.0, 3.0, 0.25, 2.5])
 def test_the_chain_of_many_parts_is_a_product_of_passes(each):
     random = np.random.default_rng(4)
