@@ -266,3 +266,32 @@ def test_derived_boxes(benchmark, name, table):
     for what, value in (("median", np.median(ratio)), ("mean", ratio.mean()), ("largest", ratio.max())):
         table.append(limit(f"boxes of {name}, derived: {what} width to that by hand", float(value), "", None))
     table.append(versus(f"boxes of {name}, derived, a cell", turns, "by hand", unit="ns", per=own.size))
+
+
+# ----------------------------------------------------------------
+# Every periodic orbit of Henon's map up to period 16, and that the list is complete.
+
+# Galias, "Interval methods for rigorous investigations of periodic orbits", 2001; of period 1 also the one outside.
+HENON_ORBITS = (2, 1, 0, 1, 0, 2, 4, 7, 6, 10, 14, 19, 32, 44, 72, 102)
+
+
+def henon_step(x, y, a, b):
+    return 1 - a * x**2 + y, b * x
+
+
+def test_all_periodic_orbits_of_henon(table, tmp_path):
+    """One file of 316 orbits; its recheck searches the rectangle again."""
+    henon = ls.map(henon_step, a=1.4, b=0.3)
+    rectangle = ls.grid([(-1.5, 1.5), (-0.5, 0.5)], cells=16)
+    ls.certify(henon, rectangle, ["all-cycles"], period=2)  # compiled
+    begin = perf_counter()
+    proof = ls.certify(henon, rectangle, ["all-cycles"], period=len(HENON_ORBITS))
+    proved = perf_counter()
+    counts = tuple(sum(cycle.period == p for cycle in proof.cycles) for p in range(1, len(HENON_ORBITS) + 1))
+    assert proof.proved
+    assert counts == HENON_ORBITS
+    file = proof.save(tmp_path / "henon.proof.zip", recheck=False)
+    table.append(limit("all 316 orbits of Henon's map to period 16, proved", proved - begin, "s", None))
+    begin = perf_counter()
+    assert recheck(file).verdict == "proved"
+    table.append(limit("the same list rechecked as complete", perf_counter() - begin, "s", None))
