@@ -5,18 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
-from limitsets.base import AnswerError, Table
+from limitsets.base import AnswerError, LimitsetsError, Table
 from limitsets.face import report
 from limitsets.face.cli.arguments import certified, deviations, laid_ranges, own_file, said_of, with_ending
-from limitsets.face.cli.commands import Answer, Run, Scene, Words, command
+from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
 from limitsets.face.cli.output import saved
+from limitsets.face.cli.subjects import (
+    MapOfFile,
+    grid_of,
+    of_map_alone,
+    of_scene_alone,
+    spans,
+    subject,
+)
 
 if TYPE_CHECKING:
+    from limitsets.feeder.scene import Scene as SceneOf
     from limitsets.proofs.prover import Claim, Proof
     from limitsets.proofs.prover.goals import State
+    from limitsets.systems.cells import Grid
 
 
 # States of a counterexample that are printed: the start, and the last of them.
@@ -28,7 +38,11 @@ REFUTED = {
 }
 
 
-@command()
+# Cells along each axis of a map's domain.
+CELLS = 512
+
+
+@command(out="--save")
 def certify(
     run: Run,
     scene: Scene,
@@ -37,34 +51,86 @@ def certify(
     tolerance: Words = None,
     noise: Words = None,
     laid: Words = None,
+    set_: Words = None,
+    domain: str | None = None,
+    cells: Annotated[int | None, limits(min=1)] = None,
+    ends: Words = None,
+    starts: Words = None,
     no_recheck: bool = False,
 ) -> Answer:
-    """Prove where the throws lead, and write a certificate that `limitsets recheck` verifies; it is checked first.
+    """Prove where orbits lead, and write a certificate that `limitsets recheck` verifies; it is checked first.
 
     Exit 1 where a claim is not proved.
 
     Parameters
     ----------
-    claim : C
-        What to prove: attracts-all, invariant, trapping, end-points, cycles, expanding or goal; repeatable.
+    scene : SCENE
+        A built-in name, a TOML file, or a map FILE.py:NAME; the Python file is run.
+    claim : C,C
+        What to prove: attracts-all, invariant, trapping, cycles, expanding; of a scene also end-points, goal; of a map
+        also basin and, with --ends, ends-in; repeatable.
     tolerance : Q=DEV
-        A quantity that is fixed but unknown, like throw.speed='0.7 %'; repeatable.
+        Of a scene: a quantity that is fixed but unknown, like throw.speed='0.7 %'; repeatable.
     noise : Q=DEV
-        What differs at every throw: throw.speed, gravity.tilt, landing.x, like throw.speed='0.3 %';
+        Of a scene: what differs at every throw: throw.speed, gravity.tilt, landing.x, like throw.speed='0.3 %';
         repeatable.
+    set_ : NAME=NUMBER
+        Of a map: the value of a parameter, like a=1.4, or its range, like a=1.4:1.41; repeatable.
+    domain : LO:HI,LO:HI
+        Of a map: a range for each coordinate.
+    cells : N
+        Of a map: cells along each axis, 512 by default; finer ones prove more.
+    ends : LO:HI,LO:HI
+        Of a map: a box in which orbits have to end; repeatable.
+    starts : LO:HI,LO:HI
+        Of a map, with --ends: a box of starts; repeatable; by default all that are proved to end there.
     out : FILE
-        The certificate, NAME.proof.zip; ./ and the scene's name by default.
+        The certificate, NAME.proof.zip; ./ and the name of the scene or map by default.
     """
+    words = [word.strip() for each in claim or [] for word in each.split(",")]
+    chosen = subject(scene, set_)
+    if isinstance(chosen, MapOfFile):
+        of_map_alone({"--tolerance": tolerance, "--noise": noise, "--laid": laid})
+        if starts and not ends:
+            remedy = "name with --ends where these have to end"
+            raise LimitsetsError("the option --starts", " ".join(starts), "beside --ends", remedy)
+        boxes = {
+            name: [spans(box, f"--{name}") for box in given] if given else None
+            for name, given in (("ends", ends), ("starts", starts))
+        }
+        return _of_map(
+            run,
+            chosen,
+            grid_of(chosen, domain, cells or CELLS),
+            words,
+            boxes=boxes,
+            recheck=not no_recheck,
+        )
+    of_scene_alone(chosen, {"--domain": domain, "--cells": cells, "--ends": ends, "--starts": starts})
+    return _of_scene(run, chosen, words, tolerance, noise, laid=laid, recheck=not no_recheck)
+
+
+def _of_scene(
+    run: Run,
+    chosen: SceneOf,
+    claims: list[str],
+    tolerance: Words,
+    noise: Words,
+    *,
+    laid: Words,
+    recheck: bool,
+) -> Answer:
+    """Prove claims about a scene."""
     fixed, varying = deviations("--tolerance", tolerance), deviations("--noise", noise)
-    begins, chosen = laid_ranges(laid), ls.load(scene)
+    begins = laid_ranges(laid)
     file = own_file(chosen) if run.out is None else with_ending(run.out)
     with saved(file):  # refuses a place that cannot be written before anything is proved
         proof = ls.certify(
-            chosen, claim or None, noise=varying, tolerance=fixed, laid=begins, progress=run.tell
+            chosen, claims or None, noise=varying, tolerance=fixed, laid=begins, progress=run.tell
         )
     some = any(each.written for each in proof.claims)
     run.tell("recheck", 0, 1)
-    proof, written = certified(proof, file, proved=some and not proof.effects, recheck=not no_recheck)
+    proof, written = certified(proof, file, proved=some and not proof.effects, recheck=recheck)
     again = {"recheck": written and written["recheck"]}
     records = [each | {"timings": each["timings"] | again} for each in proof.to_json()]
     missing = "nothing rechecks maps with effects" if some and proof.effects else "nothing is proved"
@@ -77,6 +143,35 @@ def certify(
 
     code, about = 0 if proof.proved else 1, run.about(proof.model, chosen)
     return Answer(records, words, proof.table, code=code, about=about)
+
+
+def _of_map(
+    run: Run, chosen: MapOfFile, grid: Grid, claims: list[str], boxes: dict[str, Any], *, recheck: bool
+) -> Answer:
+    """Prove claims about a map of a file."""
+    file = with_ending(run.out or Path(f"{chosen.name}.proof.zip"))
+    with saved(file):  # refuses a place that cannot be written before anything is proved
+        proof = ls.certify(chosen.lower, grid, claims or None, upper=chosen.upper, **boxes, progress=run.tell)
+    some, missing = any(claim.verdict == "proved" for claim in proof.claims), "nothing is proved"
+    run.tell("recheck", 0, 1)
+    try:
+        proof, written = certified(proof, file, proved=some, recheck=recheck)
+    except AnswerError as error:  # of what is proved no file can be made: a function that cannot be recorded
+        missing, (_, written) = str(error), certified(proof, file, proved=False, recheck=recheck)
+    again = {"recheck": written and written["recheck"]}
+    records = [each | {"timings": each["timings"] | again} for each in proof.to_json()]
+
+    def words() -> Iterator[str | Table]:
+        yield f"{chosen.name}: {proof.graph.n_cells} cells, {proof.seconds:.2g} s"
+        for name, lo, hi in zip(proof.map._fields, proof.map, proof.upper, strict=True):
+            if lo is not hi and lo != hi:
+                yield f"for every {name} from {lo} to {hi}, also if it changes at every step"
+        for table in proof.tables():
+            yield f"\n{table.caption}" + (f" ({table.how})" if table.how else "")
+            yield table
+        yield from said_of(written, missing, partly=not proof.proved)
+
+    return Answer(records, words, proof.table, code=0 if proof.proved else 1)
 
 
 def _text(proof: Proof) -> Iterator[str | Table]:

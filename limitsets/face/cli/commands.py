@@ -78,7 +78,13 @@ _SHARED = {
     "json": _OUT.replace(name="json", annotation=bool, default=False),
 }
 
-_FLAGS = {"out": ("--out", "-o"), "form": ("--format",), "from_": ("--from",)}
+_FLAGS = {
+    "out": ("--out", "-o"),
+    "form": ("--format",),
+    "from_": ("--from",),
+    "set_": ("--set",),
+    "claim": ("--claim", "--claims"),
+}
 
 _LAID = (
     "Where parts are laid down, like 0=8:20 or 0='8 in:20 in'; repeatable. The goal's starts are these; "
@@ -106,14 +112,14 @@ def _documented(text: str) -> tuple[str, dict[str, tuple[str, str]]]:
     return about, {name: (metavar, " ".join(words.split())) for name, metavar, words in entries}
 
 
-def _declared(parameter: Parameter, metavar: str, words: str) -> Parameter:
+def _declared(parameter: Parameter, metavar: str, words: str, more_flags: Sequence[str] = ()) -> Parameter:
     """Make an option of a parameter, or an argument of one that is positional."""
     kind, more = parameter.annotation, {}
     if get_origin(kind) is Annotated:
         kind, more = get_args(kind)
     if parameter.kind is Parameter.KEYWORD_ONLY:
         flags = _FLAGS.get(parameter.name, (f"--{parameter.name.replace('_', '-')}",))
-        about = typer.Option(*flags, metavar=metavar or None, help=words, **more)
+        about = typer.Option(*flags, *more_flags, metavar=metavar or None, help=words, **more)
     else:
         about = typer.Argument(metavar=metavar, help=words, **more)
     return parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=Annotated[kind, about])
@@ -254,11 +260,12 @@ COMMANDS: defaultdict[str, list[Callable[..., None]]] = defaultdict(list)
 
 
 def command(
-    *, out: bool = True, html: bool = False, form: bool = False, csv: bool = True, json: bool = True
+    *, out: bool | str = True, html: bool = False, form: bool = False, csv: bool = True, json: bool = True
 ) -> Callable[[Callable[..., Answer]], Callable[..., None]]:
     """Make a command of a function of a `Run`, with the shared options that are wanted here.
 
-    What its docstring says of `out` is a folder, or a file of its own; else the file is that of the JSON.
+    What its docstring says of `out` is a folder, or a file of its own; else the file is that of the JSON.  Where `out`
+    is a text, it is one more name of that option.
     """
     wanted = {"out": out, "html": html, "form": form, "csv": csv, "json": json}
     shared = [parameter for name, parameter in _SHARED.items() if wanted[name]]
@@ -278,7 +285,11 @@ def command(
             raise typer.Exit(answer.code)
 
         none = "", ""  # under python -OO there are no docstrings
-        declared = [_declared(each, *words.get(each.name, none)) for each in (*parameters, *shared)]
+        also = {"out": [out]} if isinstance(out, str) else {}
+        declared = [
+            _declared(each, *words.get(each.name, none), also.get(each.name, ()))
+            for each in (*parameters, *shared)
+        ]
         vars(run)["__signature__"] = inspect.Signature(declared)
         run.__name__, run.__doc__, run.__annotations__ = function.__name__, about, {}
         COMMANDS[function.__module__].append(run)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
 from limitsets.base import Table, joined
@@ -13,6 +13,7 @@ from limitsets.face import report
 from limitsets.face.cli.arguments import deviations, goal_at, laid_ranges, scattering_of
 from limitsets.face.cli.commands import About, Answer, Run, Scene, Words, command, limits
 from limitsets.face.cli.output import processes, saved, stem_of
+from limitsets.face.cli.subjects import MapOfFile, domain_of, of_map_alone, of_scene_alone, subject
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene as SceneOf
@@ -225,17 +226,21 @@ def atlas(
     margin: str | None = None,
     reading: str = "fixed",
     certify: bool = False,
+    set_: Words = None,
+    domain: str | None = None,
     workers: Annotated[int | None, limits(min=1)] = None,
     cluster: str | None = None,
     refine: bool = False,
     coarse: Annotated[int, limits(min=2)] = 8,
 ) -> Answer:
-    """Vary one or two quantities of a scene, and keep what a task says at every point.
+    """Vary one or two quantities of a scene or a map, and keep what a task says at every point.
 
     A run that was interrupted goes on when the same command is given again.
 
     Parameters
     ----------
+    scene : SCENE
+        A built-in name, a TOML file, or a map FILE.py:NAME; the Python file is run.
     x : Q=LO:HI:N
         What varies: throw.speed=120:180:1000, or with units throw.speed='120 deg/s:180 deg/s:1000'.
     y : Q=LO:HI:N
@@ -250,6 +255,10 @@ def atlas(
         Of --margin: fixed (but unknown) or per-throw.
     certify
         Prove what holds in each cell of the window; writes NAME-regions.proof.zip.
+    set_ : NAME=NUMBER
+        Of a map: the value of a parameter that does not vary, like b=0.3; repeatable.
+    domain : LO:HI,LO:HI
+        Of a map: a range for each coordinate.
     workers : N
         Processes; default: one a core.
     cluster : URL
@@ -265,13 +274,20 @@ def atlas(
 
     if task is not None:  # a file in the current folder can be imported, as with `python -m`
         sys.path.insert(0, str(Path.cwd()))
-    chosen = ls.load(scene)
-    store = run.out or Path(f"{stem_of(chosen)}-atlas.zarr")
+    chosen = subject(scene, set_)
+    if isinstance(chosen, MapOfFile):
+        of_map_alone({"--margin": margin, "--certify": certify or None})
+        name, box = chosen.name, domain_of(chosen, domain)
+        about: Any = chosen.one()
+    else:
+        name, about, box = stem_of(chosen), of_scene_alone(chosen, {"--domain": domain}), None
+    store = run.out or Path(f"{name}-atlas.zarr")
     wanted = [name.strip() for words in variables or [] for name in words.split(",")]
     answers = ls.atlas(
-        chosen,
+        about,
         x,
         y,
+        domain=box,
         task=task,
         variables=wanted or None,
         options=None if margin is None else {"margin": margin, "reading": reading},
@@ -291,7 +307,7 @@ def atlas(
     if answers.model is not None:
         last.append(run.about(answers.model).line())
     if certify:
-        proof = Path(f"{stem_of(chosen)}-regions.proof.zip")
+        proof = Path(f"{name}-regions.proof.zip")
         with processes(workers) as pool:
             regions = answers.certify(executor=pool, progress=run.tell)
         run.tell("certificate", 0, 1)

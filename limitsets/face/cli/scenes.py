@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
 from limitsets.base import Column, LimitsetsError, Table, picked, proposed
-from limitsets.face.cli.commands import Answer, Run, Scene, command, limits
+from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
+from limitsets.face.cli.subjects import MapOfFile, domain_of, of_map_alone, of_scene_alone, subject
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene as SceneOf
@@ -227,19 +228,25 @@ def explore(
     scene: str | None = None,
     *,
     atlas: Path | None = None,
+    set_: Words = None,
+    domain: str | None = None,
     port: Annotated[int, limits(min=0, max=65_535)] = 5006,
     address: str = "127.0.0.1",
     allow_origin: list[str] | None = None,
     no_show: bool = False,
 ) -> Answer:
-    """Open a page where sliders move a scene, and its limit sets, basins and goal follow.
+    """Open a page where sliders move a scene or a map, and its limit sets, basins and goal follow.
 
     Parameters
     ----------
     scene : SCENE
-        A built-in name or a TOML file; paper-designed by default.
+        A built-in name, a TOML file, or a map FILE.py:NAME (the Python file is run); paper-designed by default.
     atlas : STORE
         The store of an atlas of the scene, shown beside it; without SCENE its scene is opened.
+    set_ : NAME=NUMBER
+        Of a map: the value of a parameter to begin with, like a=1.4; repeatable.
+    domain : LO:HI,LO:HI
+        Of a map: a range for each coordinate.
     port : N
         0 for any that is free.
     address : HOST
@@ -254,8 +261,13 @@ def explore(
     required()
     from limitsets.face.explorer.visits import stored_atlas
 
-    chosen = scene or (FIRST if atlas is None else stored_atlas(atlas)[0])
-    explorer = ls.explore(chosen, atlas=atlas)
+    stored = scene is None and atlas is not None
+    about = stored_atlas(atlas)[0] if stored and atlas else subject(scene or FIRST, set_)
+    if isinstance(about, MapOfFile):
+        of_map_alone({"--atlas": atlas})
+        explorer = ls.explore(about.one(), domain=domain_of(about, domain))
+    else:
+        explorer = ls.explore(of_scene_alone(about, {"--domain": domain}), atlas=atlas)
     explorer.prepare(run.tell)
 
     def words() -> tuple[str, ...]:

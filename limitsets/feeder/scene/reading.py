@@ -163,12 +163,13 @@ def _read(path: Path, file: str) -> bytes:
 def _not_found(path: Path, file: str) -> SceneError:
     names = scenes()
     near = difflib.get_close_matches(file, names, n=1)
+    of_map = "; certify, atlas and explore take a map FILE.py:NAME" if ".py" in path.name else ""
     what = "a folder" if path.is_dir() else "not a regular file" if path.exists() else "not there"
     return SceneError(
         "the scene",
         file,
         f"the path of a TOML file or a built-in scene: {', '.join(names)}",
-        f"did you mean {near[0]!r}?" if near else f"this is {what}",
+        f"did you mean {near[0]!r}?" if near else f"this is {what}{of_map}",
         file=file,
     )
 

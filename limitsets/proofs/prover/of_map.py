@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,7 @@ from limitsets.proofs.prover.certificate_of_map import cells_of, cycle_in_file, 
 from limitsets.proofs.prover.every_orbit import every_orbit
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, missing, read_goal, within_ends
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, prove_orbit, slopes_of
-from limitsets.proofs.prover.proof import Claim
+from limitsets.proofs.prover.proof import Claim, left_of
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph, transitions
 from limitsets.systems.graph.components import ranks
@@ -160,6 +160,11 @@ class ProofOfMap(Tabled):
             workers=workers,
         )
         return Path(path)
+
+    def denied(self, claims: Mapping[str, str]) -> ProofOfMap:
+        """Return the proof where the checker denies some claims: these are undecided."""
+        cycles = () if "cycles" in claims else self.cycles
+        return replace(self, claims=left_of(self.claims, claims), cycles=cycles)
 
     def functions(self, claim: str) -> str:
         """Name the functions of the map that a claim is proved of: `image` may be another, but for a sample."""

@@ -454,19 +454,23 @@ class Proof(Tabled):
 
     def denied(self, claims: Mapping[str, str]) -> Proof:
         """Return the proof where the checker denies some claims: these are undecided."""
-        left = tuple(
-            replace(
-                each,
-                verdict="undecided",
-                reason=f"the checker denies it: {claims[each.claim]}",
-                section={},
-                starts=None,
-            )
-            if each.claim in claims
-            else each
-            for each in self.claims
+        return replace(self, claims=left_of(self.claims, claims))
+
+
+def left_of(claims: Sequence[Claim], denied: Mapping[str, str]) -> tuple[Claim, ...]:
+    """Give claims of which the checker denies some, with the reason: these are undecided."""
+    return tuple(
+        replace(
+            each,
+            verdict="undecided",
+            reason=f"the checker denies it: {denied[each.claim]}",
+            section={},
+            starts=None,
         )
-        return replace(self, claims=left)
+        if each.claim in denied
+        else each
+        for each in claims
+    )
 
 
 def _float(text: str | None) -> float | None:

@@ -1,0 +1,184 @@
+"""`certify`, `atlas` and `explore` of a map in a Python file, FILE.py:NAME."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from limitsets.face.cli import main
+from tests.cli.command import documented, json_of, names_in, prints, refusal, run
+
+FILE = """
+import math
+from typing import NamedTuple
+
+import limitsets as ls
+
+print("what a file prints goes to stderr")
+
+
+def henon(x, y, a, b=0.3):
+    return 1 - a * x**2 + y, b * x
+
+
+def ricker(x, r):
+    return x * math.exp(r * (1 - x))
+
+
+def above_half(x, top):
+    return 0.9 * x if x > top else x
+
+
+class Half(NamedTuple):
+    slope: float
+
+
+def half(params, x, side):
+    return params.slope * x, side, 0
+
+
+ls.register(Half, image=half)
+made, registered, number = ls.map(ricker, r=2.3), Half(0.5), 3
+"""
+
+
+@pytest.fixture
+def mymap(request):
+    """A file whose name no other test uses: Python knows a module by it."""
+    name = f"{request.node.name.partition('[')[0]}.py"
+    Path(name).write_text(FILE, encoding="utf-8")
+    yield name
+    sys.path[:] = [folder for folder in sys.path if folder != str(Path.cwd())]
+
+
+def certify(capfd, *words, code=0):
+    ended, out, err = run_of_file(capfd, "certify", *words)
+    assert ended == code, err
+    return out
+
+
+def run_of_file(capfd, *words):
+    """As `run`, for a file that prints."""
+    code = main(list(words))
+    out, err = capfd.readouterr()
+    lines = [line for line in err.splitlines() if not line.startswith("what a file prints")]
+    assert all(line.startswith("limitsets: ") for line in lines)
+    return code, out, "\n".join(lines)
+
+
+def test_a_range_of_a_plain_function_is_proved_and_rechecks(capfd, mymap):
+    """Section 15 of the design: orbits end in [0.35, 1.65] for r in [2.3, 2.35], and not at 2.5."""
+    goal = ["--domain", "0.02:2.6", "--cells", "1000", "--ends", "0.35:1.65", "--starts", "0.02:2.6"]
+    out = certify(capfd, f"{mymap}:ricker", "--set", "r=2.3:2.35", *goal, "--save", "goal")
+    assert "for every r from 2.3 to 2.35" in out
+    assert "what a file prints" not in out
+    Path(mymap).unlink()  # a recheck needs no code
+    out = prints(capfd, "recheck goal.proof.zip")
+    assert "every start in [0.02, 2.6] ends in [0.35, 1.65] and stays" in out
+    assert "r in [2.3, 2.35]" in out
+    assert out.splitlines()[-1] == "PROVED"
+
+
+def test_what_is_not_proved_is_exit_1_and_writes_nothing(capfd, mymap):
+    goal = ["--domain", "0.02:2.6", "--cells", "1000", "--ends", "0.35:1.65", "--starts", "0.02:2.6"]
+    out = certify(capfd, f"{mymap}:ricker", "--set", "r=2.5", *goal, code=1)
+    assert "no certificate is written: nothing is proved" in out
+    assert names_in() <= {mymap, "__pycache__"}
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "parameters"),
+    [
+        ("ricker", ["r=2.2"], {"r": 2.2}),
+        ("made", ["r=2.2"], {"r": 2.2}),
+        ("made", [], {"r": 2.3}),
+        ("registered", ["slope=-0.5"], {"slope": -0.5}),
+        ("Half", ["slope=0.25"], {"slope": 0.25}),
+    ],
+)
+def test_a_map_is_a_function_an_object_or_a_class(capfd, mymap, name, settings, parameters):
+    """One attracting cycle each: the 2-cycle of Ricker's map for 2 < r < 2.52, and the fixed point 0."""
+    words = [word for each in settings for word in ("--set", each)]
+    where = ["--domain", "0.02:2.6"] if "r" in parameters else ["--domain=-1:1"]
+    out = ["certify", f"{mymap}:{name}", *words, *where, "--cells=501", "--claims", "invariant,cycles"]
+    code, printed, _ = run_of_file(capfd, *out, "--json", "--save", f"{name}.zip")
+    assert code == 0
+    invariant, cycles = json.loads(printed)
+    assert set(invariant) == documented("certify of a map")
+    assert [invariant["verdict"], cycles["verdict"]] == ["proved", "proved"]
+    assert invariant["parameters"] == [parameters] * 2
+    assert sorted(len(each["side"]) for each in cycles["cycles"] if each["attracts"]) == [
+        2 if "r" in parameters else 1
+    ]
+    assert json_of(capfd, f"recheck {name}.zip")["verdict"] == "proved"
+
+
+BOX = ["--domain", "0:1,0:1"]
+REFUSED = [
+    ("certify", "nofile.py:henon", [], "nofile.py"),
+    ("certify", "{}", [], "henon, ricker, above_half, Half, half, made, registered"),
+    ("certify", "{}:heno", [], "henon, ricker"),
+    ("certify", "{}:number", [], "the map is 3"),
+    ("certify", "{}:henon", ["--set", "a=1.4"], 'add --domain "0:1,0:1"'),
+    ("certify", "{}:henon", ["--set", "a=1.4", "--domain", "0:1"], "each of its 2 coordinates"),
+    ("certify", "{}:henon", ["--set", "a=1.4", "--domain", "0:1,1:0"], "LO below HI"),
+    ("certify", "{}:henon", ["--set", "a=1.4", "--set", "c=2", *BOX], "values of a, b"),
+    ("certify", "{}:henon", ["--set", "a=one", *BOX], "the value of a is 'one'"),
+    ("certify", "{}:henon", ["--set", "a=1:2:3", *BOX], "LOW:HIGH"),
+    ("certify", "{}:henon", ["--set", "a=1.5:1.4", *BOX], "swap them"),
+    ("certify", "{}:registered", ["--set", "q=1", "--domain", "0:1"], "a value of slope"),
+    ("certify", "{}:Half", ["--domain", "0:1"], "--set slope="),
+    ("certify", "{}:made", ["--domain", "0:1", "--noise", "a=b"], "the option --noise is 'a=b'"),
+    ("certify", "{}:made", ["--domain", "0:1", "--starts", "0:1"], "beside --ends"),
+    ("certify", "{}:above_half", ["--domain", "0:1", "--set", "top=0.5"], "no comparison"),
+    ("certify", "paper-designed", ["--domain", "0:1"], "none beside a scene"),
+    ("certify", "paper-designed", ["--set", "a=1"], "none beside a scene"),
+    ("atlas", "{}:made", ["--x", "r=2:3:4"], "--domain"),
+    ("atlas", "{}:made", ["--x", "r=2:3:4", "--domain", "0:1", "--set", "r=1:2"], "certify takes a range"),
+    ("explore", "{}:made", ["--no-show"], "--domain"),
+]
+
+
+@pytest.mark.parametrize(("command", "subject", "options", "says"), REFUSED)
+def test_bad_input_is_one_line(capfd, mymap, command, subject, options, says):
+    code, out, err = run_of_file(capfd, command, subject.format(mymap), *options)
+    assert (code, out) == (2, "")
+    assert "bug" not in err
+    assert says in err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x = 1\ny = x / 0\n", "line 2 is 'ZeroDivisionError: division by zero'"),
+        ("def f(x:\n", 'line 1 is "SyntaxError'),
+        ("import nothing_of_this_name\n", "ModuleNotFoundError"),
+        ("raise SystemExit(0)\n", "SystemExit: 0"),
+    ],
+)
+def test_a_file_that_fails_names_its_own_error(capfd, text, says):
+    Path("failing_map.py").write_text(text, encoding="utf-8")
+    assert says in refusal(capfd, "certify failing_map.py:f --domain 0:1")
+
+
+def test_a_name_of_a_module_in_use_is_refused(capfd):
+    Path("math.py").write_text("", encoding="utf-8")
+    assert "rename it: a module math is in use" in refusal(capfd, "certify math.py:f --domain 0:1")
+
+
+def test_other_commands_take_scenes_alone(capfd):
+    code, _, err = run(capfd, "analyse mymap.py:henon")
+    assert code == 2
+    assert "certify, atlas and explore take a map" in err
+
+
+@pytest.mark.sweep
+def test_an_atlas_of_a_map(capfd, mymap):
+    """Ricker's fixed point doubles its period at r = 2."""
+    words = ["--x", "r=1.9:2.1:2", "--domain", "0.02:2.6", "--workers", "1"]
+    code, _, err = run_of_file(capfd, "atlas", f"{mymap}:made", *words)
+    assert code == 0, err
+    xarray = pytest.importorskip("xarray")
+    answers = xarray.open_zarr("made-atlas.zarr", consolidated=False)
+    assert answers["period"].values.squeeze().tolist() == [1, 2]
