@@ -49,7 +49,15 @@ from limitsets.base.arrays import Array, Arrays, Ints
 from limitsets.numbers.interval import guard
 from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.certificate import require_proved
-from limitsets.proofs.prover.certificate_of_map import cells_of, cycle_in_file, write_map
+from limitsets.proofs.prover.certificate_of_map import (
+    Part,
+    cells_of,
+    cycle_in_file,
+    frames,
+    widened,
+    write_map,
+)
+from limitsets.proofs.prover.converging import Ball, cells_within, contracted_ball, settled_orbits
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, missing, read_goal, within_ends
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.proof import Claim
@@ -65,7 +73,7 @@ from limitsets.systems.sets.basin import longest_stays, passing
 Matrix: TypeAlias = list[list[Intervals]]
 
 # Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
-OF_SLOPES = ("cycles", "expanding")
+OF_SLOPES = ("converges", "cycles", "expanding")
 
 # Largest period of the search for cycles.
 UP_TO = 16
@@ -91,6 +99,8 @@ class CycleOfMap:
         Enclosure of the derivative of F^p.
     attracts : bool or None
         Whether every eigenvalue of it is below 1 in modulus; None where that is open.
+    ball : Ball or None
+        Balls around its points that the map contracts, if "converges" was asked for.
     """
 
     lo: Array
@@ -100,6 +110,7 @@ class CycleOfMap:
     slope_lo: Array
     slope_hi: Array
     attracts: bool | None
+    ball: Ball | None = None
 
     @property
     def period(self) -> int:
@@ -127,6 +138,9 @@ class ProofOfMap(Tabled):
         Time it took.
     goal : GoalOfMap or None
         What "ends-in" says, if boxes were given.
+    final : ndarray of int32, shape (n_cells,), or None
+        If "converges" was asked for: the cells whose orbits tend to the first cycle with a ball (0), the second (1)
+        and so on, -1 elsewhere.
     """
 
     map: Any
@@ -137,6 +151,7 @@ class ProofOfMap(Tabled):
     cycles: tuple[CycleOfMap, ...]
     seconds: float
     goal: GoalOfMap | None = None
+    final: NDArray[np.int32] | None = None
 
     @property
     def proved(self) -> bool:
@@ -145,12 +160,16 @@ class ProofOfMap(Tabled):
 
     @property
     def cells(self) -> CellSet:
-        """The attracting cells: proved to be positively invariant."""
+        """The attracting cells: proved to be positively invariant, or that their orbits tend to a cycle."""
+        if self.final is not None:
+            return CellSet(self.graph.grid, self.arrays["component"] >= 0)
         return CellSet(self.graph.grid, self.component >= 0)
 
     @property
     def enters(self) -> CellSet:
         """The cells all of whose points are proved to enter the attracting cells."""
+        if self.final is not None:
+            return CellSet(self.graph.grid, self.arrays["rank"] >= 0)
         return CellSet(self.graph.grid, self.graph.condensation().destinations(passing(self.graph)) >= 0)
 
     @functools.cached_property
@@ -158,7 +177,7 @@ class ProofOfMap(Tabled):
         """The arrays of a certificate: target cells, ranks, components (docs/certificates.md)."""
         grid = self.graph.grid
         ends = None if self.goal is None else within_ends(self.goal, grid)
-        return cells_of(self.map, self.upper, grid, ends)
+        return cells_of(self.map, self.upper, grid, ends, self.final)
 
     def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
         """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
@@ -182,21 +201,31 @@ class ProofOfMap(Tabled):
         DeniedError
             The checker does not confirm it: it is kept as NAME.denied.zip.
         """
-        claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
-        require_proved(claims)
-        if "cycles" in claims:
-            claims["cycles"] = {"cycles": [_in_file(self, cycle) for cycle in self.cycles]}
+        part = self.part()
+        require_proved(part.claims)
+        needs_goal = {"ends-in", "refuted"} & set(part.claims)
         write_map(
             path,
-            (self.map, self.upper),
-            self.graph.grid,
-            claims,
-            arrays={} if set(claims) == {"cycles"} else self.arrays,
-            goal=self.goal.in_file() if self.goal and "ends-in" in claims else None,
+            self.graph.grid.domain,
+            [part],
+            goal=self.goal.in_file() if self.goal and needs_goal else None,
             recheck=recheck,
             workers=workers,
         )
         return Path(path)
+
+    def part(self) -> Part:
+        """Give what a certificate holds of this box of parameters; a refuted goal stands by itself."""
+        cycles = {"cycles": [_in_file(self, cycle) for cycle in self.cycles]}
+        if any(each.claim == "ends-in" and each.verdict == "refuted" for each in self.claims):
+            return Part((self.map, self.upper), {"cycles": cycles, "refuted": {}}, {})
+        claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
+        if "converges" in claims:
+            drawn = [k for k, cycle in enumerate(self.cycles) if cycle.ball is not None]
+            claims["converges"] = {"components": [*range(len(drawn))], "cycles": drawn}
+        if {"cycles", "converges"} & set(claims):
+            claims["cycles"] = cycles
+        return Part((self.map, self.upper), claims, {} if set(claims) == {"cycles"} else self.arrays)
 
     def functions(self, claim: str) -> str:
         """Name the functions of the map that a claim is proved of: `image` may be another, but for a sample."""
@@ -218,7 +247,7 @@ class ProofOfMap(Tabled):
                 cells=self.graph.n_cells,
                 attracting=len(self.cells),
                 section=claim.section or None,
-                cycles=self.cycles if claim.claim == "cycles" else None,
+                cycles=self.cycles if claim.claim in ("cycles", "converges") else None,
                 timings={"certify": self.seconds},
             )
             for claim in self.claims
@@ -233,7 +262,8 @@ class ProofOfMap(Tabled):
         claims = Table(("claim", "verdict", "of", "missing"), rows, caption)
         if not len(self.cells):
             return (claims,)
-        kept = _region(self.cells, "Attracting cells", "no image leads out")
+        kind = "no image leads out" if self.final is None else "no image leads out, or orbits tend to a cycle"
+        kept = _region(self.cells, "Attracting cells", kind)
         return claims, kept, _region(self.enters, "Basin", "every point of its cells enters them")
 
     def __str__(self) -> str:
@@ -410,15 +440,19 @@ def _inverse(slope: Intervals) -> Array:
         return np.full((p * d, p * d), np.nan)
 
 
+def _middle_slopes(proof: ProofOfMap, cycle: CycleOfMap) -> Array:
+    step = _stepped(proof, cycle.lo, cycle.hi, cycle)
+    assert not isinstance(step, str)  # it was proved on these boxes
+    return 0.5 * (step[1].lo + step[1].hi)
+
+
 def _in_file(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
-    slopes = None
-    if cycle.attracts:
-        step = _stepped(proof, cycle.lo, cycle.hi, cycle)
-        assert not isinstance(step, str)  # it was proved on these boxes
-        slopes = 0.5 * (step[1].lo + step[1].hi)
     # branches that are names alone are one in the file
     branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
-    return cycle_in_file(cycle.lo, cycle.hi, cycle.side, branches, slopes)
+    boxes = cycle.lo, cycle.hi, cycle.side, branches
+    if cycle.ball is not None:
+        return cycle_in_file(*boxes, cycle.ball.frames, cycle.ball.radius)
+    return cycle_in_file(*boxes, frames(_middle_slopes(proof, cycle)) if cycle.attracts else None)
 
 
 def _krawczyk(middle: Array, c: Array, off: Intervals, slope: Intervals, wide: Intervals) -> Intervals:
@@ -447,8 +481,8 @@ def _attracts(slope: Matrix) -> bool | None:
 
 
 @np.errstate(all="ignore")  # a singular matrix or an overflow gives inf and nan, which prove nothing
-def _prove(proof: ProofOfMap, cycle: Cycle) -> CycleOfMap | str:
-    """Prove that there is one orbit near one found in floats; or say what is missing."""
+def _prove(proof: ProofOfMap, cycle: Cycle, *, anywhere: bool = False) -> CycleOfMap | str:
+    """Prove one orbit near one found in floats, in attracting cells or anywhere; or say what is missing."""
     middle = cycle.x.reshape(cycle.period, -1).astype(np.float64)
     step = _stepped(proof, middle, middle, cycle)
     if isinstance(step, str):
@@ -458,7 +492,7 @@ def _prove(proof: ProofOfMap, cycle: Cycle) -> CycleOfMap | str:
     for _ in range(TRIES):
         held = _krawczyk(middle, c, off, step[1], Intervals(lo, hi) - _exactly(middle))
         if ((lo < held.lo) & (held.hi < hi)).all():
-            return _proved(proof, held, cycle)
+            return _proved(proof, held, cycle, anywhere=anywhere)
         more = MORE * (held.hi - held.lo) + least
         lo, hi = np.minimum(held.lo - more, middle), np.maximum(held.hi + more, middle)
         if not np.isfinite([lo, hi]).all():
@@ -469,7 +503,7 @@ def _prove(proof: ProofOfMap, cycle: Cycle) -> CycleOfMap | str:
     return "no box is found that Newton's operator contracts"
 
 
-def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
+def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle, *, anywhere: bool) -> CycleOfMap | str:
     """Prove the sides, branches and slope of an orbit that lies in boxes; or say what is missing."""
     step = _stepped(proof, at.lo, at.hi, cycle)
     if isinstance(step, str):
@@ -480,7 +514,7 @@ def _proved(proof: ProofOfMap, at: Intervals, cycle: Cycle) -> CycleOfMap | str:
         if cycle.period % k == 0 and cycle.side[k] == cycle.side[0]
     ):
         return "its period may be smaller"
-    if not _within(proof.cells, at.lo[0], at.hi[0], int(cycle.side[0])):
+    if not anywhere and not _within(proof.cells, at.lo[0], at.hi[0], int(cycle.side[0])):
         return "its box is not in the attracting cells"
     slope = _slope(step[1])
     return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
@@ -507,11 +541,18 @@ def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
     return candidates, [] if candidates.complete else [beyond]
 
 
+NO_CYCLES = "cycles need slopes, at most two dimensions, and `margin` where there are branches"
+
+
+def _has_cycles(lower: Any) -> bool:
+    """Whether cycles of a map can be proved."""
+    kind = kind_of(lower)
+    return kind.dimension <= 2 and has_slope(lower) and (len(kind.branches) == 1 or kind.has_margin)
+
+
 def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[CycleOfMap, ...]]:
-    kind = kind_of(proof.map)
-    if (len(kind.branches) > 1 and not kind.has_margin) or kind.dimension > 2 or not has_slope(proof.map):
-        reason = "cycles need slopes, at most two dimensions, and `margin` where there are branches"
-        return Claim("cycles", "undecided", reason, {}, final=True), ()
+    if not _has_cycles(proof.map):
+        return Claim("cycles", "undecided", NO_CYCLES, {}, final=True), ()
     candidates, missing = _candidates(proof) if len(proof.cells) else ((), [])
     proved: list[CycleOfMap] = []
     for number, cycle in enumerate(candidates):
@@ -530,7 +571,120 @@ def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[
     ), tuple(proved)
 
 
+# ---------------------------------------------------------------- cycles that attract, and what tends to them
+
+
+# Orbits that are followed until they are at a cycle.
+ORBITS = 256
+
+
+def _attracting(proof: ProofOfMap, starts: tuple[Array, Ints]) -> tuple[tuple[CycleOfMap, ...], list[str]]:
+    """Prove the cycles to which orbits from some starts come, for the parameters in the middle; and what is missing."""
+    proved, missing = [], []
+    for cycle in settled_orbits(between(proof.map, proof.upper), *starts):
+        answer = _prove(proof, cycle, anywhere=True)
+        if isinstance(answer, CycleOfMap) and answer.attracts:
+            proved.append(answer)
+        else:
+            why = answer if isinstance(answer, str) else "that it attracts is not proved"
+            missing.append(f"period {cycle.period} through {cycle.x[0]}: {why}")
+    return tuple(proved), missing
+
+
+def _spread(grid: Grid) -> tuple[Array, Ints]:
+    """Middles of cells spread over the domain, and their sides."""
+    numbers = np.unique(np.linspace(0, grid.n_cells - 1, ORBITS).astype(np.int64))
+    lo, hi, sides = grid.corners(numbers)
+    return 0.5 * (lo + hi), sides
+
+
+def _converging(proof: ProofOfMap) -> tuple[ProofOfMap, Claim]:
+    """Draw balls around the cycles that attract, and find the cells in them."""
+    if not _has_cycles(proof.map):
+        return proof, Claim("converges", "undecided", NO_CYCLES, {}, final=True)
+    grid = proof.graph.grid
+    orbits, missing = proof.cycles, list[str]()
+    if not orbits:
+        orbits, missing = _attracting(proof, _spread(grid))
+    final, drawn, chosen = np.full(grid.n_cells, -1, np.int32), 0, []
+    for cycle in orbits:
+        ball, why = _ball(proof, cycle) if cycle.attracts else (None, "")
+        if ball is not None:
+            mine = cells_within(grid, ball, *widened(cycle.lo, cycle.hi), cycle.side) & (final < 0)
+            if mine.any():
+                final[mine], drawn = drawn, drawn + 1
+            else:
+                ball, why = None, "no cell lies in the balls that are contracted: take finer cells there"
+        chosen.append(replace(cycle, ball=ball))
+        missing += [f"period {cycle.period} through {cycle.lo[0]}: {why}"] if why else []
+    if not drawn:
+        reason = missing[0] if missing else "no cycle that attracts is found"
+        return proof, Claim("converges", "undecided", reason, {})
+    claim = Claim("converges", "proved", "", {"cycles": drawn, "missing": missing})
+    return replace(proof, cycles=tuple(chosen), final=final), claim
+
+
+def _ball(proof: ProofOfMap, cycle: CycleOfMap) -> tuple[Ball | None, str]:
+    """Find balls around a cycle, in the domain and the ends; or say what is missing."""
+    domain, boxes = proof.graph.grid.domain, widened(cycle.lo, cycle.hi)
+
+    def slopes(lo: Array, hi: Array) -> Intervals | None:
+        beyond = (lo < domain.lo[cycle.side]).any() or (hi > domain.hi[cycle.side]).any()
+        if beyond or (proof.goal is not None and not proof.goal.holds(lo, hi, cycle.side)):
+            return None
+        step = _stepped(proof, lo, hi, cycle)
+        return None if isinstance(step, str) else step[1]
+
+    extent = float((domain.hi - domain.lo).max())
+    ball = contracted_ball(*boxes, _middle_slopes(proof, cycle), slopes, extent)
+    where = "the domain" if proof.goal is None else "the domain and the ends"
+    return ball, "" if ball is not None else f"no balls around it in {where} are contracted"
+
+
+def _refuted(proof: ProofOfMap) -> ProofOfMap:
+    """Look for a cycle that attracts, begins inside the starts and leaves the ends: then the goal is refuted."""
+    goal = proof.goal
+    if goal is None or goal.starts is None or not _has_cycles(proof.map):
+        return proof
+    for cycle in _attracting(proof, goal.spread(ORBITS))[0]:
+        leaves = goal.is_left_by(*widened(cycle.lo, cycle.hi), cycle.side)
+        if leaves:
+            why = f"a cycle of period {cycle.period} attracts: {leaves}"
+            claims = (
+                Claim(each.claim, "refuted", why, {})
+                if each.claim == "ends-in"
+                else Claim(each.claim, "undecided", "not asked further, for ends-in is refuted", {})
+                for each in proof.claims
+            )
+            return replace(proof, claims=tuple(claims), cycles=(cycle,), final=None)
+    return proof
+
+
+def proved_again(proof: ProofOfMap, lower: Any, upper: Any) -> ProofOfMap:
+    """Ask "ends-in" between other corners, on the cells of a proof; its graph is left as it was."""
+    other = replace(proof, map=lower, upper=upper, cycles=())
+    return replace(other, claims=(_ends_in(other),))
+
+
+def refuted_again(proof: ProofOfMap, lower: Any, upper: Any) -> ProofOfMap:
+    """Look for what refutes "ends-in" between other corners."""
+    open_ = Claim("ends-in", "undecided", "no cycle is found that refutes it", {})
+    return _refuted(replace(proof, map=lower, upper=upper, claims=(open_,), cycles=()))
+
+
 # ---------------------------------------------------------------- all together
+
+
+def _with_final(proof: ProofOfMap, claim: str) -> Claim:
+    """Prove a claim about all starts where some cells are final, from the labels of the certificate."""
+    grid, rank = proof.graph.grid, proof.arrays["rank"]
+    lost = np.flatnonzero(rank < 0)
+    if claim == "attracts-all" and lost.size:
+        place = _place(grid, int(lost[0]))
+        return Claim(
+            claim, "undecided", f"{lost.size} cells may not lead to attracting cells: first {place}", {}
+        )
+    return Claim(claim, "proved", "", {"max_rank": int(rank.max())} if claim == "attracts-all" else {})
 
 
 PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
@@ -541,7 +695,7 @@ PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "basin": lambda proof: replace(_invariant(proof), claim="basin"),
     "trapping": lambda proof: replace(_invariant(proof), claim="trapping"),
 }
-CLAIMS_OF_MAP = (*PROVERS, "cycles")
+CLAIMS_OF_MAP = (*PROVERS, "cycles", "converges")
 """What can be claimed of any map."""
 
 
@@ -607,9 +761,17 @@ def certify_map(
     if grid is None:
         way = "limitsets.certify(map, limitsets.grid([(lo, hi)], cells=1024))"
         raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
-    if (ends is None) is ("ends-in" in wanted) or (ends is not None and len(wanted) > 1):
+    beside = set(wanted) - {"ends-in", "converges", "cycles"}
+    if (ends is None) is ("ends-in" in wanted) or (ends is not None and beside):
         way = 'ask so: limitsets.certify(map, grid, ["ends-in"], ends=[[(lo, hi)]])'
-        raise AnswerError("the claims", ", ".join(wanted), "ends-in by itself, with its boxes ends=", way)
+        allowed = "ends-in by itself, or with converges and cycles, and its boxes ends="
+        raise AnswerError("the claims", ", ".join(wanted), allowed, way)
+    beside = {"invariant", "trapping", "expanding"} & set(wanted)
+    if "converges" in wanted and beside:
+        allowed = "cycles, basin, attracts-all and ends-in beside converges"
+        raise AnswerError(
+            "the claims", ", ".join(wanted), allowed, f"prove {min(beside)} in a call of its own"
+        )
     goal = None if ends is None else read_goal(ends, starts, grid.domain)
     guard()
     _require_provable(map)
@@ -621,12 +783,17 @@ def certify_map(
     proof = ProofOfMap(
         lower, upper, graph, component=components_of(graph)[0], claims=(), cycles=(), seconds=0.0, goal=goal
     )
-    orbits: tuple[CycleOfMap, ...] = ()
-    answers = []
+    known: dict[str, Claim] = {}
+    if "cycles" in wanted:
+        known["cycles"], orbits = _cycles(proof, progress)
+        proof = replace(proof, cycles=orbits)
+    if "converges" in wanted:
+        proof, known["converges"] = _converging(proof)
     for word in wanted:
-        if word == "cycles":
-            answer, orbits = _cycles(proof, progress)
-        else:
-            answer = PROVERS[word](proof)
-        answers.append(answer)
-    return replace(proof, claims=tuple(answers), cycles=orbits, seconds=time.perf_counter() - begin)
+        if word not in known:
+            final = proof.final is not None and word != "ends-in"
+            known[word] = _with_final(proof, word) if final else PROVERS[word](proof)
+    proof = replace(proof, claims=tuple(known[word] for word in wanted))
+    if "ends-in" in known and known["ends-in"].verdict != "proved":
+        proof = _refuted(proof)
+    return replace(proof, seconds=time.perf_counter() - begin)
