@@ -290,11 +290,13 @@ def certify(
     'proved'
     """
     if isinstance(scene, tuple | type):
-        _require_none({"noise": noise, "tolerance": tolerance, "laid": laid}, "beside a map")
+        require_none({"noise": noise, "tolerance": tolerance, "laid": laid}, "certify", "beside a map")
         return certify_map(scene, grid, claims, upper=upper, ends=ends, starts=starts, progress=progress)
     twice = isinstance(grid, Grid) or claims is not None  # else the claims stand in its place
-    _require_none(
-        {"upper": upper, "ends": ends, "starts": starts, "grid": grid if twice else None}, "beside a scene"
+    require_none(
+        {"upper": upper, "ends": ends, "starts": starts, "grid": grid if twice else None},
+        "certify",
+        "beside a scene",
     )
     return certify_scene(
         scene,
@@ -306,12 +308,12 @@ def certify(
     )
 
 
-def _require_none(given: Mapping[str, Any], beside: str) -> None:
+def require_none(given: Mapping[str, Any], function: str, beside: str) -> None:
     """Refuse arguments of the other kind of proof."""
     for name, value in given.items():
         if value is not None:
-            remedy = "leave it out; a scene has tolerance=, a map upper="
-            raise AnswerError(f"the argument {name} of certify", shown(value), f"none {beside}", remedy)
+            remedy = f"leave it out; help({function}) says what a scene has and what a map has"
+            raise AnswerError(f"the argument {name} of {function}", shown(value), f"none {beside}", remedy)
 
 
 @shown_in_notebooks
