@@ -9,6 +9,8 @@ import pytest
 import limitsets as ls
 from limitsets import maps
 from limitsets.base.errors import AnswerError, GridError, LimitsetsError, MapError, SceneError
+from limitsets.parameters.margins.of_map import margins_of_map
+from limitsets.parameters.margins.single import margin_scene
 from limitsets.parameters.regions import evenly
 from limitsets.proofs.prover.certifying import certify_scene
 from limitsets.proofs.prover.of_map import certify_map
@@ -104,9 +106,10 @@ def _public():
         for name in room.__all__:
             function = getattr(room, name)
             if inspect.isfunction(function) and name not in ("scenes", "register"):
-                # `certify` asks its first argument whether a scene or a map is meant
-                yield prefix + name, {"certify": certify_scene}.get(name, function)
+                # these ask their first argument whether a scene or a map is meant
+                yield prefix + name, {"certify": certify_scene, "margin": margin_scene}.get(name, function)
     yield "certify_map", certify_map
+    yield "margins_of_map", margins_of_map
 
 
 def _words(annotation):

@@ -11,7 +11,7 @@ import pytest
 import limitsets as ls
 from limitsets import maps
 from limitsets.base.errors import AnswerError
-from limitsets.proofs.prover.of_map import MOST_WORDS
+from limitsets.proofs.prover.cycles_of_map import MOST_WORDS
 from limitsets.proofs.prover.orbits_of_map import prove_orbit
 from limitsets.systems.sets import Cycle, cycles
 from tests.maps_of_tests import Tent

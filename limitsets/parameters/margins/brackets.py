@@ -11,18 +11,72 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import Any, Protocol
 
-from limitsets.parameters.margins.deviations import (
-    DeviationScale,
-    Signs,
-    Tolerance,
-    a_little_beyond,
-    halved,
-    short,
-)
+from limitsets.parameters.margins.deviations import Signs, a_little_beyond, halved, short
 from limitsets.proofs.prover.numbers import RationalInterval
-from limitsets.proofs.prover.parameters import SceneBox
-from limitsets.proofs.prover.query import Outcome, Query, unjoined
+
+# What is asked, and of what: scenes (`Query`, `DeviationScale`, `Tolerance`) or maps (`of_map`).  A piece is a box of
+# scenes or of maps, None for what is given; an outcome has `verdict`, `reason`, `piece` and `within`.
+
+
+class Asked(Protocol):
+    """Proves and refutes goals of a piece."""
+
+    def prove(self, piece: Any = ..., noise: Any = ..., finest: int = ...) -> Any:
+        """Prove the goals, or say what is missing."""
+
+    def refute(self, piece: Any = ..., noise: Any = ...) -> Any:
+        """Find an orbit that violates one."""
+
+    def unjoined(self, pieces: Sequence[Any]) -> str:
+        """Say why pieces do not prove the goals together, in one certificate; empty if they do."""
+
+
+class Sizes(Protocol):
+    """Deviations as sizes of a vector."""
+
+    def corner(self, factor: Fraction, signs: Signs) -> Any:
+        """Return the piece of one corner."""
+
+    def noise(self, factor: Fraction) -> dict[str, str]:
+        """Say what differs at every throw."""
+
+    def texts(self, factor: Fraction) -> dict[str, str]:
+        """Say what is fixed but unknown."""
+
+
+class Scale(Protocol):
+    """One quantity or parameter, and how its deviations are measured."""
+
+    @property
+    def key(self) -> str:
+        """Its name in pieces."""
+
+    @property
+    def least(self) -> Fraction:
+        """Where a search begins."""
+
+    @property
+    def most(self) -> Fraction | None:
+        """What sizes stay below."""
+
+    @property
+    def widest(self) -> Fraction | None:
+        """Width of a piece at most."""
+
+    def alone(self) -> Sizes:
+        """Return its deviations by 1 of its unit."""
+
+    def text(self, size: Fraction) -> str:
+        """Write a size."""
+
+    def between(self, one: Fraction, other: Fraction) -> RationalInterval:
+        """Return the values at all deviations between two."""
+
+    def piece(self, span: RationalInterval) -> Any:
+        """Return the piece with these values."""
+
 
 Tell = Callable[[float], None]
 """Called with the share of the bracket that is closed."""
@@ -50,7 +104,7 @@ class Bracket:
         Largest size proved, 0 if the scene as it is or nothing is.
     refuted : Fraction or None
         Smallest size refuted.
-    pieces : list of Outcome
+    pieces : list of Outcome, or what else is asked gives
         What proves it.
     against : Outcome or None
         What refutes it.
@@ -62,8 +116,8 @@ class Bracket:
 
     proved: Fraction = Fraction(0)
     refuted: Fraction | None = None
-    pieces: list[Outcome] = field(default_factory=list)
-    against: Outcome | None = None
+    pieces: list[Any] = field(default_factory=list)
+    against: Any = None
     reason: str = ""
     sign: int = 1
 
@@ -75,12 +129,12 @@ class Bracket:
 class Ray:
     """Sizes in one direction of a tolerance, each asked as a single scene, and what became of them."""
 
-    def __init__(self, query: Query, tolerance: Tolerance, signs: Signs) -> None:
+    def __init__(self, query: Asked, tolerance: Sizes, signs: Signs) -> None:
         self.query, self.tolerance, self.signs = query, tolerance, signs
         self.bracket = Bracket()
         self.end: Fraction | None = None
 
-    def _at(self, size: Fraction) -> tuple[SceneBox | None, dict[str, str]]:
+    def _at(self, size: Fraction) -> tuple[Any, dict[str, str]]:
         return self.tolerance.corner(size, self.signs), self.tolerance.noise(size)
 
     def proves(self, size: Fraction, finest: int = 3) -> bool:
@@ -90,7 +144,7 @@ class Ray:
             self.bracket.reason = one.reason
         elif size > self.bracket.proved:
             self.bracket.proved, self.bracket.pieces = size, [one]
-        return one.verdict == "proved"
+        return bool(one.verdict == "proved")
 
     def refutes(self, size: Fraction) -> bool:
         """Whether an orbit violates a goal at a size."""
@@ -98,7 +152,7 @@ class Ray:
         if one.verdict == "refuted":
             self.bracket.refuted = size
             self.bracket.against = replace(one, within=self.tolerance.texts(size))
-        return one.verdict == "refuted"
+        return bool(one.verdict == "refuted")
 
     def ask(self, size: Fraction) -> str:
         """Ask for the verdict at a size; `end` is where it was neither proved nor refuted last."""
@@ -111,7 +165,7 @@ class Ray:
             self.bracket.proved = max(self.bracket.proved, size)
         else:
             self.end, self.bracket.reason = size, one.reason
-        return one.verdict
+        return str(one.verdict)
 
     @property
     def gap(self) -> bool:
@@ -119,9 +173,9 @@ class Ray:
         return self.bracket.refuted is not None and self.end is not None and self.end < self.bracket.refuted
 
 
-def _reach(query: Query, scale: DeviationScale, sign: int, width: Fraction, known: Fraction | None) -> Ray:
+def _reach(query: Asked, scale: Scale, sign: int, width: Fraction, known: Fraction | None) -> Ray:
     """Go outward from the scene as it is until single scenes are refuted or cannot be, then halve."""
-    ray, step = Ray(query, Tolerance.alone(scale), (sign,)), scale.least
+    ray, step = Ray(query, scale.alone(), (sign,)), scale.least
     bracket = ray.bracket
     for _ in range(STEPS):
         size = step if scale.most is None else min(step, (step / FACTOR + scale.most) / 2)
@@ -143,10 +197,10 @@ def _reach(query: Query, scale: DeviationScale, sign: int, width: Fraction, know
 
 
 def _grow(
-    query: Query, scale: DeviationScale, sign: int, target: Fraction, wall: Fraction, tell: Tell
-) -> tuple[Fraction, list[Outcome], str]:
+    query: Asked, scale: Scale, sign: int, target: Fraction, wall: Fraction, tell: Tell
+) -> tuple[Fraction, list[Any], str]:
     """Prove from the scene as it is outward, in pieces; how far, the pieces, and what stops it."""
-    low, pieces, reason = Fraction(0), list[Outcome](), ""
+    low, pieces, reason = Fraction(0), list[Any](), ""
     share = Fraction(2, 5)
     step = share * wall
     for _ in range(TRIALS):
@@ -170,7 +224,7 @@ def _grow(
     return low, pieces, reason
 
 
-def bracket_fixed(query: Query, scale: DeviationScale, width: Fraction, tell: Tell) -> Bracket:
+def bracket_fixed(query: Asked, scale: Scale, width: Fraction, tell: Tell) -> Bracket:
     """Bracket the margin of a quantity that is fixed but unknown."""
     ways: dict[int, Ray] = {}
     for sign in (-1, 1):
@@ -198,9 +252,7 @@ def bracket_fixed(query: Query, scale: DeviationScale, width: Fraction, tell: Te
     return bracket
 
 
-def _fixed_proof(
-    query: Query, scale: DeviationScale, bracket: Bracket, goal: Fraction, tell: Tell
-) -> Bracket:
+def _fixed_proof(query: Asked, scale: Scale, bracket: Bracket, goal: Fraction, tell: Tell) -> Bracket:
     """Prove it all at once, or grow the proof in both directions."""
     if goal <= NONE * scale.least:
         return bracket
@@ -217,26 +269,26 @@ def _fixed_proof(
         if far < goal:
             stuck = f"{reason}; {NARROWER}" if reason else f"from there on it is in more than {TRIALS} pieces"
             goal, bracket.reason = far, stuck
-            _fails_beyond(Ray(query, Tolerance.alone(scale), (sign,)), sign, far, bracket)
+            _fails_beyond(Ray(query, scale.alone(), (sign,)), sign, far, bracket)
             if not far:
                 break
     bracket.proved = goal
     return bracket
 
 
-def _come_back(query: Query, scale: DeviationScale, bracket: Bracket, width: Fraction) -> None:
+def _come_back(query: Asked, scale: Scale, bracket: Bracket, width: Fraction) -> None:
     """Come back to the size up to which all pieces together are one claim, as a certificate has to make it.
 
     Each piece is proved for its own starts; where these differ too much, no claim is left for all of them.
     """
-    pieces, missing = bracket.pieces, unjoined(bracket.pieces) if bracket.pieces else ""
+    pieces, missing = bracket.pieces, query.unjoined(bracket.pieces) if bracket.pieces else ""
     if not missing:
         return
 
     def joins(size: Fraction) -> bool:
         nonlocal missing
         within = _within(query, scale, pieces, size)
-        why = unjoined(within)
+        why = query.unjoined(within)
         if not why:
             bracket.proved, bracket.pieces = size, within
         missing = why or missing
@@ -250,7 +302,7 @@ def _come_back(query: Query, scale: DeviationScale, bracket: Bracket, width: Fra
     bracket.reason = f"from {scale.text(bad)} on: {missing}"
 
 
-def _within(query: Query, scale: DeviationScale, pieces: Sequence[Outcome], size: Fraction) -> list[Outcome]:
+def _within(query: Asked, scale: Scale, pieces: Sequence[Any], size: Fraction) -> list[Any]:
     """Cut pieces back to a size: those that reach beyond are proved anew, for more starts."""
     whole, kept = scale.between(-size, size), []
     for piece in pieces:
@@ -274,9 +326,9 @@ def _fails_beyond(ray: Ray, sign: int, far: Fraction, bracket: Bracket) -> None:
             return
 
 
-def bracket_per_throw(query: Query, scale: DeviationScale, width: Fraction, tell: Tell) -> Bracket:
+def bracket_per_throw(query: Asked, scale: Scale, width: Fraction, tell: Tell) -> Bracket:
     """Bracket the margin of a quantity that has another value at every throw."""
-    ray, size, most = Ray(query, Tolerance.alone(scale), ()), scale.least, scale.most
+    ray, size, most = Ray(query, scale.alone(), ()), scale.least, scale.most
     bracket = ray.bracket
     for _ in range(STEPS):
         if not ray.proves(size, 1):

@@ -171,6 +171,10 @@ class DeviationScale:
         """Return the box of scenes with these values."""
         return SceneBox(self.scene, {self.key: span})
 
+    def alone(self) -> Tolerance:
+        """Return its deviations by 1 of its unit."""
+        return Tolerance.alone(self)
+
 
 def nominal_of(scene: Scene, quantity: str) -> tuple[float | None, str]:
     """Find the value of a quantity as people say it, and its unit; None for what has none."""

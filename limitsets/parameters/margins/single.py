@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from limitsets.base import (
     Progress,
     Table,
     Tabled,
-    arguments_checked,
+    arguments_checked_as,
     as_table,
     picked,
     shown_in_notebooks,
@@ -39,7 +39,10 @@ from limitsets.parameters.margins.deviations import (
 )
 from limitsets.parameters.margins.joint import joint_margin
 from limitsets.parameters.margins.margin_result import Margin, bound, bound_above, failure
+from limitsets.parameters.margins.of_map import MarginOfMap, margins_of_map, require_width
+from limitsets.proofs.prover.certifying import require_none
 from limitsets.proofs.prover.query import Outcome, Query
+from limitsets.systems.cells import Grid
 
 # ----------------------------------------------------------------
 # Margins: how much a quantity may deviate before a goal fails, as a bracket that is proved and refuted.
@@ -78,8 +81,7 @@ def _goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple
     return tuple(goals)
 
 
-@shown_in_notebooks
-@arguments_checked
+@overload
 def margin(
     scene: Scene | str | Path,
     *quantities: str,
@@ -88,16 +90,36 @@ def margin(
     laid: LaidLike | None = None,
     width: float = 0.01,
     progress: Progress | None = None,
-) -> tuple[Margin, ...]:
-    """Bracket how much quantities may deviate before a goal fails.
+) -> tuple[Margin, ...]: ...
+@overload
+def margin(
+    scene: tuple[Any, ...],
+    *quantities: str | Grid,
+    ends: Any,
+    starts: Any = None,
+    width: float = 0.01,
+    progress: Progress | None = None,
+) -> tuple[MarginOfMap, ...]: ...
+def margin(
+    scene: Any,
+    *quantities: Any,
+    reading: str | None = None,
+    goal: GoalLike | Sequence[GoalLike] | None = None,
+    laid: LaidLike | None = None,
+    ends: Any = None,
+    starts: Any = None,
+    width: float = 0.01,
+    progress: Progress | None = None,
+) -> tuple[Margin, ...] | tuple[MarginOfMap, ...]:
+    """Bracket how much quantities of a scene, or parameters of a map, may deviate before a goal fails.
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        A scene, or what `limitsets.load` takes.
+    scene : Scene, str, Path, or NamedTuple
+        A scene, or what `limitsets.load` takes; or a map.
     *quantities : str
         Names of quantities; "joint" for all of the scene's tolerance at once.  Default: all that the scene gives, in
-        both readings, and joint if there is a tolerance.
+        both readings, and joint if there is a tolerance.  Of a map: its grid, then names of parameters, by default all.
     reading : str, optional
         "fixed" but unknown, or "per-throw": another value at every throw, of throw.speed, gravity.tilt and landing.x.
         Default: "fixed", and "per-throw" of landing.x.
@@ -106,6 +128,8 @@ def margin(
     laid : mapping of int to sequence of (float, float), optional
         By side the ranges of x where parts are laid down, as for `limitsets.certify`: the goal's starts are these.
         Default: the whole arm.
+    ends, starts : sequence of boxes
+        Of a map: its goal, that every start in `starts` ends in `ends` and stays, as for `limitsets.certify`.
     width : float
         How close the two ends of a bracket have to be, as a share of the upper one.
     progress : callable, optional
@@ -113,14 +137,15 @@ def margin(
 
     Returns
     -------
-    tuple of Margin
+    tuple of Margin, or of MarginOfMap
         One per quantity and reading.  Of several, one whose search ends with an error has nothing proved, and the error
         as its reason.
 
     Raises
     ------
     AnswerError
-        No goal, a quantity or a reading that the scene does not have, or effects of which nothing is proved.
+        No goal, a quantity or a reading that the scene does not have, effects of which nothing is proved, or arguments
+        for maps beside a scene or the reverse.
 
     Notes
     -----
@@ -132,10 +157,34 @@ def margin(
     >>> (speed,) = ls.margin("paper-designed", "throw.speed")
     >>> speed.proved < 0.733 < speed.refuted, speed.unit
     (True, '%')
+    >>> ricker, line = ls.maps.Logistic(2.5), ls.grid([(0.1, 0.9)], cells=512)
+    >>> (r,) = ls.margin(ricker, line, "r", ends=[[(0.5, 0.7)]], starts=[[(0.2, 0.8)]])
+    >>> 0.1 < r.proved < r.refuted < 0.9, r.direction
+    (True, 'more')
     """
+    if isinstance(scene, tuple | type):
+        require_none({"reading": reading, "goal": goal, "laid": laid}, "margin", "beside a map")
+        return margins_of_map(scene, *quantities, ends=ends, starts=starts, width=width, progress=progress)
+    require_none({"ends": ends, "starts": starts}, "margin", "beside a scene")
+    return margin_scene(
+        scene, *quantities, reading=reading, goal=goal, laid=laid, width=width, progress=progress
+    )
+
+
+@shown_in_notebooks
+@arguments_checked_as("margin")
+def margin_scene(
+    scene: Scene | str | Path,
+    *quantities: str,
+    reading: str | None = None,
+    goal: GoalLike | Sequence[GoalLike] | None = None,
+    laid: LaidLike | None = None,
+    width: float = 0.01,
+    progress: Progress | None = None,
+) -> tuple[Margin, ...]:
+    """Bracket margins of a scene; called by `limitsets.margin`, which says what the arguments are."""
+    require_width(width)
     loaded = load(scene)
-    if not 1e-4 <= width < 1:
-        raise AnswerError("the width", width, "from 0.0001 to below 1", "0.01 is a hundredth")
     goals = goals_of(loaded, goal, laid)
     query = Query.of(loaded, goals)
     query.box(None, {})  # refuses a scene of which nothing can be proved

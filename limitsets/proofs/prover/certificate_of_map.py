@@ -7,10 +7,10 @@ are those of these targets.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import reduce
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from limitsets.base.arrays import Array, Arrays, Ints
 from limitsets.proofs.prover.certificate import FORMAT, written
 from limitsets.proofs.prover.programs import recorded_map, require_same
 from limitsets.proofs.prover.recording import decimal, names_of
-from limitsets.systems.cells import Grid
+from limitsets.systems.cells import Domain, Grid
 from limitsets.systems.graph.components import attracting_of, ranks, reach, strong_components
 from limitsets.systems.graph.ranges import Ranges, build
 from limitsets.systems.maps import kind_of
@@ -36,8 +36,9 @@ OF_WIDTH, OF_SIZE = 2.0**-28, 2.0**-50
 # size of its points: the checker has to find Newton's operator inside them.
 LESS, MORE, LEAST = 2.0**-40, 0.25, 2.0**-40
 
-# Condition of a frame of eigenvectors beyond which Lyapunov's equation is solved, by so many rounds along the orbit.
-WORST, ROUNDS = 1e6, 60
+# Condition of frames of eigenvectors beyond which Lyapunov's equation is solved, by so many rounds along the orbit, for
+# rates of contraction that are these powers of the orbit's own (or of the fastest that is asked for).
+WORST, ROUNDS, SHARES, FASTEST = 1e6, 60, (0.25, 0.5, 0.75), 1e-3
 
 Numbers: TypeAlias = NDArray[np.int32]
 
@@ -45,7 +46,13 @@ NO_CLAIM = -1  # the rank of cells of which nothing is claimed
 IMPOSSIBLE = -2  # the target of a branch that is not taken
 
 
-def cells_of(lower: Any, upper: Any, grid: Grid, ends: NDArray[np.bool_] | None = None) -> Arrays:
+def cells_of(
+    lower: Any,
+    upper: Any,
+    grid: Grid,
+    ends: NDArray[np.bool_] | None = None,
+    final: Numbers | None = None,
+) -> Arrays:
     """Find the arrays of one box of parameters.
 
     Parameters
@@ -57,6 +64,9 @@ def cells_of(lower: Any, upper: Any, grid: Grid, ends: NDArray[np.bool_] | None 
     ends : ndarray of bool, shape (n_cells,), optional
         Cells in which orbits shall end: those of them from which none leaves these then stand in place of the
         attracting components, as one.
+    final : ndarray of int32, shape (n_cells,), optional
+        Cells whose orbits are known from there on, as they tend to a cycle: their components from 0 on, -1 elsewhere.
+        The others are numbered on.
 
     Returns
     -------
@@ -77,7 +87,9 @@ def cells_of(lower: Any, upper: Any, grid: Grid, ends: NDArray[np.bool_] | None 
         lost[mine[(boxes.state != NEVER) & ~inside]] = True
         chosen = (boxes.state != NEVER) & inside
         target[branch, mine[chosen]], to[branch, mine] = cells[chosen], boxes.side
-    component, rank = _labels(_ranges_of(grid, target, to, lost), lost, ends)
+    if final is not None:
+        target[:, final >= 0], lost[final >= 0] = IMPOSSIBLE, False
+    component, rank = _labels(_ranges_of(grid, target, to, lost), lost, ends, final)
     edges = {f"edges.{s}.{axis}": e for s, axes in enumerate(grid.edges) for axis, e in enumerate(axes)}
     targets = {f"target.{branch}": each for branch, each in enumerate(target)}
     return {"component": component, "rank": rank, **edges, **targets}
@@ -102,18 +114,20 @@ def _ranges_of(grid: Grid, target: Numbers, to: Numbers, lost: NDArray[np.bool_]
 
 
 def _labels(
-    ranges: Ranges, lost: NDArray[np.bool_], ends: NDArray[np.bool_] | None
+    ranges: Ranges, lost: NDArray[np.bool_], ends: NDArray[np.bool_] | None, final: Numbers | None
 ) -> tuple[Numbers, Numbers]:
     """Find component and rank of each cell."""
     parts = strong_components(ranges)
-    component = np.full(lost.size, -1, np.int32)
+    component = np.full(lost.size, -1, np.int32) if final is None else final.copy()
+    first = int(component.max()) + 1
     if ends is None:
         sets = [np.flatnonzero(parts.label == k).astype(np.int32) for k in np.flatnonzero(parts.recurrent)]
         attracts = attracting_of(ranges, parts, sets)
         for number, cells in enumerate(each for each, good in zip(sets, attracts, strict=True) if good):
-            component[cells] = number
+            component[cells] = first + number
     else:
-        component[reach(ranges, parts, (lost | ~ends).astype(np.uint8)) == 0] = 0
+        # who may come into final cells is none of the set that stays: its targets would be of two components
+        component[reach(ranges, parts, (lost | ~ends | (component >= 0)).astype(np.uint8)) == 0] = first
     settled = np.zeros(parts.count, dtype=bool)
     settled[parts.label[component >= 0]] = True
     stays_elsewhere = (parts.recurrent & ~settled)[parts.label]
@@ -131,7 +145,15 @@ def hexed(values: Array) -> Any:
     return float(values).hex() if np.ndim(values) == 0 else [hexed(each) for each in values]
 
 
-def cycle_in_file(lo: Array, hi: Array, side: Ints, branches: Ints, slopes: Array | None) -> dict[str, Any]:
+def widened(lo: Array, hi: Array) -> tuple[Array, Array]:
+    """Boxes of an orbit as the file has them: in wider ones the checker finds its own Newton's operator."""
+    wide = MORE * (hi - lo) + LEAST * np.maximum(np.maximum(np.abs(lo), np.abs(hi)), 1.0)
+    return lo - wide, hi + wide
+
+
+def cycle_in_file(
+    lo: Array, hi: Array, side: Ints, branches: Ints, chosen: Array | None, radius: float | None = None
+) -> dict[str, Any]:
     """Write a periodic orbit.
 
     Parameters
@@ -140,25 +162,34 @@ def cycle_in_file(lo: Array, hi: Array, side: Ints, branches: Ints, slopes: Arra
         Boxes of its points.
     side, branches : ndarray of int, shape (p,)
         Of its points.
-    slopes : ndarray, shape (p, d, d), or None
-        Derivatives of its steps, if it attracts.
+    chosen : ndarray, shape (p, d, d), or None
+        Frames in which it is contracted, if it attracts.
+    radius : float, optional
+        Of the balls in these frames that are contracted, if cells lie there.
     """
-    wide = MORE * (hi - lo) + LEAST * np.maximum(np.maximum(np.abs(lo), np.abs(hi)), 1.0)
     return {
-        "boxes": hexed(np.stack([lo - wide, hi + wide], axis=-1)),
+        "boxes": hexed(np.stack(widened(lo, hi), axis=-1)),
         "side": side.tolist(),
         "branch": branches.tolist(),
-        "attracts": slopes is not None,
-        "frames": None if slopes is None else hexed(frames(slopes)),
-        "radius": None,
+        "attracts": chosen is not None,
+        "frames": None if chosen is None else hexed(chosen),
+        "radius": None if radius is None else radius.hex(),
     }
 
 
 def frames(slopes: Array) -> Array:
     """Choose S_k so that S_(k+1)^-1 A_k S_k contracts, from the derivatives A_k of the steps of an attracting orbit.
 
-    Eigenvectors of the product of all steps, carried along the orbit; where these are nearly parallel or a step loses a
-    direction, Lyapunov's equation: |A_k x| in the norm of k + 1 is below |x| in that of k.
+    Eigenvectors, or what Lyapunov's equation gives where these are nearly parallel or a step loses a direction.
+    """
+    return frames_to_try(slopes)[0]
+
+
+def frames_to_try(slopes: Array) -> list[Array]:
+    """Give frames by eigenvectors, where these are far from parallel, and by Lyapunov's equation for several rates.
+
+    Eigenvectors of the product of all steps are carried along the orbit, and stretched so that every step contracts
+    alike.  The largest norm of a frame is 1.
     """
     count, dimension = slopes.shape[:2]
     whole = reduce(lambda product, slope: slope @ product, slopes, np.eye(dimension))
@@ -170,12 +201,29 @@ def frames(slopes: Array) -> Array:
     for slope in slopes[:-1]:
         after = slope @ carried[-1]
         carried.append(after / max(float(np.linalg.norm(after, 2)), np.finfo(float).tiny))
+    tried = [_by_lyapunov(slopes, max(float(np.abs(values).max()), FASTEST) ** (s / count)) for s in SHARES]
     if all(np.linalg.cond(frame) < WORST for frame in carried):
-        return np.array(carried)
+        tried.insert(0, _alike(np.array(carried), slopes))
+    return [frame / np.linalg.norm(frame, 2, axis=(1, 2)).max() for frame in tried]
+
+
+def _by_lyapunov(slopes: Array, rate: float) -> Array:
+    """Choose frames so that |A_k x| in the norm of k + 1 is below so much of |x| in that of k."""
+    count, dimension = slopes.shape[:2]
     weights = [np.eye(dimension)] * count
     for k in [*reversed(range(count))] * ROUNDS:
-        weights[k] = np.eye(dimension) + slopes[k].T @ weights[(k + 1) % count] @ slopes[k]
+        weights[k] = np.eye(dimension) + slopes[k].T @ weights[(k + 1) % count] @ slopes[k] / rate**2
     return np.array([np.linalg.inv(np.linalg.cholesky(weight).T) for weight in weights])
+
+
+def _alike(carried: Array, slopes: Array) -> Array:
+    """Stretch frames so that every step contracts by the same factor, but where one sends all to 0."""
+    stretch = np.linalg.norm(np.linalg.solve(np.roll(carried, -1, axis=0), slopes @ carried), 2, axis=(1, 2))
+    if not (stretch > 0.0).all():
+        return carried
+    logs = np.log(stretch)
+    sizes = np.exp(np.concatenate([[0.0], np.cumsum(logs - logs.mean())[:-1]]))
+    return np.asarray(carried * sizes[:, None, None])
 
 
 def _parameters(lower: Any, upper: Any) -> dict[str, Any]:
@@ -197,16 +245,26 @@ def _section(claim: str, arrays: Arrays, known: Mapping[str, Any]) -> dict[str, 
         return {"max_rank": int(arrays["rank"].max())}
     if claim == "expanding":
         return {"least": (float.fromhex(known["least_slope"]) * (1.0 - LESS)).hex()}
-    return dict(known) if claim in ("cycles", "all-cycles") else {}
+    return dict(known) if claim in ("cycles", "all-cycles", "converges") else {}
+
+
+class Part(NamedTuple):
+    """A box of parameters of a certificate: its two corners, the claims with the numbers that the prover knows, arrays.
+
+    Of `expanding` that is `least_slope`, of the claims about orbits their section; `arrays` is empty where no claim is
+    about cells.  A claim is proved, but `refuted`, which is refuted.
+    """
+
+    corners: tuple[Any, Any]
+    claims: Mapping[str, Mapping[str, Any]]
+    arrays: Arrays
 
 
 def write_map(
     path: str | Path,
-    corners: tuple[Any, Any],
-    grid: Grid,
-    claims: Mapping[str, Mapping[str, Any]],
+    domain: Domain,
+    parts: Sequence[Part],
     *,
-    arrays: Arrays,
     goal: Mapping[str, Any] | None,
     recheck: bool = True,
     workers: int | None = 1,
@@ -217,16 +275,12 @@ def write_map(
     ----------
     path : str or Path
         The file.
-    corners : tuple of NamedTuple
-        The lower and the upper one of the parameters.
-    grid : Grid
-        The cells.
-    claims : mapping of str to mapping
-        What is claimed, with the numbers that the prover knows: `least_slope` of expanding, `cycles` of cycles.
-    arrays : dict of str to ndarray
-        From `cells_of`; empty where no claim is about cells.
+    domain : Domain
+        Of the map: there its formulas are compared with what is compiled.
+    parts : sequence of Part
+        The boxes of parameters, one at least.
     goal : mapping, or None
-        The goal of "ends-in", as the file has it.
+        The goal of "ends-in" and "refuted", as the file has it.
     recheck : bool
         Whether to check it first.
     workers : int, optional
@@ -244,16 +298,24 @@ def write_map(
     DeniedError
         The checker does not confirm it: it is kept as NAME.denied.zip.
     """
-    table = recorded_map(corners[0], grid.sides)
-    require_same(*corners, table, grid.domain)
-    sections = [{"claim": word, "section": _section(word, arrays, known)} for word, known in claims.items()]
-    arrays = {f"0.{name}": np.ascontiguousarray(each) for name, each in arrays.items()}
+    table = recorded_map(parts[0].corners[0], domain.sides)
+    boxes, arrays, verdicts = list[dict[str, Any]](), Arrays(), dict[str, str]()
+    for k, part in enumerate(parts):
+        require_same(*part.corners, table, domain)
+        claims = [
+            {"claim": word, "section": _section(word, part.arrays, known)}
+            for word, known in part.claims.items()
+        ]
+        boxes.append({"parameters": _parameters(*part.corners), "prefix": f"{k}.", "claims": claims})
+        arrays |= {f"{k}.{name}": np.ascontiguousarray(each) for name, each in part.arrays.items()}
+        where = f"box {k}: " if len(parts) > 1 else ""
+        verdicts |= {where + word: "refuted" if word == "refuted" else "proved" for word in part.claims}
     header = {
         "format": FORMAT,
         "version": VERSION,
         "map": table,
-        "boxes": [{"parameters": _parameters(*corners), "prefix": "0.", "claims": sections}],
+        "boxes": boxes,
         "goal": goal,
         "plane": None,
     }
-    return written(path, header, arrays, dict.fromkeys(claims, "proved"), recheck=recheck, workers=workers)
+    return written(path, header, arrays, verdicts, recheck=recheck, workers=workers)

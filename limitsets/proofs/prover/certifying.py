@@ -295,13 +295,13 @@ def certify(
     'proved'
     """
     if isinstance(scene, tuple | type):
-        _require_none({"noise": noise, "tolerance": tolerance, "laid": laid}, "beside a map")
+        require_none({"noise": noise, "tolerance": tolerance, "laid": laid}, "certify", "beside a map")
         return certify_map(
             scene, grid, claims, upper=upper, ends=ends, starts=starts, period=period, progress=progress
         )
     twice = isinstance(grid, Grid) or claims is not None  # else the claims stand in its place
     of_maps = {"upper": upper, "ends": ends, "starts": starts, "period": period}
-    _require_none({**of_maps, "grid": grid if twice else None}, "beside a scene")
+    require_none({**of_maps, "grid": grid if twice else None}, "certify", "beside a scene")
     return certify_scene(
         scene,
         claims if grid is None else grid,
@@ -312,12 +312,12 @@ def certify(
     )
 
 
-def _require_none(given: Mapping[str, Any], beside: str) -> None:
+def require_none(given: Mapping[str, Any], function: str, beside: str) -> None:
     """Refuse arguments of the other kind of proof."""
     for name, value in given.items():
         if value is not None:
-            remedy = "leave it out; a scene has tolerance=, a map upper="
-            raise AnswerError(f"the argument {name} of certify", shown(value), f"none {beside}", remedy)
+            remedy = f"leave it out; help({function}) says what a scene has and what a map has"
+            raise AnswerError(f"the argument {name} of {function}", shown(value), f"none {beside}", remedy)
 
 
 @shown_in_notebooks

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base import AnswerError, shown
-from limitsets.base.arrays import Array, Arrays
+from limitsets.base.arrays import Array, Arrays, Ints
 from limitsets.systems.cells import Domain, Grid
 
 Mask: TypeAlias = NDArray[np.bool_]
@@ -38,6 +38,33 @@ class GoalOfMap(NamedTuple):
         """Write the table `goal` of a certificate."""
         starts = None if self.starts is None else [region.in_file() for region in self.starts]
         return {"starts": starts, "ends": [region.in_file() for region in self.ends]}
+
+    def holds(self, lo: Array, hi: Array, side: Ints) -> bool:
+        """Whether each of some boxes, (n, d) on sides (n,), lies in one of the ends."""
+        within = np.zeros(len(side), dtype=bool)
+        for on, low, high in self.ends:
+            within |= (side == on) & ((lo >= low) & (hi <= high)).all(axis=1)
+        return bool(within.all())
+
+    def spread(self, count: int) -> tuple[Array, Ints]:
+        """Places spread over the starts (none: none), and their sides; always the same ones."""
+        regions = self.starts or ()
+        random, each = np.random.default_rng(0), -(-count // max(len(regions), 1))
+        places = [random.uniform(lo, hi, (each, len(lo))) for _, lo, hi in regions]
+        return np.concatenate(places), np.repeat([side for side, _, _ in regions], each)
+
+    def is_left_by(self, lo: Array, hi: Array, side: Ints) -> str:
+        """Say where an orbit through boxes (p, d) is inside the starts and where apart from the ends; "" if nowhere."""
+        inside, apart = np.zeros(len(side), dtype=bool), np.ones(len(side), dtype=bool)
+        for on, low, high in self.starts or ():
+            inside |= (side == on) & ((lo > low) & (hi < high)).all(axis=1)
+        for on, low, high in self.ends:
+            apart &= (side != on) | ((hi < low) | (lo > high)).any(axis=1)
+        if not (inside.any() and apart.any()):
+            return ""
+        k, first = int(apart.argmax()), int(inside.argmax())
+        place, begun = (_named(int(side[j]), lo, hi, j) for j in (k, first))
+        return f"it has a point inside the starts, {begun}, and one outside the ends, {place}"
 
 
 def read_goal(ends: Any, starts: Any, domain: Domain) -> GoalOfMap:

@@ -39,35 +39,35 @@ from limitsets.base import (
     picked,
     shown_in_notebooks,
 )
-from limitsets.base.arrays import Array, Arrays, Ints
+from limitsets.base.arrays import Arrays
 from limitsets.numbers.interval import guard
 from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.certificate import require_proved
-from limitsets.proofs.prover.certificate_of_map import cells_of, cycle_in_file, hexed, write_map
-from limitsets.proofs.prover.every_orbit import every_orbit
+from limitsets.proofs.prover.certificate_of_map import (
+    Part,
+    cells_of,
+    write_map,
+)
+from limitsets.proofs.prover.cycles_of_map import (
+    MOST_PERIOD,
+    converging_claim,
+    cycle_section,
+    cycles_claim,
+    every_cycle,
+    refuted_by_cycle,
+)
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, missing, read_goal, within_ends
-from limitsets.proofs.prover.orbits_of_map import CycleOfMap, prove_orbit, slopes_of
+from limitsets.proofs.prover.orbits_of_map import CycleOfMap
 from limitsets.proofs.prover.proof import Claim, left_of
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph, transitions
 from limitsets.systems.graph.components import ranks
-from limitsets.systems.maps import coerce, has_slope, kernels, kind_of
-from limitsets.systems.maps.contract import between
+from limitsets.systems.maps import coerce, kernels, kind_of
 from limitsets.systems.maps.derived import NEVER, UNKNOWN, branch_boxes
-from limitsets.systems.sets import Cycles, cycles, cycles_of
 from limitsets.systems.sets.basin import longest_stays, passing
 
 # Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
-OF_SLOPES = ("all-cycles", "cycles", "expanding")
-
-# Largest period of the search for cycles.
-UP_TO = 16
-
-# Largest period of which all orbits are looked for: the checker reads cycles of so many points.
-MOST_PERIOD = 200
-
-# Itineraries of one length (in the plane: starts) beyond which no longer cycles are looked for.
-MOST_WORDS = 2000
+OF_SLOPES = ("all-cycles", "converges", "cycles", "expanding")
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +90,9 @@ class ProofOfMap(Tabled):
         Time it took.
     goal : GoalOfMap or None
         What "ends-in" says, if boxes were given.
+    final : ndarray of int32, shape (n_cells,), or None
+        If "converges" was asked for: the cells whose orbits tend to the first cycle with a ball (0), the second (1)
+        and so on, -1 elsewhere.
     """
 
     map: Any
@@ -100,6 +103,7 @@ class ProofOfMap(Tabled):
     cycles: tuple[CycleOfMap, ...]
     seconds: float
     goal: GoalOfMap | None = None
+    final: NDArray[np.int32] | None = None
 
     @property
     def proved(self) -> bool:
@@ -108,12 +112,16 @@ class ProofOfMap(Tabled):
 
     @property
     def cells(self) -> CellSet:
-        """The attracting cells: proved to be positively invariant."""
+        """The attracting cells: proved to be positively invariant, or that their orbits tend to a cycle."""
+        if self.final is not None:
+            return CellSet(self.graph.grid, self.arrays["component"] >= 0)
         return CellSet(self.graph.grid, self.component >= 0)
 
     @property
     def enters(self) -> CellSet:
         """The cells all of whose points are proved to enter the attracting cells."""
+        if self.final is not None:
+            return CellSet(self.graph.grid, self.arrays["rank"] >= 0)
         return CellSet(self.graph.grid, self.graph.condensation().destinations(passing(self.graph)) >= 0)
 
     @functools.cached_property
@@ -121,7 +129,7 @@ class ProofOfMap(Tabled):
         """The arrays of a certificate: target cells, ranks, components (docs/certificates.md)."""
         grid = self.graph.grid
         ends = None if self.goal is None else within_ends(self.goal, grid)
-        return cells_of(self.map, self.upper, grid, ends)
+        return cells_of(self.map, self.upper, grid, ends, self.final)
 
     def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
         """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
@@ -145,17 +153,14 @@ class ProofOfMap(Tabled):
         DeniedError
             The checker does not confirm it: it is kept as NAME.denied.zip.
         """
-        claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
-        require_proved(claims)
-        if self.cycles:
-            claims["cycles"] = {"cycles": [_in_file(self, cycle) for cycle in self.cycles]}
+        part = self.part()
+        require_proved(part.claims)
+        needs_goal = {"ends-in", "refuted"} & set(part.claims)
         write_map(
             path,
-            (self.map, self.upper),
-            self.graph.grid,
-            claims,
-            arrays={} if set(claims) <= {"cycles", "all-cycles"} else self.arrays,
-            goal=self.goal.in_file() if self.goal and "ends-in" in claims else None,
+            self.graph.grid.domain,
+            [part],
+            goal=self.goal.in_file() if self.goal and needs_goal else None,
             recheck=recheck,
             workers=workers,
         )
@@ -165,6 +170,20 @@ class ProofOfMap(Tabled):
         """Return the proof where the checker denies some claims: these are undecided."""
         cycles = () if "cycles" in claims else self.cycles
         return replace(self, claims=left_of(self.claims, claims), cycles=cycles)
+
+    def part(self) -> Part:
+        """Give what a certificate holds of this box of parameters; a refuted goal stands by itself."""
+        cycles = {"cycles": [cycle_section(self, cycle) for cycle in self.cycles]}
+        if any(each.claim == "ends-in" and each.verdict == "refuted" for each in self.claims):
+            return Part((self.map, self.upper), {"cycles": cycles, "refuted": {}}, {})
+        claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
+        if "converges" in claims:
+            drawn = [k for k, cycle in enumerate(self.cycles) if cycle.ball is not None]
+            claims["converges"] = {"components": [*range(len(drawn))], "cycles": drawn}
+        if claims and self.cycles:
+            claims["cycles"] = cycles
+        of_cells = set(claims) - {"cycles", "all-cycles"}
+        return Part((self.map, self.upper), claims, self.arrays if of_cells else {})
 
     def functions(self, claim: str) -> str:
         """Name the functions of the map that a claim is proved of: `image` may be another, but for a sample."""
@@ -186,7 +205,7 @@ class ProofOfMap(Tabled):
                 cells=self.graph.n_cells,
                 attracting=len(self.cells),
                 section=claim.section or None,
-                cycles=self.cycles if "cycles" in claim.claim else None,
+                cycles=self.cycles if claim.claim in ("all-cycles", "cycles", "converges") else None,
                 timings={"certify": self.seconds},
             )
             for claim in self.claims
@@ -201,7 +220,8 @@ class ProofOfMap(Tabled):
         claims = Table(("claim", "verdict", "of", "missing"), rows, caption)
         if not len(self.cells):
             return (claims,)
-        kept = _region(self.cells, "Attracting cells", "no image leads out")
+        kind = "no image leads out" if self.final is None else "no image leads out, or orbits tend to a cycle"
+        kept = _region(self.cells, "Attracting cells", kind)
         return claims, kept, _region(self.enters, "Basin", "every point of its cells enters them")
 
     def __str__(self) -> str:
@@ -315,83 +335,34 @@ def _expanding(proof: ProofOfMap) -> Claim:
     return Claim("expanding", "proved", "", {"least_slope": least.hex()})
 
 
-# ---------------------------------------------------------------- cycles
+# ---------------------------------------------------------------- the same claim between other corners
 
 
-def _in_file(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
-    slopes = slopes_of((proof.map, proof.upper), cycle) if cycle.attracts else None
-    # branches that are names alone are one in the file
-    branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
-    return cycle_in_file(cycle.lo, cycle.hi, cycle.side, branches, slopes)
+def proved_again(proof: ProofOfMap, lower: Any, upper: Any) -> ProofOfMap:
+    """Ask "ends-in" between other corners, on the cells of a proof; its graph is left as it was."""
+    other = replace(proof, map=lower, upper=upper, cycles=())
+    return replace(other, claims=(_ends_in(other),))
 
 
-def _within(cells: CellSet, lo: Array, hi: Array, side: Ints) -> bool:
-    """Whether invariant cells cover the first box of an orbit, and so hold the orbit."""
-    grid = cells.grid
-    corners = grid.index(np.array([lo[0], hi[0]]), int(side[0]))
-    if (corners < 0).any():
-        return False
-    first, last = np.transpose(grid.axes(corners, int(side[0])))
-    mine = cells.mask[grid.of_side(int(side[0]))].reshape(grid.shape[int(side[0])])
-    return bool(mine[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))].all())
-
-
-def _every_cycle(
-    proof: ProofOfMap, period: int, progress: Progress | None
-) -> tuple[Claim, Claim, tuple[CycleOfMap, ...]]:
-    kind, domain = kind_of(proof.map), proof.graph.grid.domain
-    if (len(kind.branches) > 1 and not kind.has_margin) or not has_slope(proof.map):
-        reason = "it needs slopes, and `margin` where there are branches"
-        undecided = [Claim(word, "undecided", reason, {}, final=True) for word in ("all-cycles", "cycles")]
-        return undecided[0], undecided[1], ()
-    proved, missing = every_orbit((proof.map, proof.upper), domain, period, progress)
-    boxes = np.stack([domain.lo, domain.hi], axis=-1)
-    sides = [{"side": side, "box": hexed(box)} for side, box in enumerate(boxes)]
-    section = {"period": period, "domain": sides}
-    listed = {"cycles": len(proved), "missing": [], "complete": not missing}
-    return (
-        Claim("all-cycles", "undecided" if missing else "proved", missing, section),
-        Claim("cycles", "proved", "", listed)
-        if proved
-        else Claim("cycles", "undecided", "none is proved", {}),
-        tuple(proved),
-    )
-
-
-def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
-    """Find cycles in floats for the parameters in the middle, and say what was left out."""
-    cells, middle = proof.cells, between(proof.map, proof.upper)
-    if cells.grid.dimension > 1:
-        return cycles(replace(proof.graph, map=middle), UP_TO, cells), []
-    candidates = cycles_of(middle, cells.extents(), cells.grid.domain, UP_TO, most_words=MOST_WORDS)
-    beyond = f"longer cycles: there are more than {MOST_WORDS} itineraries of one length"
-    return candidates, [] if candidates.complete else [beyond]
-
-
-def _cycles(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[CycleOfMap, ...]]:
-    kind = kind_of(proof.map)
-    if (len(kind.branches) > 1 and not kind.has_margin) or kind.dimension > 2 or not has_slope(proof.map):
-        reason = "cycles need slopes, at most two dimensions, and `margin` where there are branches"
-        return Claim("cycles", "undecided", reason, {}, final=True), ()
-    candidates, missing = _candidates(proof) if len(proof.cells) else ((), [])
-    proved: list[CycleOfMap] = []
-    for number, cycle in enumerate(candidates):
-        if progress is not None:
-            progress("cycles", number, len(candidates))
-        answer = prove_orbit((proof.map, proof.upper), cycle, functools.partial(_within, proof.cells))
-        if isinstance(answer, CycleOfMap):
-            proved.append(answer)
-        else:
-            missing.append(f"period {cycle.period} through {np.atleast_1d(cycle.x[0])}: {answer}")
-    if not proved:
-        reason = missing[0] if missing else f"none is found of period up to {UP_TO} in attracting cells"
-        return Claim("cycles", "undecided", reason, {}), ()
-    return Claim(
-        "cycles", "proved", "", {"cycles": len(proved), "missing": missing, "complete": False}
-    ), tuple(proved)
+def refuted_again(proof: ProofOfMap, lower: Any, upper: Any) -> ProofOfMap:
+    """Look for what refutes "ends-in" between other corners."""
+    open_ = Claim("ends-in", "undecided", "no cycle is found that refutes it", {})
+    return refuted_by_cycle(replace(proof, map=lower, upper=upper, claims=(open_,), cycles=()))
 
 
 # ---------------------------------------------------------------- all together
+
+
+def _with_final(proof: ProofOfMap, claim: str) -> Claim:
+    """Prove a claim about all starts where some cells are final, from the labels of the certificate."""
+    grid, rank = proof.graph.grid, proof.arrays["rank"]
+    lost = np.flatnonzero(rank < 0)
+    if claim == "attracts-all" and lost.size:
+        place = _place(grid, int(lost[0]))
+        return Claim(
+            claim, "undecided", f"{lost.size} cells may not lead to attracting cells: first {place}", {}
+        )
+    return Claim(claim, "proved", "", {"max_rank": int(rank.max())} if claim == "attracts-all" else {})
 
 
 PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
@@ -402,7 +373,7 @@ PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "basin": lambda proof: replace(_invariant(proof), claim="basin"),
     "trapping": lambda proof: replace(_invariant(proof), claim="trapping"),
 }
-CLAIMS_OF_MAP = (*PROVERS, "cycles", "all-cycles")
+CLAIMS_OF_MAP = (*PROVERS, "cycles", "all-cycles", "converges")
 """What can be claimed of any map."""
 
 
@@ -424,9 +395,17 @@ def _wanted(claims: Sequence[str] | None, ends: Any, period: int | None) -> tupl
     for claim in wanted:
         if claim not in CLAIMS_OF_MAP:
             raise AnswerError("the claim about a map", claim, ", ".join(CLAIMS_OF_MAP), "correct the word")
-    if (ends is None) is ("ends-in" in wanted) or (ends is not None and len(wanted) > 1):
+    beside = set(wanted) - {"ends-in", "converges", "cycles"}
+    if (ends is None) is ("ends-in" in wanted) or (ends is not None and beside):
         way = 'ask so: limitsets.certify(map, grid, ["ends-in"], ends=[[(lo, hi)]])'
-        raise AnswerError("the claims", ", ".join(wanted), "ends-in by itself, with its boxes ends=", way)
+        allowed = "ends-in by itself, or with converges and cycles, and its boxes ends="
+        raise AnswerError("the claims", ", ".join(wanted), allowed, way)
+    beside = {"invariant", "trapping", "expanding"} & set(wanted)
+    if "converges" in wanted and beside:
+        allowed = "cycles, basin, attracts-all and ends-in beside converges"
+        raise AnswerError(
+            "the claims", ", ".join(wanted), allowed, f"prove {min(beside)} in a call of its own"
+        )
     if ("all-cycles" in wanted and period is None) or (
         period is not None and ("all-cycles" not in wanted or not 1 <= period <= MOST_PERIOD)
     ):
@@ -498,11 +477,20 @@ def certify_map(
     proof = ProofOfMap(
         lower, upper, graph, component=components_of(graph)[0], claims=(), cycles=(), seconds=0.0, goal=goal
     )
-    of_orbits: dict[str, Claim] = {}
-    orbits: tuple[CycleOfMap, ...] = ()
+    known: dict[str, Claim] = {}
     if period is not None:
-        of_orbits["all-cycles"], of_orbits["cycles"], orbits = _every_cycle(proof, period, progress)
+        known["all-cycles"], known["cycles"], orbits = every_cycle(proof, period, progress)
+        proof = replace(proof, cycles=orbits)
     elif "cycles" in wanted:
-        of_orbits["cycles"], orbits = _cycles(proof, progress)
-    answers = tuple(of_orbits[word] if word in of_orbits else PROVERS[word](proof) for word in wanted)
-    return replace(proof, claims=answers, cycles=orbits, seconds=time.perf_counter() - begin)
+        known["cycles"], orbits = cycles_claim(proof, progress)
+        proof = replace(proof, cycles=orbits)
+    if "converges" in wanted:
+        proof, known["converges"] = converging_claim(proof)
+    for word in wanted:
+        if word not in known:
+            final = proof.final is not None and word != "ends-in"
+            known[word] = _with_final(proof, word) if final else PROVERS[word](proof)
+    proof = replace(proof, claims=tuple(known[word] for word in wanted))
+    if "ends-in" in known and known["ends-in"].verdict != "proved":
+        proof = refuted_by_cycle(proof)
+    return replace(proof, seconds=time.perf_counter() - begin)

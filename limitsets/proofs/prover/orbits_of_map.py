@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base.arrays import Array, Ints
+from limitsets.proofs.prover.converging import Ball
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.systems.maps.derived import SURE, UNKNOWN, branch_boxes
 from limitsets.systems.sets import Cycle
@@ -51,6 +52,8 @@ class CycleOfMap:
         Enclosure of the derivative of F^p.
     attracts : bool or None
         Whether every eigenvalue of it is below 1 in modulus; None where that is open.
+    ball : Ball or None
+        Balls around its points that the map contracts, if "converges" was asked for.
     """
 
     lo: Array
@@ -60,6 +63,7 @@ class CycleOfMap:
     slope_lo: Array
     slope_hi: Array
     attracts: bool | None
+    ball: Ball | None = None
 
     @property
     def period(self) -> int:
@@ -167,11 +171,17 @@ def _sure_steps(
     return steps.image, steps.slope
 
 
+def slopes_on(corners: Corners, lo: Array, hi: Array, cycle: Cycle | CycleOfMap) -> Intervals | None:
+    """Enclose the derivatives (p, d, d) on boxes around an orbit; None where its branches are not proved there."""
+    steps = _sure_steps(corners, lo, hi, cycle)
+    return None if isinstance(steps, str) else Intervals(steps[1].lo[0], steps[1].hi[0])
+
+
 def slopes_of(corners: Corners, cycle: CycleOfMap) -> Array:
     """Return the derivatives of the steps of a proved orbit, in the middles of their enclosures, shape (p, d, d)."""
-    steps = _sure_steps(corners, cycle.lo, cycle.hi, cycle)
-    assert not isinstance(steps, str)  # it was proved on these boxes
-    return np.asarray(0.5 * (steps[1].lo[0] + steps[1].hi[0]))
+    slopes = slopes_on(corners, cycle.lo, cycle.hi, cycle)
+    assert slopes is not None  # it was proved on these boxes
+    return np.asarray(0.5 * (slopes.lo + slopes.hi))
 
 
 def _matrix(lo: Array, hi: Array) -> Matrix:

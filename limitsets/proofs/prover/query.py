@@ -337,6 +337,10 @@ class Query:
         """Whether some goal is about every start on the arm."""
         return any(goal.from_anywhere or goal.of_every_start for goal in self.goals)
 
+    def unjoined(self, pieces: Sequence[Outcome]) -> str:
+        """Say why pieces do not prove the goals together; empty if they do."""
+        return unjoined(pieces)
+
     def box(self, piece: SceneBox | None, noise: Mapping[str, str]) -> ParameterBox:
         """Enclose the parameters."""
         return parameter_box(self.scene, tree=None if piece is None else piece.tree(), noise=dict(noise))

@@ -496,6 +496,25 @@ def _require(low: Any, high: Any, name: str) -> None:
         )
 
 
+def with_number(params: Any, name: str, value: float) -> Any:
+    """Give parameters with one number changed, in others by a point: ``arm.length``, ``k.0`` of an array.
+
+    Examples
+    --------
+    >>> from limitsets import maps
+    >>> from limitsets.systems.maps.contract import with_number
+    >>> with_number(maps.Henon(1.4, 0.3), "a", 1.25)
+    Henon(a=1.25, b=0.3)
+    """
+    field, _, rest = name.partition(".")
+    if isinstance(params, tuple):
+        held = with_number(getattr(params, field), rest, value) if rest else value
+        return params._replace(**{field: held})  # type: ignore[attr-defined]  # a NamedTuple
+    changed = params.copy()
+    changed[int(field)] = value
+    return changed
+
+
 def between(lower: Any, upper: Any, share: Callable[[], float] = lambda: 0.5) -> Any:
     """Give parameters between two corners: each number so much of the way up, by default half.
 
