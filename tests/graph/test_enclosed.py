@@ -353,3 +353,67 @@ def test_place_finds_every_closed_cell_that_an_interval_meets(graded):
 
 def place_one(target, lo, hi, hint):
     return place(target, np.int64(0), 0, lo, hi, 0, np.int64(hint))
+
+
+# ---------------------------------------------------------------- faces of the domain that a map keeps
+
+
+def parabola(x, a):
+    return a * x * (1 - x)
+
+
+def saturating(x, r):
+    return r * x / (1 + x)
+
+
+def competing(x, y, r, s, c):
+    return x * math.exp(r * (1 - x - c * y)), y * math.exp(s * (1 - y - c * x))
+
+
+def slow_competing(x, y, r, c):
+    return x + r * x * (1 - x - c * y), y + r * y * (1 - y - c * x)
+
+
+def line(x, a, b):
+    return a * x + b
+
+
+# Attracting fixed points by theory: each competitor wins where the competition is stronger than 1, both live below.
+KEPT = [
+    (ls.map(parabola, a=0.5), [(0, 1)], [(0.0,)]),
+    (ls.map(saturating, r=2.0), [(0, 3)], [(1.0,)]),
+    (ls.map(competing, r=1.5, s=1.6, c=0.5), [(0, 3), (0, 3)], [(2 / 3, 2 / 3)]),
+    (ls.map(competing, r=1.5, s=1.6, c=1.5), [(0, 3), (0, 3)], [(0.0, 1.0), (1.0, 0.0)]),
+    (ls.map(slow_competing, r=0.5, c=0.5), [(0, 1.2), (0, 1.2)], [(2 / 3, 2 / 3)]),
+]
+
+
+@pytest.mark.parametrize(("params", "box", "wanted"), KEPT)
+def test_a_face_that_the_map_keeps_is_not_left_by_rounding(params, box, wanted):
+    grid = ls.grid(box, cells=1024 if len(box) == 1 else 128)
+    graph = ls.transitions(params, grid, "boxes")
+    assert not graph.ranges.exits.any()
+    found = [attractor.cells for attractor in ls.attractors(graph, throws=100)]
+    points = [[bool(cells.holds(np.array([at]), 0)[0]) for at in wanted] for cells in found]
+    assert sorted(points, reverse=True) == np.eye(len(wanted), dtype=bool).tolist()
+    assert all(len(cells) < 0.01 * grid.n_cells for cells in found)
+
+
+def test_a_border_that_is_touched_is_named_with_what_helps():
+    """0.5 x + 0.5 ends at 1 exactly: the enclosure beyond it; on a wider domain nothing leaves."""
+    params, (narrow, wide) = ls.map(line, a=0.5, b=0.5), (ls.grid([(0, end)], cells=512) for end in (1, 1.25))
+    touching = ls.transitions(params, narrow, "boxes")
+    assert "widen the domain" in ls.basins(touching, ls.attractors(touching)).advice
+    inside = ls.transitions(params, wide, "boxes")
+    assert ls.basins(inside, ls.attractors(inside)).attractors == (1.0,)
+    leaving = ls.transitions(params.with_values(a=0.9), narrow, "boxes")  # truly: 1.4 at 1
+    assert "widen the domain" not in (ls.basins(leaving, ls.attractors(leaving)).advice or "")
+
+
+@pytest.mark.parametrize("number", [0, 3])
+def test_a_proof_up_to_a_kept_face_rechecks(number, tmp_path):
+    params, box, _ = KEPT[number]
+    proof = ls.certify(params, ls.grid(box, cells=64), ["invariant", "basin"])
+    assert {claim.verdict for claim in proof.claims} == {"proved"}
+    proof.save(tmp_path / "kept.proof.zip")
+    assert ls.recheck(tmp_path / "kept.proof.zip").verdict == "proved"

@@ -516,3 +516,14 @@ def test_the_bound_is_met_where_it_is_worst():
                     s, c, _ = e_of_sine_bound.sin_cos(x)
                     worst = max(worst, float(abs(flint.arb(x).sin() - s)), float(abs(flint.arb(x).cos() - c)))
         assert worst < e_of_sine_bound.NEAR / 2
+
+
+def test_ends_at_0_stay_where_the_signs_of_the_operands_allow_nothing_beyond():
+    """Exact zeros stay; a product that underflows keeps its sign only, and one of both signs keeps neither end."""
+    tiny, zero = (0.0, 5e-324), (0.0, 0.0)
+    assert iv.mul(zero, (-1.0, 1.0)) == zero == iv.div(zero, (-2.0, -1.0)) == iv.sin(zero)
+    assert iv.mul((0.0, 0.5), (0.5, 1.0))[0] == 0.0 == iv.mul((-0.5, 0.0), (0.5, 1.0))[1]
+    assert iv.mul((5e-324, 5e-324), tiny)[0] == 0.0 < iv.mul((5e-324, 5e-324), (5e-324, 1e-300))[1]
+    lo, hi = iv.mul((-5e-324, 5e-324), (-5e-324, 5e-324))
+    assert lo < 0.0 < hi
+    assert iv.sin((0.0, 1e-3))[0] == 0.0 == iv.sin((-1e-3, 0.0))[1]

@@ -94,12 +94,26 @@ def sub(a: Ends, b: Ends) -> Ends:
 
 
 @proof_kernel
+def _keep_sign(a: Ends, b: Ends, lo: float, hi: float) -> Ends:
+    """Cut the bounds of a product, or quotient, of a and b at 0 where their signs allow none beyond it.
+
+    So an end that is 0 stays 0: a face x = 0 that a map keeps is not left by rounding.
+    """
+    over, under = (a[0] >= 0.0, b[0] >= 0.0), (a[1] <= 0.0, b[1] <= 0.0)
+    zero = (over[0] & under[0]) | (over[1] & under[1])
+    not_below = (over[0] & over[1]) | (under[0] & under[1]) | zero
+    not_above = (over[0] & under[1]) | (under[0] & over[1]) | zero
+    return max(lo, 0.0 if not_below else -math.inf), min(hi, 0.0 if not_above else math.inf)
+
+
+@proof_kernel
 def mul(a: Ends, b: Ends) -> Ends:
     """Return a b."""
     p, q = _number(a[0] * b[0]), _number(a[0] * b[1])
     r, s = _number(a[1] * b[0]), _number(a[1] * b[1])
     lo, hi = min(min(p, q), min(r, s)), max(max(p, q), max(r, s))
-    return or_empty(holds(a) & holds(b), below(lo), above(hi))
+    lo, hi = _keep_sign(a, b, below(lo), above(hi))
+    return or_empty(holds(a) & holds(b), lo, hi)
 
 
 @proof_kernel
@@ -109,6 +123,7 @@ def div(a: Ends, b: Ends) -> Ends:
     r, s = _number(a[1] / b[0]), _number(a[1] / b[1])
     safe = (b[0] > 0.0) | (b[1] < 0.0)
     lo, hi = below(min(min(p, q), min(r, s))), above(max(max(p, q), max(r, s)))
+    lo, hi = _keep_sign(a, b, lo, hi)
     return or_empty(holds(a) & holds(b), lo if safe else -math.inf, hi if safe else math.inf)
 
 

@@ -58,7 +58,9 @@ def _sine(x: float) -> Ends:
     """Enclosure of sin at one double, beyond the range at the end of it."""
     s, _, n = sin_cos(clamped(x, -LARGEST, LARGEST))
     error = RELATIVE * abs(s) if n == 0.0 else NEAR
-    return max(down(s - error), -1.0), min(up(s + error), 1.0)
+    # Next to 0 the sine has the sign of x: an end that is 0 stays 0.
+    least, most = 0.0 if (n == 0.0) & (x >= 0.0) else -1.0, 0.0 if (n == 0.0) & (x <= 0.0) else 1.0
+    return max(down(s - error), least), min(up(s + error), most)
 
 
 @proof_kernel

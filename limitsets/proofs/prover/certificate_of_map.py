@@ -98,9 +98,12 @@ def cells_of(
 def _target_cells(grid: Grid, side: int, lo: Array, hi: Array) -> Ints:
     """First and last cell along each axis that boxes meet, shape (n, 2 d); outside the grid where they reach beyond."""
     slack = OF_WIDTH * (hi - lo) + OF_SIZE * np.maximum(np.abs(lo), np.abs(hi))
-    axes = grid.edges[side]
-    first = [np.searchsorted(e, low, "right") - 1 for e, low in zip(axes, (lo - slack).T, strict=True)]
-    last = [np.searchsorted(e, high, "left") - 1 for e, high in zip(axes, (hi + slack).T, strict=True)]
+    axes, bottom, top = grid.edges[side], grid.domain.lo[side], grid.domain.hi[side]
+    # An image proved to stay within a face of the domain does so for the checker too: it reaches such an end exactly.
+    low_ends = np.where(lo >= bottom, np.maximum(lo - slack, bottom), lo - slack)
+    high_ends = np.where(hi <= top, np.minimum(hi + slack, top), hi + slack)
+    first = [np.searchsorted(e, low, "right") - 1 for e, low in zip(axes, low_ends.T, strict=True)]
+    last = [np.searchsorted(e, high, "left") - 1 for e, high in zip(axes, high_ends.T, strict=True)]
     return np.stack([*first, *last], axis=1)
 
 

@@ -365,6 +365,13 @@ def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | N
             "within a branch (a floor), and finer cells decide few more starts; give it one branch before the jump and "
             "one after it (docs/own_map.md), or sample the images: limitsets.transitions(map, grid)"
         )
+    if _left_by_rounding(graph):
+        return (
+            f"{reached}: enclosed images leave the domain, and no sampled one does: the map touches a border, over "
+            "which rounding carries every enclosure, however fine the cells are; widen the domain beyond that border, "
+            "move it to x = 0 (a product or quotient of numbers that are not negative never ends below 0), or sample "
+            "the images: limitsets.transitions(map, grid)"
+        )
     coarse = "an attractor in cells that are too coarse for it: they are undecided; ask for finer cells"
     if max(map(len, lasting)) <= MOST_OF_A_CYCLE:
         return f"{reached}, an unstable cycle or {coarse}"
@@ -372,6 +379,21 @@ def _advice(graph: TransitionGraph, lasting: list[NDArray[np.int32]]) -> str | N
         f"{reached}, a chaotic repeller or {coarse}; near a repeller they decide few more starts, sample the shares: "
         "limitsets.resilience.basin_stability(graph, found, starts=10000)"
     )
+
+
+def _left_by_rounding(graph: TransitionGraph) -> bool:
+    """Whether enclosed images leave the domain, and none of the corners and middles of their cells does."""
+    cells, domain = np.flatnonzero(graph.ranges.exits), graph.grid.domain
+    if graph.method != "boxes" or not cells.size:
+        return False
+    lo, hi, side = graph.grid.corners(cells)
+    for s, share in product(np.unique(side).tolist(), (0.0, 0.5, 1.0)):
+        starts = (lo + share * (hi - lo))[side == s]
+        image = images(graph.map, starts if domain.dimension > 1 else starts[:, 0], s)
+        x = image.x.reshape(starts.shape)
+        if not ((domain.lo[image.side] <= x) & (x <= domain.hi[image.side])).all():
+            return False
+    return True
 
 
 def _share_reaching(graph: TransitionGraph, cells: NDArray[np.integer]) -> float:
