@@ -52,7 +52,7 @@ def two():
     """Boxes in the plane of Leslie's two parameters, which claim nothing but the first."""
     cells = arrays_of(
         known.LESLIE,
-        uniform((0, 90), (0, 70), cells=64),
+        uniform((0, 90), (0, 70), cells=256),
         {"a": [19.6, 19.61], "b": [23.68, 23.69]},
         slack=0.2,
     )
