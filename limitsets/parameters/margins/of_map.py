@@ -238,7 +238,7 @@ def require_width(width: float) -> None:
 @arguments_checked_as("margin")
 def margins_of_map(
     map: Any,  # noqa: A002  # the field's word
-    grid: Grid | None = None,
+    grid: Grid,
     *quantities: str,
     ends: Any = None,
     starts: Any = None,
