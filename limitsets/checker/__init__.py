@@ -49,6 +49,7 @@ The files follow docs/certificates.md, and each imports only from those before i
     any_map      the map of a file, and one cell of it
     map_cells    the cells, their labels
     map_cycles   periodic orbits, and balls around them
+    map_plane    regions of parameters, and shares of them
     map_file     the file of a map
     map_words    what is proved, in sentences
     map_claims   the claims

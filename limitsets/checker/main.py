@@ -1,6 +1,7 @@
 """The command line: `python -m limitsets.checker FILE`; docs/certificates.md, "Checking one"."""
 
 import argparse
+import itertools
 import json
 import sys
 import time
@@ -53,6 +54,12 @@ def show_map(report: Report, of: dict[str, Any], *, whole: bool) -> None:
         said = [f"{name}: {WORDS[word]} - {text}" for name, word, text in box["claims"]]
         said = said or ["nothing is claimed"]
         print("\n".join([*title, *box["parameters"], *filter(None, [box["holds_for"]]), *said]))
+    if "plane" in of:
+        print(
+            "\n".join(
+                itertools.takewhile(lambda line: line.startswith(("region:", "    ")), report.statement)
+            )
+        )
     print(f"relying on: {'; '.join(report.relied_on)}")
     print(f"{counted(report.cells, 'cell')}, {report.seconds:.1f} s")
     verdicts = [box["verdict"] for box in of["boxes"]]

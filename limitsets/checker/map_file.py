@@ -12,6 +12,7 @@ from .file import Arrays, hex_float, read_side, require, rows, table
 from .map_cells import MapCells
 from .map_cycles import Listed, read_box, read_cycles
 from .map_orbits import Every, read_every
+from .map_plane import ParameterAxis, RegionPlace, read_axes, read_region_boxes
 from .program import is_whole
 
 CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
@@ -64,6 +65,8 @@ class MapFile(NamedTuple):
     shape: Shape
     goal: Goal | None
     parts: list[Part]
+    axes: list[ParameterAxis]  # of a region, none where the boxes are no region
+    places: list[RegionPlace]  # of the boxes in it
 
 
 # ----------------------------------------------------------------
@@ -73,23 +76,26 @@ class MapFile(NamedTuple):
 def read_map_file(header: dict[str, Any], entries: dict[str, memoryview]) -> MapFile:
     """Read the content of a file; raises BadFileError."""
     table(header, "header.json", "format version map boxes goal plane arrays", "producer")
-    require(header["plane"] is None, "plane: this checker does not know regions of a map's parameters")
     shape = read_map(header["map"])
+    axes = [] if header["plane"] is None else read_axes(header["plane"], shape.names)
     goal = None if header["goal"] is None else read_map_goal(header["goal"], shape)
     boxes = rows(header["boxes"], "boxes", 1, MOST_PARAMETER_BOXES)
-    prefixes = [table(box, "a box", "parameters prefix claims")["prefix"] for box in boxes]
+    keys = "parameters prefix claims at" if axes else "parameters prefix claims"
+    prefixes = [table(box, "a box", keys)["prefix"] for box in boxes]
     plain_ones = all(isinstance(prefix, str) and re.fullmatch(r"[0-9]{1,6}\.", prefix) for prefix in prefixes)
     require(
         plain_ones and len(set(prefixes)) == len(boxes), "the prefixes of the boxes are not as they should be"
     )
     arrays = Arrays(header["arrays"], entries)
     parts = [read_map_part(box, shape, goal, arrays, f"box {k}") for k, box in enumerate(boxes)]
+    given = [part.parameters for part in parts]
+    places = read_region_boxes(axes, [box["at"] for box in boxes], given) if axes else []
     require(any(part.claims or part.unknown for part in parts), "nothing is claimed")
     if not any(part.unknown for part in parts):  # which may need arrays
         arrays.require_no_others(
             "the header describes arrays that no claim needs", "it holds arrays that no claim needs"
         )
-    return MapFile(shape, goal, parts)
+    return MapFile(shape, goal, parts, axes=axes, places=places)
 
 
 def read_map_goal(raw: object, shape: Shape) -> Goal:

@@ -38,6 +38,7 @@ from .file import (
 from .goals import content_of_goal, goal_of_scene
 from .map_claims import check_map_file
 from .map_file import MapFile, read_map_file
+from .map_plane import region_in_words
 from .model import FORMULAS
 from .plane import (
     Plane,
@@ -297,6 +298,10 @@ def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report)
             good = word in ("proved", "refuted")
             report.claims.append((where + name, word, "" if good else text))
             report.statement += [f"{where}{name}: {text}"] if good else []
+    if file.axes:
+        words = [{name: word for name, word, _ in outcome.claims} for outcome in outcomes]
+        lines, report.map["plane"] = region_in_words(file.axes, file.places, words)
+        report.statement = lines + report.statement
     worst = {outcome.verdict for outcome in outcomes if outcome.verdict}
     report.verdict = "failed" if "failed" in worst else "proved" if "proved" in worst else "refuted"
     report.reason = next((f"{name}: {why}" for name, _, why in report.claims if why), "")

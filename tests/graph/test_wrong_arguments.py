@@ -165,7 +165,7 @@ def test_an_argument_of_the_wrong_kind_is_named(name, function, asked, fitting):
         several = parameters[asked].kind == inspect.Parameter.VAR_POSITIONAL
         with pytest.raises(LimitsetsError) as error:
             function(*given.values(), wrong) if several else function(**{**given, asked: wrong})
-        public = {"certify_map": "certify"}.get(name, name.rpartition(".")[2])
+        public = {"certify_map": "certify", "margins_of_map": "margin"}.get(name, name.rpartition(".")[2])
         named = (f"the argument {asked} of {public} is", "the source of a scene", *NAMED.get(asked, ()))
         assert any(words in str(error.value) for words in named), (word, str(error.value))
         assert error.value.allowed

@@ -74,7 +74,7 @@ def test_a_goal_that_fails_or_is_open_has_no_margin(tmp_path):
 @pytest.mark.parametrize(
     ("given", "how", "words"),
     [
-        (("r",), {}, "the goal"),
+        (("r",), {}, "the argument ends of margin"),
         (("q",), {"ends": ENDS}, "the parameter is 'q'; allowed: r"),
         (("r",), {"ends": ENDS, "width": 2.0}, "the width"),
         (("r",), {"ends": ENDS, "reading": "fixed"}, "the argument reading of margin"),

@@ -238,7 +238,7 @@ def require_width(width: float) -> None:
 @arguments_checked_as("margin")
 def margins_of_map(
     map: Any,  # noqa: A002  # the field's word
-    grid: Grid | None = None,
+    grid: Grid,
     *quantities: str,
     ends: Any = None,
     starts: Any = None,
@@ -269,7 +269,8 @@ def margins_of_map(
     """
     require_width(width)
     if ends is None:
-        raise AnswerError("the goal", None, "boxes in which orbits end", "pass ends=[[(lo, hi)]]")
+        allowed = "boxes in which orbits end"
+        raise AnswerError("the argument ends of margin", None, allowed, "pass ends=[[(lo, hi)]]")
     first = certify_map(map, grid, ["ends-in"], ends=ends, starts=starts)
     values = dict(names_of(first.map))
     for name in quantities:

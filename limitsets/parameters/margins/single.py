@@ -164,7 +164,8 @@ def margin(
     """
     if isinstance(scene, tuple | type):
         require_none({"reading": reading, "goal": goal, "laid": laid}, "margin", "beside a map")
-        return margins_of_map(scene, *quantities, ends=ends, starts=starts, width=width, progress=progress)
+        given = quantities or (None,)  # which is then refused as the grid
+        return margins_of_map(scene, *given, ends=ends, starts=starts, width=width, progress=progress)
     require_none({"ends": ends, "starts": starts}, "margin", "beside a scene")
     return margin_scene(
         scene, *quantities, reading=reading, goal=goal, laid=laid, width=width, progress=progress

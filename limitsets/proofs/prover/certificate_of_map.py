@@ -263,12 +263,22 @@ class Part(NamedTuple):
     arrays: Arrays
 
 
+def region_of(parts: Sequence[Part], names: Sequence[str]) -> tuple[dict[str, Any], list[Any]]:
+    """Write the axes of a region of some parameters, and by part the numbers of the borders between which it lies."""
+    ends = [[dict(names_of(corner)) for corner in part.corners] for part in parts]
+    borders = {name: sorted({corner[name] for pair in ends for corner in pair}) for name in names}
+    axes = [{"parameter": name, "borders": [decimal(end) for end in borders[name]]} for name in names]
+    at = [[[borders[name].index(corner[name]) for corner in pair] for name in names] for pair in ends]
+    return {"axes": axes}, at
+
+
 def write_map(
     path: str | Path,
     domain: Domain,
     parts: Sequence[Part],
     *,
     goal: Mapping[str, Any] | None,
+    region: Sequence[str] = (),
     recheck: bool = True,
     workers: int | None = 1,
 ) -> float | None:
@@ -284,6 +294,8 @@ def write_map(
         The boxes of parameters, one at least.
     goal : mapping, or None
         The goal of "ends-in" and "refuted", as the file has it.
+    region : sequence of str
+        Parameters of which the boxes are a region, none lying over another; by default they are none.
     recheck : bool
         Whether to check it first.
     workers : int, optional
@@ -321,4 +333,7 @@ def write_map(
         "goal": goal,
         "plane": None,
     }
+    if region:
+        header["plane"], at = region_of(parts, region)
+        header["boxes"] = [box | {"at": place} for box, place in zip(boxes, at, strict=True)]
     return written(path, header, arrays, verdicts, recheck=recheck, workers=workers)

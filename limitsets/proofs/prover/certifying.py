@@ -316,7 +316,11 @@ def require_none(given: Mapping[str, Any], function: str, beside: str) -> None:
     """Refuse arguments of the other kind of proof."""
     for name, value in given.items():
         if value is not None:
-            remedy = f"leave it out; help({function}) says what a scene has and what a map has"
+            own = {
+                "certify": "a scene has tolerance=, a map upper=",
+                "margin": "a scene has goal=, a map ends=",
+            }
+            remedy = f"leave it out; {own[function]}"
             raise AnswerError(f"the argument {name} of {function}", shown(value), f"none {beside}", remedy)
 
 
