@@ -57,7 +57,7 @@ from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph, transitions
 from limitsets.systems.graph.components import ranks
 from limitsets.systems.maps import coerce, has_slope, kernels, kind_of
-from limitsets.systems.maps.contract import between
+from limitsets.systems.maps.contract import between, compiled_kind_of
 from limitsets.systems.maps.derived import NEVER, SURE, UNKNOWN, branch_boxes
 from limitsets.systems.sets import Cycle, Cycles, cycles, cycles_of
 from limitsets.systems.sets.basin import longest_stays, passing
@@ -604,7 +604,7 @@ def certify_map(
         For a map whose images cannot be enclosed: the line names the function and the way out.
     """
     begin = time.perf_counter()
-    kind_of(map)
+    compiled_kind_of(map, "certify")
     wanted = tuple(dict.fromkeys(claims or (("attracts-all",) if ends is None else ("ends-in",))))
     for claim in wanted:
         if claim not in CLAIMS_OF_MAP:
