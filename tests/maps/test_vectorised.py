@@ -84,7 +84,7 @@ def test_a_spline_of_scipy_has_shares_of_its_basins():
 
 def test_a_map_of_a_module_is_pickled():
     map_ = ls.map(henon, vectorised=True, a=1.4)
-    assert pickle.loads(pickle.dumps(map_)) == map_  # noqa: S301  # our own
+    assert pickle.loads(pickle.dumps(map_)) == map_  # our own
 
 
 MAP = ls.map(ricker, vectorised=True, r=2.3)

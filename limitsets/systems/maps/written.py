@@ -360,7 +360,7 @@ def _registered(
 ) -> type:
     """Make the class of parameters, and register it with kernels that call the functions by their names."""
     first = functions["first"]
-    cls = _class_with_fields(first.__name__, fields, first.__doc__, coordinates)
+    cls: type = _class_with_fields(first.__name__, fields, first.__doc__, coordinates)
     _FUNCTIONS[cls] = functions
     x = {name: f"x[{k}]" if len(coordinates) > 1 else "x" for k, name in enumerate(coordinates)}
     calls = {
