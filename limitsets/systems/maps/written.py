@@ -271,6 +271,25 @@ def _require_results(
 # ---------------------------------------------------------------- functions of arrays
 
 
+def _called(formula: Any, name: str) -> Callable[..., Any]:
+    """Make the call of a function of arrays, which refuses arrays of other shapes."""
+
+    def on_arrays(params: Any, xs: tuple[Any, ...]) -> tuple[Any, ...]:
+        with np.errstate(all="ignore"):
+            after = formula(*(each.copy() for each in xs), *params)
+        after = (after,) if len(xs) == 1 and not isinstance(after, tuple | list) else after
+        shapes = [np.shape(each) for each in after] if isinstance(after, tuple | list) else [np.shape(after)]
+        if not isinstance(after, tuple | list) or shapes != [xs[0].shape] * len(xs):
+            each = f"{'an array' if len(xs) == 1 else f'a tuple of {len(xs)} arrays'} of shape {xs[0].shape}"
+            remedy = "return one array for each coordinate, of the shape of x"
+            raise MapError(
+                f"what {name} returns", f"of shape {', '.join(str(shape) for shape in shapes)}", each, remedy
+            )
+        return tuple(np.asarray(each, dtype=np.float64) for each in after)
+
+    return on_arrays
+
+
 def _of_arrays(formula: Any, alone: bool, values: dict[str, float]) -> Any:
     """Make a map of a numpy function of arrays, which is called as it is."""
     if not alone or not callable(formula) or isinstance(formula, type):
@@ -287,19 +306,7 @@ def _of_arrays(formula: Any, alone: bool, values: dict[str, float]) -> Any:
         taken = ", ".join(fields) or "no parameter"
         raise MapError("a value", f"{unknown}=...", f"values of {taken}", "correct the name")
 
-    def on_arrays(params: Any, xs: tuple[Any, ...]) -> tuple[Any, ...]:
-        with np.errstate(all="ignore"):
-            after = formula(*(each.copy() for each in xs), *params)
-        after = (after,) if len(xs) == 1 and not isinstance(after, tuple | list) else after
-        shapes = [np.shape(each) for each in after] if isinstance(after, tuple | list) else [np.shape(after)]
-        if not isinstance(after, tuple | list) or shapes != [xs[0].shape] * len(xs):
-            each = f"{'an array' if len(xs) == 1 else f'a tuple of {len(xs)} arrays'} of shape {xs[0].shape}"
-            remedy = "return one array for each coordinate, of the shape of x"
-            raise MapError(
-                f"what {name} returns", f"of shape {', '.join(str(shape) for shape in shapes)}", each, remedy
-            )
-        return tuple(np.asarray(each, dtype=np.float64) for each in after)
-
+    on_arrays = _called(formula, name)
     key = ("vectorised", fields, id(formula))
     if key not in _CLASSES:
         cls = _class_with_fields(name, fields, formula.__doc__, coordinates)
