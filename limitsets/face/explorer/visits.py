@@ -20,8 +20,8 @@ from limitsets.face.explorer.page import MapPage, ScenePage
 from limitsets.face.explorer.work import within_reach
 from limitsets.feeder.scene import Scene, load
 from limitsets.systems.cells import as_domain
-from limitsets.systems.maps import coerce, domain_of, kind_of
-from limitsets.systems.maps.contract import require_dimension
+from limitsets.systems.maps import coerce, domain_of
+from limitsets.systems.maps.contract import compiled_kind_of, require_dimension
 
 # ----------------------------------------------------------------
 # A server for the page: on this machine alone, unless another address and its allowed visitors are given.
@@ -147,7 +147,7 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
     @classmethod
     def of_map(cls, params: Any, domain: Any) -> Explorer:
         """Look at a map."""
-        kind_of(params)
+        compiled_kind_of(params, "the explorer")
         chosen = coerce(params)
         try:
             where = as_domain(domain_of(chosen) if domain is None else domain)

@@ -33,8 +33,8 @@ from limitsets.parameters.atlas.store import CHECKSUM, SEAL, Store
 from limitsets.parameters.atlas.subjects import Axis, MapSubject, SceneSubject, Subject, axis_of
 from limitsets.parameters.atlas.work import STEP, answer
 from limitsets.systems.cells import Domain, as_domain
-from limitsets.systems.maps import coerce, domain_of, kind_of
-from limitsets.systems.maps.contract import require_dimension
+from limitsets.systems.maps import coerce, domain_of
+from limitsets.systems.maps.contract import compiled_kind_of, require_dimension
 from limitsets.systems.maps.written import modules_of
 
 if TYPE_CHECKING:
@@ -385,7 +385,7 @@ def _subject(subject: Any, domain: Any) -> Subject:
                 "the domain", "given", "none beside a scene", "a scene has one: leave it out"
             )
         return SceneSubject(subject)
-    kind_of(subject)
+    compiled_kind_of(subject, "the atlas")
     chosen = coerce(subject)
     box = _own_domain(chosen) if domain is None else as_domain(domain)
     if box is not None:

@@ -16,7 +16,7 @@ from limitsets.feeder.scene import Scene, in_unit_of, unit_of
 from limitsets.feeder.scene.quantities import in_units
 from limitsets.systems.cells import Domain, as_domain
 from limitsets.systems.maps import coerce, domain_of, has_slope, kind_of
-from limitsets.systems.maps.contract import require_dimension
+from limitsets.systems.maps.contract import compiled_kind_of, require_dimension
 from limitsets.systems.sets.end_points import IntervalMap
 
 Values: TypeAlias = Mapping[str, Any]
@@ -184,7 +184,7 @@ def _of_scene(scene: Scene, path: Curve) -> Path:
 
 
 def _of_map(params: Any, path: Curve, domain: Any) -> Path:
-    kind_of(params)
+    compiled_kind_of(params, "continuation")
     box = as_domain(domain_of(params) if domain is None else domain)
     require_dimension(params, "domain", box.dimension)
     curve = _curve(path, dict)

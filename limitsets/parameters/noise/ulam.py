@@ -35,6 +35,7 @@ from limitsets.parameters.noise.cell_images import (
 )
 from limitsets.systems.cells import Grid
 from limitsets.systems.maps import codes, kind_of
+from limitsets.systems.maps.contract import compiled_kind_of
 
 # ----------------------------------------------------------------
 # The two stages of the transfer operator: the throw, and the scatter of the landing place.
@@ -366,7 +367,7 @@ def transfer(
     law = certain(1.0) if parameter is None else parameter
     pieces = law if isinstance(law, Strata) else law.strata(strata)
     params = at(float(pieces.mean[0]))
-    kind = kind_of(params)
+    kind = compiled_kind_of(params, "the noisy chain")
     if kind.dimension != grid.dimension:
         raise AnswerError(
             "the dimension of the grid", grid.dimension, f"{kind.dimension}, the map's", "cut another domain"

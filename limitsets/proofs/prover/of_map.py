@@ -63,6 +63,7 @@ from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph, transitions
 from limitsets.systems.graph.components import ranks
 from limitsets.systems.maps import coerce, kernels, kind_of
+from limitsets.systems.maps.contract import compiled_kind_of
 from limitsets.systems.maps.derived import NEVER, UNKNOWN, branch_boxes
 from limitsets.systems.sets.basin import longest_stays, passing
 
@@ -461,7 +462,7 @@ def certify_map(
         For a map whose images cannot be enclosed: the line names the function and the way out.
     """
     begin = time.perf_counter()
-    kind_of(map)
+    compiled_kind_of(map, "certify")
     wanted = _wanted(claims, ends, period)
     if grid is None:
         way = "limitsets.certify(map, limitsets.grid([(lo, hi)], cells=1024))"

@@ -21,7 +21,13 @@ from limitsets.base.arrays import Array
 from limitsets.proofs.prover.recording import LEAVES, entries_of, names_of, recorded
 from limitsets.systems.cells import Domain, Grid, as_domain
 from limitsets.systems.maps import codes, coerce, images, images_on, kernels, kind_of
-from limitsets.systems.maps.contract import between, require_corners, require_dimension, require_sides
+from limitsets.systems.maps.contract import (
+    between,
+    compiled_kind_of,
+    require_corners,
+    require_dimension,
+    require_sides,
+)
 from limitsets.systems.maps.critical import margins
 
 # Places at which a program is compared, and how far it may be off, of the value and the extent.
@@ -363,7 +369,7 @@ def formulas(params: Any, domain: Grid | Domain | ArrayLike | None = None, *, si
         x0' = x1
         x1' = x1 * exp(alpha - x0)
     """
-    kind = kind_of(params)
+    kind = compiled_kind_of(params, "formulas")
     require_sides(params, sides - 1, sides - 1)
     corner = np.full((sides, kind.dimension), HALF)
     given = domain.domain if isinstance(domain, Grid) else domain

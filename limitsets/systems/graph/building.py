@@ -17,7 +17,7 @@ from limitsets.systems.graph.images import METHODS
 from limitsets.systems.graph.ranges import build
 from limitsets.systems.graph.target import Target, no_boxes
 from limitsets.systems.maps import kind_of
-from limitsets.systems.maps.contract import require_dimension, require_sides
+from limitsets.systems.maps.contract import compiled_kind_of, require_dimension, require_sides
 
 # ----------------------------------------------------------------
 # Test whether the graph of a grid fits in memory, before it is built: a process that needs more is killed.
@@ -97,8 +97,8 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
         Cells to go between.
     method : str, optional
         How the image of a cell is found, a word of docs/choosing.md.  Default: "end-points" in one dimension,
-        "corners-padded" in more.  "boxes" proves that no image of any point is missed, for a map with `image_box`; the
-        others sample.
+        "corners-padded" in more and of a map of vectorised=True.  "boxes" proves that no image of any point is missed,
+        for a map with `image_box`; the others sample.
     **options
         For "boxes": upper, the upper corner of a box of parameters.
 
@@ -127,9 +127,12 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     kind = kind_of(map)
     require_dimension(map, "grid", grid.dimension)
     require_sides(map, 0, grid.sides - 1)
-    chosen = method or ("end-points" if grid.dimension == 1 else "corners-padded")
+    cut = grid.dimension == 1 and kind.on_arrays is None  # cells are cut where compiled images bend
+    chosen = method or ("end-points" if cut else "corners-padded")
     if chosen not in METHODS:
         raise AnswerError("the image method", chosen, ", ".join(METHODS), "correct the word")
+    if chosen in ("boxes", "end-points"):
+        compiled_kind_of(map, f'transitions by "{chosen}"')
     require_memory(grid, chosen)
     require_agreement(map, grid.domain, chosen == "boxes", options.get("upper"))
     target = Target.of(grid, kind.exits)

@@ -67,6 +67,9 @@ class MapKind:
         Which of the optional kernels exist.
     own_box : bool
         Whether `image_box` was registered, and not derived.
+    on_arrays : callable or None
+        Of a map of a numpy function of arrays, which nothing compiles: ``on_arrays(params, xs)`` gives the coordinate
+        arrays of the images.
     """
 
     name: str
@@ -78,6 +81,7 @@ class MapKind:
     has_margin: bool
     has_displacement: bool
     own_box: bool = False
+    on_arrays: Callable[..., tuple[NDArray[np.float64], ...]] | None = None
 
     @property
     def formulas(self) -> tuple[str, ...]:
@@ -226,6 +230,37 @@ def register(
     return cls
 
 
+def register_on_arrays(
+    cls: type, dimension: int, on_arrays: Callable[..., tuple[NDArray[np.float64], ...]]
+) -> None:
+    """Make a class of parameters a map of one side whose images a numpy function gives, of all states at once."""
+    exits = {**EXITS_OF_A_MAP, "undefined": codes.UNDEFINED}
+    _KINDS[cls] = MapKind(
+        cls.__name__, dimension, ("map",), exits, has_image_on=False, has_image_box=False, has_margin=False,
+        has_displacement=False, on_arrays=on_arrays,
+    )  # fmt: skip
+
+
+def compiled_kind_of(params: Any, door: str) -> MapKind:
+    """Return what is known of a map, as `kind_of`; refuse one of a numpy function of arrays, which is not compiled.
+
+    Raises
+    ------
+    MapError
+        Its class was never registered, or is of such a function: the line names `door`, the call that needs more.
+    """
+    kind = kind_of(params)
+    if kind.on_arrays is not None:
+        raise MapError(
+            f"the map of {door}",
+            f"{kind.name}, of vectorised=True",
+            "one of a function of numbers, which is compiled",
+            "write it without arrays and leave vectorised=True out; as it is it has transitions by samples, attractors,"
+            " basins, orbits, and resilience with starts=",
+        )
+    return kind
+
+
 # Arguments of each kernel, as the table of this module has them.
 ARGUMENTS = {
     "image": ("params", "x", "side"),
@@ -330,6 +365,8 @@ def has_slope(params: Any) -> bool:
     True
     """
     kind, cls = kind_of(params), type(params)
+    if kind.on_arrays is not None:
+        return False
     if kind.has_image_on or len(kind.branches) > 1:
         return kind.has_image_on
     if cls not in _SLOPES:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from limitsets.base import AnswerError, arguments_checked, shown
 from limitsets.numbers.jit import kernel
 from limitsets.systems.maps import codes
-from limitsets.systems.maps.contract import kind_of, require_sides
+from limitsets.systems.maps.contract import compiled_kind_of, kind_of, require_sides
 from limitsets.systems.maps.drivers import columns, images
 from limitsets.systems.maps.kernels import margin, on_side, pick
 
@@ -266,7 +266,7 @@ def branches_of_side(params: Any, domain: Sides, side: int, samples: int) -> tup
 
 def require_one_dimension(params: Any) -> None:
     """Refuse a map of more dimensions: there branches have no order."""
-    dimension = kind_of(params).dimension
+    dimension = compiled_kind_of(params, "critical points").dimension
     if dimension != 1:
         raise AnswerError(
             "the dimension of the map",

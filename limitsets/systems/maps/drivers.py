@@ -16,7 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from limitsets.base import MapError, Table, Tabled, arguments_checked, shown
 from limitsets.numbers.jit import generic, kernel
 from limitsets.systems.maps import codes
-from limitsets.systems.maps.contract import has_slope, kind_of, or_register, require_codes, require_sides
+from limitsets.systems.maps.contract import (
+    compiled_kind_of,
+    has_slope,
+    kind_of,
+    or_register,
+    require_codes,
+    require_sides,
+)
 from limitsets.systems.maps.kernels import (
     displacement,
     entries_of,
@@ -239,13 +246,38 @@ def images(params: Any, x: ArrayLike, side: int) -> Images:
     >>> maps.images(maps.Doubling(2.0), [0.1, 0.6], 0).x
     array([0.2, 0.2])
     """
-    xs = columns(x, kind_of(params).dimension)
+    kind = kind_of(params)
+    xs = columns(x, kind.dimension)
     require_sides(params, side, side)
     count = xs[0].size
+    if kind.on_arrays is not None:
+        after = kind.on_arrays(params, xs)
+        return Images(rows(after), np.zeros(count, np.int64), _codes_of(after), 0.0)
     after = tuple(np.empty(count) for _ in xs)
     side_after, code = np.empty(count, np.int64), np.empty(count, np.int64)
     again = fill_images(params, side, xs, after, side_after, code)
     return Images(rows(after), side_after, code, again / max(count, 1))
+
+
+def _codes_of(after: tuple[NDArray[np.float64], ...]) -> NDArray[np.int64]:
+    """Codes of images of a function of arrays: branch 0, or `UNDEFINED` where a coordinate is nan."""
+    undefined = np.logical_or.reduce([np.isnan(values) for values in after])
+    return np.where(undefined, codes.UNDEFINED, 0).astype(np.int64)
+
+
+def _advanced_on_arrays(params: Any, count: int, xs: Any, sides: Any, code_after: Any, steps: Any) -> None:
+    """Do what `_advance` does, of all starts that go on at once."""
+    code_after[:], steps[:], sides[:] = 0, 0, 0
+    going = np.arange(steps.size)
+    for _ in range(count):
+        if not going.size:
+            return
+        after = kind_of(params).on_arrays(params, tuple(values[going] for values in xs))  # type: ignore[misc]
+        for values, each in zip(xs, after, strict=True):
+            values[going] = each
+        code_after[going] = _codes_of(after)
+        steps[going] += 1
+        going = going[code_after[going] >= 0]
 
 
 @arguments_checked
@@ -280,7 +312,7 @@ def images_on(
     >>> x.round(2), side
     (array([16.55]), array([0]))
     """
-    xs = columns(x, kind_of(params).dimension)
+    xs = columns(x, compiled_kind_of(params, "images_on").dimension)
     require_sides(params, side, side)
     after = tuple(np.empty(xs[0].size) for _ in xs)
     side_after = np.empty(xs[0].size, np.int64)
@@ -370,7 +402,17 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     if count < 0:
         raise MapError("the number of steps", count, "an integer from 0", "pass count=100")
     xs, sides, code = empty_orbit(start, side, count)
-    return as_orbit(params, xs, sides, code, _orbit(params, 0, xs, sides, code))
+    on_arrays = kind_of(params).on_arrays
+    if on_arrays is None:
+        return as_orbit(params, xs, sides, code, _orbit(params, 0, xs, sides, code))
+    sides[:], code[:], made = 0, 0, 0
+    while made < count and not (made and code[made - 1] < 0):
+        after = on_arrays(params, tuple(values[made : made + 1] for values in xs))
+        for values, each in zip(xs, after, strict=True):
+            values[made + 1] = each[0]
+        code[made] = _codes_of(after)[0]
+        made += 1
+    return as_orbit(params, xs, sides, code, made)
 
 
 def empty_orbit(start: tuple[float, ...], side: int, count: int) -> tuple[Any, Any, Any]:
@@ -445,7 +487,10 @@ def advance(
     if sides.size:
         require_sides(params, int(sides.min()), int(sides.max()))
     code, steps = np.empty(sides.size, np.int64), np.empty(sides.size, np.int64)
-    _advance(params, first, count, xs, sides, code, steps)
+    if kind_of(params).on_arrays is None:
+        _advance(params, first, count, xs, sides, code, steps)
+    else:
+        _advanced_on_arrays(params, count, xs, sides, code, steps)
     return rows(xs), sides, code, steps
 
 
@@ -613,7 +658,7 @@ class _Tangent:
     """A tangent vector on its way along an orbit, beginning where `start` is."""
 
     def __init__(self, params: Any, x: Any, side: int, count: int, skip: int) -> None:
-        self.params, self.kind = params, kind_of(params)
+        self.params, self.kind = params, compiled_kind_of(params, "lyapunov")
         self.start = start_of(params, x, side)
         if not has_slope(params):
             raise MapError(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from limitsets.base import AnswerError, MapError, arguments_checked
 from limitsets.numbers.jit import kernel, row_of
-from limitsets.systems.maps.contract import coerce, has_slope, kind_of, require_sides
+from limitsets.systems.maps.contract import coerce, compiled_kind_of, has_slope, kind_of, require_sides
 from limitsets.systems.maps.critical import (
     SAMPLES,
     Array,
@@ -73,7 +73,7 @@ def stacked(points: Sequence[Any]) -> Any:
             "parameters of one map, one at least",
             "stack these",
         )
-    kind_of(rows[0])
+    compiled_kind_of(rows[0], "monotone pieces")
     return _together(rows)
 
 

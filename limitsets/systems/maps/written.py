@@ -19,7 +19,7 @@ import numpy as np
 
 from limitsets.base import MapError, shown
 from limitsets.numbers.jit.cache import is_known, meaning
-from limitsets.systems.maps.contract import register
+from limitsets.systems.maps.contract import register, register_on_arrays
 
 # Kernels of a map of one function, and of two with a margin.
 ONE = {"image": "def image(params, x, side):\n    return {first}, side, 0"}
@@ -51,6 +51,7 @@ def map(  # noqa: A001  # limitsets.map, as limitsets.maps
     *,
     pieces: tuple[Callable[..., Any], Callable[..., Any]] | None = None,
     margin: Callable[..., Any] | None = None,
+    vectorised: bool = False,
     **values: float,
 ) -> Any:
     """Make a map of a plain function of coordinates and parameters.
@@ -66,6 +67,10 @@ def map(  # noqa: A001  # limitsets.map, as limitsets.maps
         In place of `formula`, for a map of two branches: branch 0, then branch 1.
     margin : callable, optional
         With `pieces`: a function of the same coordinates; where it is positive, branch 1 is taken.
+    vectorised : bool
+        Whether `formula` takes the coordinates of n states as arrays of shape (n,), and returns such: any callable,
+        with scipy or a trained network inside.  It is called as it is, not compiled: for transitions by samples,
+        attractors, basins, orbits, and resilience with ``starts=``; all else refuses such a map.
     **values : float
         Values of the parameters, in their own units.
 
@@ -78,8 +83,8 @@ def map(  # noqa: A001  # limitsets.map, as limitsets.maps
     Raises
     ------
     MapError
-        For what is no plain function, a parameter without a value, a value that is no number or that no function
-        takes, or another number of results than coordinates.
+        For what is no plain function (with `vectorised`: no function of arrays), a parameter without a value, a value
+        that is no number or that no function takes, or another number of results than coordinates.
 
     Examples
     --------
@@ -92,6 +97,8 @@ def map(  # noqa: A001  # limitsets.map, as limitsets.maps
     >>> ls.orbit(at_record, (0.0, 0.0), 0, 2).x
     array([[ 0. ,  0. ], [ 1. ,  0. ], [-0.4,  0.3]])
     """
+    if vectorised:
+        return _of_arrays(formula, pieces is None and margin is None, values)
     functions = _functions_of(formula, pieces, margin)
     takes = {name: tuple(_parameters_of(f)) for name, f in functions.items()}
     values = _defaults_of(functions, values) | values
@@ -136,20 +143,25 @@ def _functions_of(formula: Any, pieces: Any, margin: Any) -> dict[str, Callable[
     return plain
 
 
+def _name(f: Any) -> str:
+    """Name a function, or the class of what is called as one."""
+    return str(getattr(f, "__name__", type(f).__name__))
+
+
 def _parameters_of(f: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     """Names that a function takes; refuse those that cannot be handed over one by one."""
     parameters = dict(inspect.signature(f).parameters)
     for name, parameter in parameters.items():
         if parameter.kind not in (parameter.POSITIONAL_ONLY, parameter.POSITIONAL_OR_KEYWORD):
             raise MapError(
-                f"an argument of {f.__name__}",
+                f"an argument of {_name(f)}",
                 str(parameter),
                 "coordinates and parameters, each by a name of its own, no *args",
-                f"write def {f.__name__}(x, a): ...",
+                f"write def {_name(f)}(x, a): ...",
             )
         if name.startswith("_") or name == "with_values":
             raise MapError(
-                f"an argument of {f.__name__}", name, "a name that begins with a letter", "rename it"
+                f"an argument of {_name(f)}", name, "a name that begins with a letter", "rename it"
             )
     return parameters
 
@@ -164,7 +176,7 @@ def _defaults_of(functions: dict[str, Callable[..., Any]], values: dict[str, flo
             value = _number(name, parameter.default)
             if defaults.setdefault(name, value) != value:
                 raise MapError(
-                    f"the default of {name} in {f.__name__}",
+                    f"the default of {name} in {_name(f)}",
                     value,
                     f"{defaults[name]}, as in the function before",
                     f"pass {name}=..., or give it one default",
@@ -176,21 +188,21 @@ def _coordinates_of(
     functions: dict[str, Callable[..., Any]], takes: dict[str, tuple[str, ...]], values: dict[str, float]
 ) -> tuple[str, ...]:
     """Names of the coordinates: those without a value, which come first."""
-    first = functions["first"].__name__
+    first = _name(functions["first"])
     coordinates = tuple(name for name in takes["first"] if name not in values)
     for name, f in functions.items():
         open_names = tuple(each for each in takes[name] if each not in values)
         if takes[name][: len(open_names)] != open_names:
             late = next(each for each, begun in zip(open_names, takes[name], strict=False) if each != begun)
             raise MapError(
-                f"the parameter {late} of {f.__name__}",
+                f"the parameter {late} of {_name(f)}",
                 "without a value",
                 "a value for each name after the coordinates",
                 f"pass {late}=..., or let the coordinates come first",
             )
         if open_names != coordinates:
             raise MapError(
-                f"the coordinates of {f.__name__}",
+                f"the coordinates of {_name(f)}",
                 ", ".join(open_names),
                 f"{', '.join(coordinates)}, as of {first}: the names without a value",
                 "give all functions of the map the same coordinates, and each parameter a value",
@@ -227,7 +239,7 @@ def _require_results(
             continue
         except Exception as error:
             raise MapError(
-                f"what {f.__name__} does at {names[0]} = {start}",
+                f"what {_name(f)} does at {names[0]} = {start}",
                 f"{type(error).__name__}: {error}",
                 "numbers from numbers",
                 "correct the function",
@@ -239,7 +251,7 @@ def _require_results(
     if isinstance(result, tuple) != (wanted > 1) or count != wanted:
         each = f"one for each of {', '.join(names)}" if wanted > 1 else f"of {', '.join(names)}"
         raise MapError(
-            f"what {f.__name__} returns",
+            f"what {_name(f)} returns",
             f"a tuple of {count}" if isinstance(result, tuple) else shown(result),
             f"a tuple of {wanted} numbers, {each}" if wanted > 1 else "one number, and no tuple",
             "names without a value are coordinates: give each parameter one, or correct what is returned",
@@ -247,7 +259,7 @@ def _require_results(
     for number in numbers:
         if not isinstance(number, int | float | np.integer | np.floating) or isinstance(number, bool):
             raise MapError(
-                f"what {f.__name__} returns",
+                f"what {_name(f)} returns",
                 shown(number),
                 "numbers" if wanted > 1 else "a number",
                 "correct what is returned"
@@ -256,7 +268,81 @@ def _require_results(
             )
 
 
+# ---------------------------------------------------------------- functions of arrays
+
+
+def _called(formula: Any, name: str) -> Callable[..., Any]:
+    """Make the call of a function of arrays, which refuses arrays of other shapes."""
+
+    def on_arrays(params: Any, xs: tuple[Any, ...]) -> tuple[Any, ...]:
+        with np.errstate(all="ignore"):
+            after = formula(*(each.copy() for each in xs), *params)
+        after = (after,) if len(xs) == 1 and not isinstance(after, tuple | list) else after
+        shapes = [np.shape(each) for each in after] if isinstance(after, tuple | list) else [np.shape(after)]
+        if not isinstance(after, tuple | list) or shapes != [xs[0].shape] * len(xs):
+            each = f"{'an array' if len(xs) == 1 else f'a tuple of {len(xs)} arrays'} of shape {xs[0].shape}"
+            remedy = "return one array for each coordinate, of the shape of x"
+            raise MapError(
+                f"what {name} returns", f"of shape {', '.join(str(shape) for shape in shapes)}", each, remedy
+            )
+        return tuple(np.asarray(each, dtype=np.float64) for each in after)
+
+    return on_arrays
+
+
+def _of_arrays(formula: Any, alone: bool, values: dict[str, float]) -> Any:
+    """Make a map of a numpy function of arrays, which is called as it is."""
+    if not alone or not callable(formula) or isinstance(formula, type):
+        given = shown(formula) if alone else "pieces or margin"
+        remedy = "write def f(x, y, a): return np.where(x > 0, ...), ..."
+        raise MapError("the map of vectorised=True", given, "one function of arrays alone", remedy)
+    name = _name(formula).replace("<lambda>", "function")
+    takes = tuple(_parameters_of(formula))
+    values = _defaults_of({"first": formula}, values) | values
+    coordinates = _coordinates_of({"first": formula}, {"first": takes}, values)
+    fields = tuple(each for each in takes if each in values)
+    unknown = next((each for each in values if each not in fields), None)
+    if unknown is not None:
+        taken = ", ".join(fields) or "no parameter"
+        raise MapError("a value", f"{unknown}=...", f"values of {taken}", "correct the name")
+
+    on_arrays = _called(formula, name)
+    key = ("vectorised", fields, id(formula))
+    if key not in _CLASSES:
+        cls = _class_with_fields(name, fields, formula.__doc__, coordinates)
+        _FUNCTIONS[cls] = {"vectorised": formula}
+        register_on_arrays(cls, len(coordinates), on_arrays)
+        _CLASSES[key] = cls, [formula]
+    made = _CLASSES[key][0](**{each: _number(each, values[each]) for each in fields})
+    starts = np.array(TRIED)
+    try:
+        on_arrays(made, tuple(starts + 0.25 * k for k in range(len(coordinates))))
+    except MapError:
+        raise
+    except Exception as error:
+        raise MapError(
+            f"what {name} does with {len(starts)} states",
+            f"{type(error).__name__}: {error}",
+            "arrays from arrays",
+            "write it for arrays of shape (n,), without if",
+        ) from error
+    return made
+
+
 # ---------------------------------------------------------------- the class
+
+
+def _class_with_fields(name: str, fields: tuple[str, ...], doc: str | None, coordinates: Any) -> Any:
+    """Make the class of parameters, which is not registered yet."""
+    own = {
+        "__slots__": (),
+        "__module__": __name__,
+        "__doc__": doc or f"The map {name}, of {', '.join(coordinates)}.",
+        "__reduce__": _reduced,
+        "with_values": _with_values,
+    }
+    fields_alone = namedtuple(name, fields)  # type: ignore[misc]  # noqa: PYI024  # names known only now
+    return type(name, (fields_alone,), own)
 
 
 def _class_of(
@@ -281,15 +367,7 @@ def _registered(
 ) -> type:
     """Make the class of parameters, and register it with kernels that call the functions by their names."""
     first = functions["first"]
-    own = {
-        "__slots__": (),
-        "__module__": __name__,
-        "__doc__": first.__doc__ or f"The map {first.__name__}, of {', '.join(coordinates)}.",
-        "__reduce__": _reduced,
-        "with_values": _with_values,
-    }
-    fields_alone = namedtuple(first.__name__, fields)  # type: ignore[misc]  # noqa: PYI024  # names known only now
-    cls = type(first.__name__, (fields_alone,), own)
+    cls: type = _class_with_fields(first.__name__, fields, first.__doc__, coordinates)
     _FUNCTIONS[cls] = functions
     x = {name: f"x[{k}]" if len(coordinates) > 1 else "x" for k, name in enumerate(coordinates)}
     calls = {
@@ -318,7 +396,8 @@ def _reduced(self: Any) -> Any:
 def _again(functions: dict[str, Any], values: dict[str, Any]) -> Any:
     """Make a map from what stands in its place in a pickle."""
     if len(functions) == 1:
-        return map(functions["first"], **values)
+        ((word, function),) = functions.items()
+        return map(function, vectorised=word == "vectorised", **values)
     return map(pieces=(functions["first"], functions["second"]), margin=functions["margin"], **values)
 
 

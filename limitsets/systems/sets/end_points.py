@@ -20,7 +20,7 @@ import numpy as np
 
 from limitsets.base import AnswerError, Column, Table, Tabled, arguments_checked, bands_of, shown
 from limitsets.systems.graph.graph import TransitionGraph, morse_graph
-from limitsets.systems.maps.contract import kind_of
+from limitsets.systems.maps.contract import compiled_kind_of, kind_of
 from limitsets.systems.maps.critical import SAMPLES, Sides, margins
 from limitsets.systems.maps.drivers import displacements, images
 from limitsets.systems.maps.pieces import along, monotone_pieces
@@ -537,6 +537,7 @@ def limit_set(
     >>> [round(x, 6) for x in found.extents[0][0]]
     [15.205339, 19.752688]
     """
+    compiled_kind_of(graph.map, "the limit set")
     if attractor is not None:
         extents = getattr(attractor, "extents", None)
         if not isinstance(extents, Mapping):

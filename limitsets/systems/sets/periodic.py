@@ -13,7 +13,7 @@ from limitsets.base import AnswerError, arguments_checked, shown
 from limitsets.numbers.jit import kernel
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph.graph import TransitionGraph
-from limitsets.systems.maps.contract import has_slope, kind_of
+from limitsets.systems.maps.contract import compiled_kind_of, has_slope
 from limitsets.systems.maps.critical import Flags, Sides, bisected
 from limitsets.systems.maps.drivers import step
 from limitsets.systems.maps.kernels import image_on
@@ -428,7 +428,7 @@ def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> 
     [-1.131354, 0.631354]
     """
     require_period(up_to)
-    kind = kind_of(params)
+    kind = compiled_kind_of(params, "cycles")
     if kind.dimension != 2 or not has_slope(params):
         raise AnswerError("the map", kind.name, "a map of the plane with image_on", "register image_on")
     x = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
@@ -501,6 +501,7 @@ def cycles(graph: TransitionGraph, up_to: int, within: Any = None) -> Cycles:
     >>> [cycle.period for cycle in ls.cycles(graph, 3) if abs(cycle.multiplier) < 1]
     [3]
     """
+    compiled_kind_of(graph.map, "cycles")
     cells = _cells(graph, within)
     if graph.grid.dimension == 1:
         extents = cells.extents() if cells is not None else getattr(within, "extents", None)

@@ -19,7 +19,7 @@ from limitsets.numbers.jit import kernel
 from limitsets.systems.cells import Grid
 from limitsets.systems.graph.images.undecided import SamplePoints, every_branch, mark_bends, split
 from limitsets.systems.graph.target import Target, TargetBoxes, merged, place
-from limitsets.systems.maps import codes
+from limitsets.systems.maps import codes, images, kind_of
 from limitsets.systems.maps.drivers import judged
 from limitsets.systems.maps.kernels import fallback, image, on_side, pick, put
 
@@ -172,6 +172,15 @@ def _require_sides(grid: Grid, to: Any, code: Any) -> None:
             )
 
 
+def _images_of_arrays(params: Any, side: int, samples: SamplePoints, after: Any, to: Any, code: Any) -> float:
+    """Do what `_images_of_product` does, by a function of arrays."""
+    there = images(params, np.stack(samples.points(), axis=-1), side)
+    for values, each in zip(after, np.reshape(there.x, (to.size, -1)).T, strict=True):
+        values[:] = each
+    to[:], code[:] = there.side, there.code
+    return 0.0
+
+
 def _boxes_of_side(
     method: Callable[..., SamplePoints], params: Any, grid: Grid, side: int, target: Target, **options: Any
 ) -> TargetBoxes:
@@ -182,8 +191,11 @@ def _boxes_of_side(
     count = int(np.prod([axis.size for axis in samples.axes]))
     after = tuple(np.empty(count) for _ in range(dimension))
     to, code = np.empty(count, np.int16), np.empty(count, np.int8)
-    run = tuple(np.empty(samples.axes[-1].size) for _ in range(dimension))
-    second = _images_of_product(params, side, samples.axes, run, after, to, code) / count
+    if kind_of(params).on_arrays is None:
+        run = tuple(np.empty(samples.axes[-1].size) for _ in range(dimension))
+        second = _images_of_product(params, side, samples.axes, run, after, to, code) / count
+    else:
+        second = _images_of_arrays(params, side, samples, after, to, code)
     _require_sides(grid, to, code)
     state, side_out, exits = np.empty(n, np.int8), np.empty(n, np.int32), np.empty(n, np.uint8)
     lo, hi = np.empty((n, dimension), np.int32), np.empty((n, dimension), np.int32)
