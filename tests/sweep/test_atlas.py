@@ -462,6 +462,20 @@ def test_the_room_of_atlases_loads_none_of_their_libraries():
     assert not HEAVY & set(loaded)
 
 
+def test_what_a_worker_computes_by_loads_what_it_needs_alone():
+    """Each worker begins with these imports: the topology of a point needs no graph library, optimizer or proof."""
+    loaded = python("import sys\nimport limitsets.sweep.of_topology\nprint(*sys.modules)").split()
+    assert "limitsets.parameters.atlas.of_topology" in loaded
+    needless = {
+        "networkx",
+        "scipy.optimize",
+        "scipy.sparse",
+        "limitsets.proofs",
+        "limitsets.parameters.continuation",
+    }
+    assert not needless & set(loaded)
+
+
 @pytest.mark.sweep
 def test_an_analysis_loads_none_of_them(tmp_path):
     words = ["analyse", "paper-designed", "--cells", "64", "--out", str(tmp_path / "a"), "--json"]

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from limitsets.base import AnswerError
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import Deviation, Scene, ThrowStack, throw_stack
-from limitsets.parameters.margins.deviations import deviation_scale
 from limitsets.systems.topology import Topologies, reaches, region_of
 from limitsets.systems.topology.work import DECIDED, Floats, Ints
 
@@ -43,6 +42,9 @@ def threshold_of(goal: OrientedBeyond | Reaches, reach: Floats) -> Floats:
 
 def unit_of_margin(scene: Scene, quantity: str, reading: str) -> str:
     """Return the unit of a margin: as in `limitsets.margin`; of the tolerance none, for it is a factor."""
+    # lazily, as below: the whole prover comes with it, and few atlases ask for margins
+    from limitsets.parameters.margins.deviations import deviation_scale
+
     return "" if quantity == "joint" else deviation_scale(scene, quantity, reading).unit
 
 
@@ -186,6 +188,8 @@ class _Search:
 
     def single(self, quantity: str, reading: str) -> Floats:
         """Margins of one quantity."""
+        from limitsets.parameters.margins.deviations import deviation_scale
+
         scale = deviation_scale(self.scene, quantity, reading)
         if quantity == "landing.x":
             raise AnswerError(

@@ -14,8 +14,6 @@ from limitsets.parameters.atlas.classes import classes
 from limitsets.parameters.atlas.float_margins import float_margins, threshold_of, unit_of_margin
 from limitsets.parameters.atlas.plan import Block, Coded, Variable, block_task
 from limitsets.parameters.atlas.subjects import SceneSubject, Subject
-from limitsets.parameters.continuation.growth import grown
-from limitsets.parameters.continuation.path import SAMPLES
 from limitsets.systems.cells import Domain
 from limitsets.systems.maps import advance
 from limitsets.systems.maps.pieces import chosen, point_of
@@ -229,6 +227,9 @@ def _bands(params: Any, domain: Domain, x: float, side: int) -> dict[int, list[t
 
     Between its ends on a side there are gaps, and in these cycles that attract nothing.
     """
+    from limitsets.parameters.continuation.growth import grown  # lazily: few atlases ask for entropies
+    from limitsets.parameters.continuation.path import SAMPLES
+
     at, on, _, _ = advance(params, [x], [side], BEFORE)
     forward = IntervalMap(params, domain, SAMPLES)
     return grown(forward, at, on, float(np.max(domain.hi - domain.lo))) or {}

@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from limitsets.parameters.continuation.growth import on_itinerary
 from limitsets.parameters.continuation.path import LEAVING, Border, Path, Place
@@ -255,6 +254,7 @@ def approaches(path: Path, lo: Snapshot, hi: Snapshot) -> Iterator[Approach]:
 
 def _solved(gap: Callable[[float], float], lo: float, hi: float) -> float | None:
     """Root of a gap; None where it ends on the way."""
+    from scipy.optimize import brentq
 
     def value(t: float) -> float:
         distance = gap(t)
@@ -278,6 +278,8 @@ def crossing(approach: Approach, lo: Snapshot, hi: Snapshot) -> float | None:
 
 def nearest(approach: Approach, middle: float) -> tuple[float, float] | None:
     """Least gap between two places at whose ends it is no smaller than in the middle: t, and the gap there."""
+    from scipy.optimize import minimize_scalar
+
     if approach.target[0].kind in LEAVING:  # a set may end with the domain all along
         return None
     lo, hi = approach.span

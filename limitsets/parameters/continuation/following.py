@@ -7,7 +7,6 @@ from itertools import pairwise
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-import networkx as nx
 import numpy as np
 
 from limitsets.base import AnswerError, arguments_checked, shown_in_notebooks
@@ -108,6 +107,8 @@ def _alike(one: AttractorAtPlace, other: AttractorAtPlace, reach: float) -> bool
 
 def matched(before: Snapshot, after: Snapshot) -> Match:
     """Match the attractors of two places."""
+    import networkx as nx
+
     reach = REACH * before.place.extent
     pairs: nx.Graph = nx.Graph()
     pairs.add_nodes_from((0, i) for i in range(len(before.attractors)))

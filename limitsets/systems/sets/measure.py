@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph
@@ -332,6 +331,8 @@ def topological_entropy(params: Any, extents: Extents, domain: Sides) -> float:
     >>> abs(found - math.log(2)) < 1e-9
     True
     """
+    from scipy import sparse
+
     edges, count = _diagram(params, extents, domain)
     if not edges:
         return 0.0
