@@ -389,7 +389,7 @@ def _require_provable(lower: Any) -> None:
             raise AnswerError("the map", f"{kind.name}, which has {name}", allowed, way)
 
 
-def _wanted(claims: Sequence[str] | None, ends: Any, period: int | None) -> tuple[str, ...]:
+def _wanted(claims: Sequence[str] | None, ends: Any, starts: Any, period: int | None) -> tuple[str, ...]:
     """Return what is claimed, by default what the other arguments are for; refuse those without their claim."""
     usual = "ends-in" if ends is not None else "attracts-all" if period is None else "all-cycles"
     wanted = tuple(dict.fromkeys(claims or (usual,)))
@@ -397,7 +397,7 @@ def _wanted(claims: Sequence[str] | None, ends: Any, period: int | None) -> tupl
         if claim not in CLAIMS_OF_MAP:
             raise AnswerError("the claim about a map", claim, ", ".join(CLAIMS_OF_MAP), "correct the word")
     beside = set(wanted) - {"ends-in", "converges", "cycles"}
-    if (ends is None) is ("ends-in" in wanted) or (ends is not None and beside):
+    if (ends is None) is ("ends-in" in wanted) or (ends is not None and beside) or (ends is None and starts):
         way = 'ask so: limitsets.certify(map, grid, ["ends-in"], ends=[[(lo, hi)]])'
         allowed = "ends-in by itself, or with converges and cycles, and its boxes ends="
         raise AnswerError("the claims", ", ".join(wanted), allowed, way)
@@ -463,7 +463,7 @@ def certify_map(
     """
     begin = time.perf_counter()
     compiled_kind_of(map, "certify")
-    wanted = _wanted(claims, ends, period)
+    wanted = _wanted(claims, ends, starts, period)
     if grid is None:
         way = "limitsets.certify(map, limitsets.grid([(lo, hi)], cells=1024))"
         raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
