@@ -21,7 +21,7 @@ MOST_TUBES = 500_000  # of one period: a certificate that needs more is refused
 OPEN = -1  # a side or a branch that is not known yet
 ROUNDS = 2  # of narrowing, before a tube is cut
 WIDER, BY_SIZE = 2.0**-4, 2.0**-44  # what W is wider than its tube: of the width, and of the size
-SMALL, LEAST = (
+TWO_WAYS, LEAST = (
     2.0**-6,
     2.0**-36,
 )  # shares of the domain, below which two branches are both taken; a tube is given up
@@ -163,7 +163,7 @@ def opened(the_map: Map, tube: Tube, domain: Boxes) -> Iterator[Tube]:
     side, after = tube.side[k], (k + 1) % len(tube.boxes)
     branches = possible(the_map, side, the_map.piece(tube.boxes[k]))[0]
     _, axis, share = widest([tube.boxes[k]], domain[side])
-    if len(branches) > 1 and share > SMALL:
+    if len(branches) > 1 and share > TWO_WAYS:
         yield from halves(tube, k, axis)
         return
     for branch in branches:

@@ -29,7 +29,8 @@ from limitsets.parameters.margins.brackets import NARROWER, Bracket, bracket_fix
 from limitsets.parameters.margins.margin_result import bound, bound_above
 from limitsets.proofs.prover.certificate_of_map import write_map
 from limitsets.proofs.prover.numbers import RationalInterval
-from limitsets.proofs.prover.of_map import ProofOfMap, certify_map, proved_again, refuted_again
+from limitsets.proofs.prover.of_map import certify_map, proved_again, refuted_again
+from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.proofs.prover.recording import names_of
 from limitsets.systems.cells import Grid
 from limitsets.systems.maps.contract import with_number

@@ -19,7 +19,7 @@ from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.end_points import proved_ends
 from limitsets.proofs.prover.goals import cuts, prove, prove_or_refute
 from limitsets.proofs.prover.goals.violating_orbits import start_that_leaves
-from limitsets.proofs.prover.of_map import ProofOfMap, certify_map
+from limitsets.proofs.prover.of_map import certify_map
 from limitsets.proofs.prover.orbits import proved_cycles
 from limitsets.proofs.prover.parameters import (
     ParameterBox,
@@ -30,6 +30,7 @@ from limitsets.proofs.prover.parameters import (
     whole,
 )
 from limitsets.proofs.prover.proof import Claim, Proof
+from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.proofs.prover.query import weakest_of
 from limitsets.proofs.prover.thinning import least_slope
 from limitsets.systems.cells import Grid

@@ -7,25 +7,23 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from limitsets.base import Progress
 from limitsets.base.arrays import Array, Ints
-from limitsets.proofs.prover.certificate_of_map import cycle_in_file, frames, hexed, widened
+from limitsets.proofs.prover.certificate_of_map import hexed, widened
 from limitsets.proofs.prover.converging import Ball, cells_within, contracted_ball, settled_orbits
 from limitsets.proofs.prover.every_orbit import every_orbit
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, prove_orbit, slopes_of, slopes_on
 from limitsets.proofs.prover.proof import Claim
+from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.maps import has_slope, kind_of
 from limitsets.systems.maps.contract import between
 from limitsets.systems.sets import Cycles, cycles, cycles_of
-
-if TYPE_CHECKING:
-    from limitsets.proofs.prover.of_map import ProofOfMap
 
 # Largest period of the search for cycles.
 UP_TO = 16
@@ -35,18 +33,6 @@ MOST_PERIOD = 200
 
 # Itineraries of one length (in the plane: starts) beyond which no longer cycles are looked for.
 MOST_WORDS = 2000
-
-
-def cycle_section(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
-    """Write a proved orbit as a certificate has it."""
-    # branches that are names alone are one in the file
-    branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
-    boxes = cycle.lo, cycle.hi, cycle.side, branches
-    if cycle.ball is not None:
-        return cycle_in_file(*boxes, cycle.ball.frames, cycle.ball.radius)
-    return cycle_in_file(
-        *boxes, frames(slopes_of((proof.map, proof.upper), cycle)) if cycle.attracts else None
-    )
 
 
 def _within(cells: CellSet, lo: Array, hi: Array, side: Ints) -> bool:

@@ -1,0 +1,231 @@
+"""What was proved of a map: claims, attracting cells, orbits; its tables and its certificate."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from limitsets.base import (
+    Column,
+    Table,
+    Tabled,
+    as_table,
+    bands_of,
+    picked,
+)
+from limitsets.base.arrays import Arrays
+from limitsets.proofs.prover.certificate import require_proved
+from limitsets.proofs.prover.certificate_of_map import (
+    Part,
+    cells_of,
+    cycle_in_file,
+    frames,
+    write_map,
+)
+from limitsets.proofs.prover.goal_of_map import GoalOfMap, within_ends
+from limitsets.proofs.prover.orbits_of_map import CycleOfMap, slopes_of
+from limitsets.proofs.prover.proof import Claim, left_of
+from limitsets.systems.cells import CellSet
+from limitsets.systems.graph import TransitionGraph
+from limitsets.systems.maps import kind_of
+from limitsets.systems.sets.basin import passing
+
+# Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
+OF_SLOPES = ("all-cycles", "converges", "cycles", "expanding")
+
+
+@dataclass(frozen=True, eq=False)
+class ProofOfMap(Tabled):
+    """What was proved of a map on a grid.
+
+    Attributes
+    ----------
+    map, upper : NamedTuple
+        The corners of the parameters.
+    graph : TransitionGraph
+        Cells and enclosed images.
+    component : ndarray of int32, shape (n_cells,)
+        Number of the attracting component of each cell, -1 outside.
+    claims : tuple of Claim
+        One per claim asked for.
+    cycles : tuple of CycleOfMap
+        The periodic orbits that are proved, if "cycles" was asked for.
+    seconds : float
+        Time it took.
+    goal : GoalOfMap or None
+        What "ends-in" says, if boxes were given.
+    final : ndarray of int32, shape (n_cells,), or None
+        If "converges" was asked for: the cells whose orbits tend to the first cycle with a ball (0), the second (1)
+        and so on, -1 elsewhere.
+    """
+
+    map: Any
+    upper: Any
+    graph: TransitionGraph
+    component: NDArray[np.int32]
+    claims: tuple[Claim, ...]
+    cycles: tuple[CycleOfMap, ...]
+    seconds: float
+    goal: GoalOfMap | None = None
+    final: NDArray[np.int32] | None = None
+
+    @property
+    def proved(self) -> bool:
+        """Whether every claim is proved."""
+        return all(claim.verdict == "proved" for claim in self.claims)
+
+    @property
+    def cells(self) -> CellSet:
+        """The attracting cells: proved to be positively invariant, or that their orbits tend to a cycle."""
+        if self.final is not None:
+            return CellSet(self.graph.grid, self.arrays["component"] >= 0)
+        return CellSet(self.graph.grid, self.component >= 0)
+
+    @property
+    def enters(self) -> CellSet:
+        """The cells all of whose points are proved to enter the attracting cells."""
+        if self.final is not None:
+            return CellSet(self.graph.grid, self.arrays["rank"] >= 0)
+        return CellSet(self.graph.grid, self.graph.condensation().destinations(passing(self.graph)) >= 0)
+
+    @functools.cached_property
+    def arrays(self) -> Arrays:
+        """The arrays of a certificate: target cells, ranks, components (docs/certificates.md)."""
+        grid = self.graph.grid
+        ends = None if self.goal is None else within_ends(self.goal, grid)
+        return cells_of(self.map, self.upper, grid, ends, self.final)
+
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
+
+        The file holds the formulas of `image_on` (of `image` where a map of one branch has no other) and `margin`, as
+        `limitsets.formulas` shows them, and the proof is of these.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
+
+        Raises
+        ------
+        AnswerError
+            Nothing is proved, or the map cannot be recorded: the line names the function and the way out.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip.
+        """
+        part = self.part()
+        require_proved(part.claims)
+        needs_goal = {"ends-in", "refuted"} & set(part.claims)
+        write_map(
+            path,
+            self.graph.grid.domain,
+            [part],
+            goal=self.goal.in_file() if self.goal and needs_goal else None,
+            recheck=recheck,
+            workers=workers,
+        )
+        return Path(path)
+
+    def denied(self, claims: Mapping[str, str]) -> ProofOfMap:
+        """Return the proof where the checker denies some claims: these are undecided."""
+        cycles = () if "cycles" in claims else self.cycles
+        return replace(self, claims=left_of(self.claims, claims), cycles=cycles)
+
+    def part(self) -> Part:
+        """Give what a certificate holds of this box of parameters; a refuted goal stands by itself."""
+        cycles = {"cycles": [_cycle_section(self, cycle) for cycle in self.cycles]}
+        if any(each.claim == "ends-in" and each.verdict == "refuted" for each in self.claims):
+            return Part((self.map, self.upper), {"cycles": cycles, "refuted": {}}, {})
+        claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
+        if "converges" in claims:
+            drawn = [k for k, cycle in enumerate(self.cycles) if cycle.ball is not None]
+            claims["converges"] = {"components": [*range(len(drawn))], "cycles": drawn}
+        if claims and self.cycles:
+            claims["cycles"] = cycles
+        of_cells = set(claims) - {"cycles", "all-cycles"}
+        return Part((self.map, self.upper), claims, self.arrays if of_cells else {})
+
+    def functions(self, claim: str) -> str:
+        """Name the functions of the map that a claim is proved of: `image` may be another, but for a sample."""
+        kind = kind_of(self.map)
+        names: tuple[str, ...] = ("image_box",) if kind.own_box else ()
+        if not kind.own_box or claim in OF_SLOPES:
+            names += kind.formulas
+        return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Give it as plain tables for JSON, one per claim."""
+        return [
+            as_table(
+                **picked(claim, "claim", "verdict"),
+                of=self.functions(claim.claim),
+                reason=claim.reason or None,
+                map=type(self.map).__name__,
+                parameters=[end._asdict() for end in (self.map, self.upper)],
+                cells=self.graph.n_cells,
+                attracting=len(self.cells),
+                section=claim.section or None,
+                cycles=self.cycles if claim.claim in ("all-cycles", "cycles", "converges") else None,
+                timings={"certify": self.seconds},
+            )
+            for claim in self.claims
+        ]
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [
+            (each.claim, each.verdict, self.functions(each.claim), _missing(each)) for each in self.claims
+        ]
+        caption = f"Proofs of {type(self.map).__name__}, of {self.functions('invariant')}"
+        claims = Table(("claim", "verdict", "of", "missing"), rows, caption)
+        if not len(self.cells):
+            return (claims,)
+        kind = "no image leads out" if self.final is None else "no image leads out, or orbits tend to a cycle"
+        kept = _region(self.cells, "Attracting cells", kind)
+        return claims, kept, _region(self.enters, "Basin", "every point of its cells enters them")
+
+    def __str__(self) -> str:
+        return "\n\n".join(table.text() for table in self.tables())
+
+
+def _region(cells: CellSet, caption: str, proved: str) -> Table:
+    """Say where cells are: which intervals on a line, else by boxes around their connected pieces."""
+    rows: list[tuple[Any, ...]]
+    if cells.grid.dimension == 1:
+        names, rows = ["x"], [(side, band) for side, band in bands_of(cells.extents())]
+    else:
+        names = [f"x[{axis}]" for axis in range(cells.grid.dimension)]
+        rows = [(side, *box) for side, boxes in cells.pieces().items() for box in boxes]
+    spans = [Column(name, show=".6g", ends=True) for name in names]
+    caption += ": boxes around its pieces" if cells.grid.dimension > 1 else ""
+    how = f"proved: {proved}; {len(cells)} of {cells.grid.n_cells} cells"
+    return Table(("side", *spans), rows, caption, how)
+
+
+def _missing(claim: Claim) -> str | None:
+    """Say what is not proved, also of the cycles where only some are proved."""
+    rest = claim.section.get("missing", [])
+    more = f"; and {len(rest) - 1} more" if len(rest) > 1 else ""
+    return claim.reason or (f"{rest[0]}{more}" if rest else None)
+
+
+def _cycle_section(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
+    """Write a proved orbit as a certificate has it."""
+    # branches that are names alone are one in the file
+    branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
+    boxes = cycle.lo, cycle.hi, cycle.side, branches
+    if cycle.ball is not None:
+        return cycle_in_file(*boxes, cycle.ball.frames, cycle.ball.radius)
+    return cycle_in_file(
+        *boxes, frames(slopes_of((proof.map, proof.upper), cycle)) if cycle.attracts else None
+    )
