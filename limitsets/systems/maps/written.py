@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base import MapError, shown
+from limitsets.base import MapError, arguments_checked, shown
 from limitsets.numbers.jit.cache import is_known, meaning
 from limitsets.systems.maps.contract import register, register_on_arrays
 
@@ -45,6 +45,7 @@ _CLASSES: dict[Any, tuple[type, list[Any]]] = {}
 _FUNCTIONS: dict[type, dict[str, Callable[..., Any]]] = {}
 
 
+@arguments_checked
 def map(  # noqa: A001  # limitsets.map, as limitsets.maps
     formula: Callable[..., Any] | None = None,
     /,
