@@ -77,7 +77,7 @@ def test_throws_that_scatter_have_a_seed(capfd, tmp_path):
         ls.load(own()).map_of_seed(-1)
 
 
-@pytest.mark.parametrize("ask", [ls.analyse, ls.margin, ls.load])
+@pytest.mark.parametrize("ask", [ls.analyse, ls.robustness, ls.load])
 def test_a_map_in_the_place_of_a_scene_is_named(ask):
     """It was "a list of 2": Henon's map has two parameters."""
     with pytest.raises(SceneError, match=r"a map, Henon.*ls\.certify\(map, grid\)"):

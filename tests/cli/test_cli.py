@@ -283,8 +283,9 @@ def test_a_reader_that_goes_away():
     process.stdout.readline()
     process.stdout.close()
     assert process.wait() == 0
-    assert process.stderr.read() == ""
+    said = process.stderr.read().splitlines()
     process.stderr.close()
+    assert [line for line in said if "a first run compiles" not in line] == []  # told on a slow machine
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
