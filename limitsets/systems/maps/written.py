@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base import MapError, arguments_checked, shown
+from limitsets.base import MapError, shown
 from limitsets.numbers.jit.cache import is_known, meaning
 from limitsets.systems.maps.contract import register, register_on_arrays
 
@@ -45,7 +45,6 @@ _CLASSES: dict[Any, tuple[type, list[Any]]] = {}
 _FUNCTIONS: dict[type, dict[str, Callable[..., Any]]] = {}
 
 
-@arguments_checked
 def map(  # noqa: A001  # limitsets.map, as limitsets.maps
     formula: Callable[..., Any] | None = None,
     /,
@@ -98,6 +97,9 @@ def map(  # noqa: A001  # limitsets.map, as limitsets.maps
     >>> ls.orbit(at_record, (0.0, 0.0), 0, 2).x
     array([[ 0. ,  0. ], [ 1. ,  0. ], [-0.4,  0.3]])
     """
+    if not isinstance(vectorised, bool):
+        allowed = "True or False"
+        raise MapError("the argument vectorised of map", shown(vectorised), allowed, "pass vectorised=True")
     if vectorised:
         return _of_arrays(formula, pieces is None and margin is None, values)
     functions = _functions_of(formula, pieces, margin)
