@@ -18,6 +18,7 @@ from limitsets.proofs.prover.converging import Ball, cells_within, contracted_ba
 from limitsets.proofs.prover.every_orbit import every_orbit
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, prove_orbit, slopes_of, slopes_on
+from limitsets.proofs.prover.programs import names_alone
 from limitsets.proofs.prover.proof import Claim
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.systems.cells import CellSet, Grid
@@ -50,8 +51,8 @@ def every_cycle(
     proof: ProofOfMap, period: int, progress: Progress | None
 ) -> tuple[Claim, Claim, tuple[CycleOfMap, ...]]:
     """Prove the claims `all-cycles` and `cycles` of all orbits in the domain, and return these."""
-    kind, domain = kind_of(proof.map), proof.graph.grid.domain
-    if (len(kind.branches) > 1 and not kind.has_margin) or not has_slope(proof.map):
+    domain = proof.graph.grid.domain
+    if names_alone(proof.map) or not _decided(proof.map) or not has_slope(proof.map):
         reason = "it needs slopes, and `margin` where there are branches"
         undecided = [Claim(word, "undecided", reason, {}, final=True) for word in ("all-cycles", "cycles")]
         return undecided[0], undecided[1], ()
@@ -82,10 +83,15 @@ def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
 NO_CYCLES = "cycles need slopes, at most two dimensions, and `margin` where there are branches"
 
 
+def _decided(lower: Any) -> bool:
+    """Whether it is known on a box which formula the map takes."""
+    kind = kind_of(lower)
+    return len(kind.branches) == 1 or kind.has_margin or names_alone(lower)
+
+
 def _has_cycles(lower: Any) -> bool:
     """Whether cycles of a map can be proved."""
-    kind = kind_of(lower)
-    return kind.dimension <= 2 and has_slope(lower) and (len(kind.branches) == 1 or kind.has_margin)
+    return kind_of(lower).dimension <= 2 and has_slope(lower) and _decided(lower)
 
 
 def cycles_claim(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[CycleOfMap, ...]]:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from limitsets.base.arrays import Array, Ints
 from limitsets.proofs.prover.converging import Ball
 from limitsets.proofs.prover.numbers import Intervals
+from limitsets.proofs.prover.programs import names_alone
 from limitsets.systems.maps.derived import SURE, UNKNOWN, branch_boxes
 from limitsets.systems.sets import Cycle
 
@@ -104,6 +105,8 @@ def stepped(corners: Corners, boxes: Intervals, side: Ints, branch: Ints) -> Ste
         here = np.flatnonzero((flat_side == s) & (flat_branch == b))
         each = branch_boxes(*corners, s, b, lo[here], hi[here])
         state[here], to[here], sound = each.state, each.side, each.state != UNKNOWN
+        if names_alone(corners[0]):
+            state[here[sound]] = SURE
         image[:, here[sound]] = each.lo[sound], each.hi[sound]
         slope[:, here[sound]] = each.slope_lo[sound], each.slope_hi[sound]
     shape = branch.shape

@@ -126,6 +126,19 @@ def recorded_map(params: Any, sides: int) -> dict[str, Any]:
     }
 
 
+def names_alone(params: Any) -> bool:
+    """Whether the branches of a map are names alone: it has several, no `margin`, and one formula for all of them."""
+    kind = kind_of(params)
+    if kind.has_margin or len(kind.branches) == 1 or not kind.has_image_on:
+        return False
+    step, params = kernels.forced.methods[type(params)], coerce(params)
+    try:
+        branches = [recorded(step, params, kind.dimension, 0, branch) for branch in range(len(kind.branches))]
+    except AnswerError:
+        return False
+    return all(each == branches[0] for each in branches)
+
+
 def _require_recordable(cls: type, kind: Any, sides: int) -> None:
     """Refuse maps of which a certificate could not speak."""
     extra = next((name for name in ("scattered", "on_side") if cls in getattr(kernels, name).methods), None)

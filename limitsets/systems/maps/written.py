@@ -359,7 +359,9 @@ def _class_of(
     key = (fields, *(meaning(f, alive) for f in functions.values()))
     if key not in _CLASSES:
         _CLASSES[key] = _registered(functions, takes, coordinates, fields), alive
-    return _CLASSES[key][0]
+    cls = _CLASSES[key][0]
+    _FUNCTIONS[cls] = functions  # other processes import the newest: the file of an older one may be gone
+    return cls
 
 
 def _registered(
@@ -371,7 +373,6 @@ def _registered(
     """Make the class of parameters, and register it with kernels that call the functions by their names."""
     first = functions["first"]
     cls: type = _class_with_fields(first.__name__, fields, first.__doc__, coordinates)
-    _FUNCTIONS[cls] = functions
     x = {name: f"x[{k}]" if len(coordinates) > 1 else "x" for k, name in enumerate(coordinates)}
     calls = {
         name: f"{name}_function({', '.join(x.get(each, f'params.{each}') for each in takes[name])})"
