@@ -266,9 +266,22 @@ def test_words_and_maps_that_cannot_be_proved():
     grid = ls.grid([(0.1, 0.9)], cells=64)
     with pytest.raises(AnswerError, match="the claim about a map"):
         ls.certify(Ricker(2.0), grid, ["goal"])
-    answer = ls.certify(maps.Logistic(3.2), grid, ["cycles"]).claims[0]  # two branches without a margin
+    answer = ls.certify(maps.Doubling(1.9), grid, ["cycles"]).claims[0]  # two formulas without a margin
     assert answer.verdict == "undecided"
     assert "margin" in answer.reason
+
+
+def test_branches_that_are_names_alone_need_no_margin():
+    """The 2-cycle of the logistic map has the points (r + 1 +- sqrt((r - 3) (r + 1))) / 2r."""
+    r, grid = 3.4, ls.grid([(0.1, 0.9)], cells=512)
+    proof = ls.certify(maps.Logistic(r), grid, ["cycles", "converges"])
+    assert [claim.verdict for claim in proof.claims] == ["proved", "proved"]
+    (cycle,) = (each for each in proof.cycles if each.attracts)
+    points = [(r + 1 + sign * math.sqrt((r - 3) * (r + 1))) / (2 * r) for sign in (-1, 1)]
+    assert np.sort(0.5 * (cycle.lo + cycle.hi).ravel()) == pytest.approx(points, rel=1e-12)
+    every = ls.certify(maps.Logistic(4.0), ls.grid([(-0.1, 1.1)], cells=16), ["all-cycles"], period=4)
+    assert every.claims[0].verdict == "proved"
+    assert sorted(orbit.period for orbit in every.cycles) == [1, 1, 2, 3, 3, 4, 4, 4]  # of the full shift of two
 
 
 class Rooted(NamedTuple):

@@ -52,7 +52,7 @@ def every_cycle(
 ) -> tuple[Claim, Claim, tuple[CycleOfMap, ...]]:
     """Prove the claims `all-cycles` and `cycles` of all orbits in the domain, and return these."""
     domain = proof.graph.grid.domain
-    if names_alone(proof.map) or not _decided(proof.map) or not has_slope(proof.map):
+    if not _decided(proof.map) or not has_slope(proof.map):
         reason = "it needs slopes, and `margin` where there are branches"
         undecided = [Claim(word, "undecided", reason, {}, final=True) for word in ("all-cycles", "cycles")]
         return undecided[0], undecided[1], ()

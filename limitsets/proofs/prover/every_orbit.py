@@ -34,6 +34,7 @@ from limitsets.proofs.prover.orbits_of_map import (
     prove_orbit,
     stepped,
 )
+from limitsets.proofs.prover.programs import names_alone
 from limitsets.systems.cells import Domain
 from limitsets.systems.maps import kind_of
 from limitsets.systems.maps.derived import NEVER
@@ -104,7 +105,8 @@ def every_orbit(
     str
         Empty if these are all; else what is missing.
     """
-    search = Search(corners, domain, len(kind_of(corners[0]).branches))
+    branches = 1 if names_alone(corners[0]) else len(kind_of(corners[0]).branches)
+    search = Search(corners, domain, branches)
     known: list[CycleOfMap] = []
     for period in range(up_to // 2 + 1, up_to + 1):
         stack, tried = [search.whole(period)], 0
