@@ -48,7 +48,7 @@ _use_widest_vectors()
 _COMMON = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 ESTIMATE = {**_COMMON, "fastmath": {"contract"}}
 PROOF = {**_COMMON, "fastmath": False}
-OVERLOAD = ("error_model", "fastmath")  # what an overload takes of these
+OVERLOAD = ("error_model", "fastmath", "no_cfunc_wrapper")  # what an overload takes of these
 
 
 # ----------------------------------------------------------------
