@@ -208,6 +208,22 @@ def test_a_power_holds_its_values_and_is_hardly_wider(count):
         assert found.hi <= float(max(values)) + size
 
 
+@pytest.mark.parametrize("ends", [(0.5, 0.5), (-0.3, 1.7), (2.5, 3.5), (-2.0, -0.25), (1.9, 2.0)])
+def test_a_real_power_holds_its_values_and_is_hardly_wider(ends):
+    """The extremes of x^b, which is monotone in x and in b, lie at the corners."""
+    for x in (Interval(0.2, 0.7), Interval(0.9, 1.4), Interval(2.0, 2.0), Interval(1e-3, 30.0)):
+        found = x ** Interval(*ends)
+        values = [arb(p) ** arb(b) for p in (x.lo, x.hi) for b in ends]  # 53 bits: nearly exact
+        assert not any(value < found.lo or value > found.hi for value in values)
+        least, most = (float(end(map(float, values))) for end in (min, max))
+        assert found.lo >= least * (1 - 1e-12)
+        assert found.hi <= most * (1 + 1e-12)
+    zero = Interval(0.0, 4.0) ** Interval(*ends)
+    assert (zero.lo, zero.hi >= 4.0 ** ends[1]) == (0.0, True)
+    assert (zero.hi < math.inf) == (ends[0] > 0.0)
+    assert Interval(-2.0, 3.0) ** 2.0 == Interval(-2.0, 3.0) ** 2
+
+
 @formula
 def mixed(a, x, y):
     """One formula with everything in it."""

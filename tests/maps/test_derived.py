@@ -195,6 +195,19 @@ def test_a_margin_decides_between_two_branches():
     assert states == [[SURE, MAYBE, NEVER], [NEVER, MAYBE, SURE]]
 
 
+def _hill(x, b, n):
+    return b * x**n / (1 + x**n)
+
+
+def test_a_map_with_a_real_power_is_enclosed():
+    """Fixed points of b x^n / (1 + x^n), b = 2.5, that attract: 0, and 2 for n = 2; for n = 2.5 by Newton's method."""
+    hill = ls.map(_hill, b=2.5, n=2.0)
+    for exponent, stays in ((2.0, (0.0, 2.0)), (2.5, (0.0, 2.19183059))):
+        graph = ls.transitions(hill.with_values(n=exponent), ls.grid([(0.0, 3.0)], cells=512), "boxes")
+        spans = [each.extents()[0] for each in (found.cells for found in ls.attractors(graph))]
+        assert [bool(s[0][0] <= x <= s[-1][1]) for s, x in zip(spans, stays, strict=True)] == [True, True]
+
+
 def test_slopes_that_image_on_leaves_out_are_derived():
     assert maps.lyapunov(Tent(1.9), 0.3, 0, 500).exponent == pytest.approx(math.log(1.9), abs=1e-12)
     own, hand = Young(10.0, 12.0), maps.Leslie(10.0, 12.0)
@@ -227,10 +240,6 @@ def _compares_parameter(p, x, side):
     return (x if p.r > 1.0 else 2.0 * x), side, 0
 
 
-def _root_by_power(p, x, side):
-    return x**0.5, side, 0
-
-
 def _unknown(p, x, side):
     return np.cosh(x), side, 0
 
@@ -244,7 +253,6 @@ def _rounds(p, x, side):
     [
         (_compares, False),
         (_compares_parameter, True),
-        (_root_by_power, True),
         (_unknown, False),
         (_rounds, False),
     ],

@@ -11,11 +11,16 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+pytest.importorskip("flint")
+from flint import arb
+
 import limitsets as ls
 from limitsets.base.errors import AnswerError, MapError
+from limitsets.checker.program import Program, read_formulas
 from limitsets.proofs.prover.programs import Formulas, evaluate, recorded_map, require_same
 from limitsets.proofs.prover.recording import MOST, recorded
 from limitsets.systems.cells import Domain
+from limitsets.systems.maps.derived import UNKNOWN, branch_boxes
 from tests.maps_of_tests import Tent, TwoState
 
 # ----------------------------------------------------------------
@@ -342,6 +347,33 @@ def agrees(seed):
         read_back(formulas.lines[1:], x, 0.7, -1.3),
     ):
         np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)
+    holds(params, program, seed)
+
+
+def holds(params, program, seed):
+    """1e5 images lie in what the prover's compiled intervals enclose of their boxes, and the checker's balls."""
+    generator = np.random.default_rng(seed)
+    lo = generator.uniform(-2, 1.9, (100, 3))
+    hi = lo + 10.0 ** generator.uniform(-4, -1, (100, 3))
+    x = lo[:, None] + generator.uniform(0, 1, (100, 1000, 3)) * (hi - lo)[:, None]
+    images = evaluate(program, x.reshape(-1, 3), params._asdict()).reshape(x.shape)
+    least, most = images.min(axis=1), images.max(axis=1)
+    off = 1e-12 * (1 + np.abs(most))  # images are rounded
+    boxes = branch_boxes(params, params, 0, 0, lo, hi)
+    known = boxes.state != UNKNOWN
+    assert known.mean() > 0.9
+    assert ((boxes.lo <= least + off) & (most - off <= boxes.hi))[known].all()
+    names, parameters = (
+        list(params._asdict()),
+        {name: arb(number) for name, number in params._asdict().items()},
+    )
+    formulas = read_formulas({key: program[key] for key in ("ops", "out")}, 3, names, 3, "a test")
+    checked = Program(formulas, 3, parameters, [])
+    for k in range(100):
+        balls = checked.at([arb(float(a)).union(arb(float(b))) for a, b in zip(lo[k], hi[k], strict=True)])
+        for axis, ball in enumerate(balls):
+            wider = ball + arb(0, off[k, axis])
+            assert not ball.is_finite() or all(wider.contains(arb(end[k, axis])) for end in (least, most))
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -23,6 +23,9 @@ from limitsets.numbers.jit import mark_undefined, proof_kernel
 LARGEST = 700.0
 RELATIVE = 2.0**-50
 
+# A real exponent that is a whole number up to this one is taken as a product of so many factors.
+WHOLE = 200
+
 # ln 2 in two parts; the first has 32 bits, so that n times it is exact for |n| < 2^20.
 PARTS = (float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33"))
 L1, L2 = PARTS
@@ -125,3 +128,21 @@ def log(a: Ends) -> Ends:
     return or_empty(
         holds(a) & (a[1] > 0.0), -math.inf if a[0] <= 0.0 else lo[0], math.inf if a[1] == math.inf else hi[1]
     )
+
+
+@proof_kernel
+def real_power(a: Ends, exponent: Ends) -> Ends:
+    """a^b for all exponents between two ends, of the part of a that is not negative: exp(b log a), and 0 at a = 0.
+
+    A single whole exponent takes all of a.  Elsewhere the cell whose image is computed is undecided where a has another
+    part, or holds 0 and the exponents are not all positive.
+    """
+    least, most = exponent
+    if (least == most) & (least == math.floor(least)) & (abs(least) <= WHOLE):
+        return power(a, int(least))
+    mark_undefined((a[0] < 0.0) | ((a[0] == 0.0) & (least <= 0.0)))
+    at_zero = (0.0, 0.0 if least > 0.0 else math.inf)
+    low = at_zero if a[0] <= 0.0 else exp(mul(exponent, log((a[0], a[0]))))
+    high = at_zero if a[1] <= 0.0 else exp(mul(exponent, log((a[1], a[1]))))
+    good = holds(a) & holds(exponent) & (a[1] >= 0.0)
+    return or_empty(good, min(low[0], high[0]), max(low[1], high[1]))

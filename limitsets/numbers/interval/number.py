@@ -67,8 +67,8 @@ class Interval:
     def __rtruediv__(self, other: float) -> Interval:
         return _div(other, self)
 
-    def __pow__(self, count: int) -> Interval:
-        return _pow(self, count)
+    def __pow__(self, exponent: Interval | float) -> Interval:
+        return _pow(self, exponent)
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -117,8 +117,16 @@ def _max(a: Any, b: Any) -> Interval:
     return Interval(*arithmetic.maximum(ends_of(a), ends_of(b)))
 
 
-def _pow(a: Any, count: Any) -> Interval:
-    lo, hi = arithmetic.power(ends_of(a), count)
+def _real_pow(a: Any, exponent: Any) -> Interval:
+    lo, hi = exponential.real_power(ends_of(a), ends_of(exponent))
+    return Interval(lo, hi)
+
+
+def _pow(a: Any, exponent: Any) -> Interval:
+    if isinstance(exponent, int):
+        lo, hi = arithmetic.power(ends_of(a), exponent)
+    else:
+        lo, hi = exponential.real_power(ends_of(a), ends_of(exponent))
     return Interval(lo, hi)
 
 
@@ -136,7 +144,6 @@ for _stubs, _method in (
     ((operator.sub,), _sub),
     ((operator.mul,), _mul),
     ((operator.truediv,), _div),
-    ((operator.pow,), _pow),
     ((abs, math.fabs, np.abs), _abs),
     ((min, np.minimum), _min),
     ((max, np.maximum), _max),
@@ -152,6 +159,7 @@ for _stubs, _method in (
 ):
     for _stub in _stubs:
         operation(_stub, Interval, _method)
+operation(operator.pow, Interval, _real_pow, left=_pow)
 
 
 def _whole_number(x: Any) -> int:
