@@ -341,6 +341,9 @@ def test_usual_plates_and_the_built_in_scenes_are_neither_wrong_nor_improbable()
         if density.endswith("3"):
             tree["part"]["mass"]["plate_thickness"] = "1 mm"
         assert examined(tree) == ((), ())
+    usual = {"friction": 0.3, "bounce_threshold": "0.1 in", "throw_rate": "1 Hz"}
+    usual["scatter"] = {"speed": "1 %", "landing": "0.1 in"}
+    assert examined(with_tables(world=usual)) == ((), ())
     for name in ls.scenes():
         assert examined(name) == ((), ())
 

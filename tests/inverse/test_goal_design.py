@@ -24,7 +24,7 @@ from limitsets.parameters.design.search import (
     validity_slack,
 )
 from limitsets.parameters.margins.deviations import Tolerance
-from limitsets.parameters.margins.estimate import estimated, failing, invariant_intervals
+from limitsets.parameters.margins.estimate import estimated, failing, invariant_intervals, least_slack
 from limitsets.systems.maps import advance
 from tests.plates import LEAD_QUAD, LEAD_TRIANGLE, left_by_some
 from tests.studies.test_studies import load_study
@@ -311,6 +311,18 @@ def test_what_keeps_the_part_ends_where_the_limit_set_does(name, hi):
     """Of scenes whose limit sets have no gap."""
     found = invariant_intervals(ls.load(name).map, 12.0, 2)
     assert found.hi == pytest.approx(hi, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ls.scenes())
+def test_no_start_is_lost_where_all_landings_keep_off_the_ends(name):
+    """Against throws from everywhere; of paper-quadrilateral those of side 3 flip from a_3 on and are lost inward."""
+    scene = ls.load(name)
+    codes = [
+        advance(scene.bare_map, np.linspace(a, scene.arm_length, 2001)[1:], side, 1)[2]
+        for side, a in enumerate(scene.sides.a)
+    ]
+    stays = bool((np.concatenate(codes) >= 0).all())
+    assert (least_slack(scene.bare_map) > 0.0) == stays == (name != "paper-quadrilateral")
 
 
 def test_landings_off_by_e_are_never_thrown_out_of_what_keeps_the_part():

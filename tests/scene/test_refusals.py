@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import os
 import re
 import sys
 import time
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +50,7 @@ def changed(table: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
     for word in path:
         node = node[int(word)] if isinstance(node, list) else node.setdefault(word, {})
     if value is GONE:
-        del node[last]
+        del node[int(last) if isinstance(node, list) else last]
     elif isinstance(node, list):
         node[int(last)] = value
     else:
@@ -245,6 +247,24 @@ def refused(tree: dict[str, Any], changes: dict[str, Any], key: str, words: str)
 @pytest.mark.parametrize(("changes", "key", "words"), TABLE)
 def test_refuses(changes: dict[str, Any], key: str, words: str, whole: dict[str, Any]) -> None:
     refused(whole, changes, key, words)
+
+
+def paths(node: Any) -> Iterator[str]:
+    """List the place of each entry of a tree."""
+    for key, inner in node.items() if isinstance(node, dict) else enumerate(node):
+        yield str(key)
+        if isinstance(inner, dict | list):
+            yield from (f"{key}/{path}" for path in paths(inner))
+
+
+def test_whatever_is_left_out_is_missed_as_such_or_not_at_all(
+    whole: dict[str, Any], plate: dict[str, Any]
+) -> None:
+    """A key that is needed, and not known to be, was read as None."""
+    for tree in (whole, plate):
+        for path in paths(tree):
+            wrong, _ = examined(changed(copy.deepcopy(tree), path, GONE))
+            assert not any("None" in str(error) for error in wrong), path
 
 
 def test_contact_is_for_the_engine_alone(whole: dict[str, Any]) -> None:
