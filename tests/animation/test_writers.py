@@ -96,9 +96,9 @@ def test_a_gif_has_the_frames_and_their_delays(tmp_path):
 
 
 def test_pixels_show_the_part_where_it_is():
-    """The colour of the part's face is at its centre of mass, aside from the sign there, and nowhere under the arm."""
+    """Its colour is at its centre of mass, aside from the sign there, and nowhere under the arm; edges have a line."""
     film = film_of("paper-designed", **SHORT)
-    picture, face = Picture.of(film), np.array([0xCF, 0xE3, 0xF2])
+    picture, face, edge = Picture.of(film), np.array([0xCF, 0xE3, 0xF2]), (0x00, 0x72, 0xB2)
     for k, pixels in enumerate(frames(picture)):
         if k % 9 == 0:
             centre, corners = picture.at(film.poses[k, 0, :2]), picture.at(film.polygon(k))
@@ -110,6 +110,9 @@ def test_pixels_show_the_part_where_it_is():
             assert found[:, 1].min() >= corners[:, 0].min() - 3
             assert found[:, 1].max() <= corners[:, 0].max() + 3
             assert found[:, 0].max() <= corners[:, 1].max() + 3
+            for x, y in (0.5 * (corners + np.roll(corners, 1, axis=0))).astype(int):
+                # the line is two pixels wide: it covers two thirds of this one at least
+                assert (np.abs(pixels[y, x].astype(int) - edge) < 70).all()
 
 
 def test_a_film_that_is_not_finished_leaves_the_old_file(tmp_path):

@@ -486,6 +486,23 @@ def test_polishing_never_ends_below_its_start():
     assert 20.0 <= made.kappa <= 30.0
 
 
+def test_a_corner_at_which_a_design_fails_is_kept():
+    """A design whose quick margin is denied by a corner, by `failing`: with that corner kept, none denies the next."""
+    scene = ls.load("paper-designed")
+    box = Tolerance.of(scene, SPEED | {"arm.length": "1 %"})
+    search = DesignSearch(scene, box, 2, bounds_of(scene))
+    design = np.random.default_rng(0).random((36, len(search.bounds)))[-1]
+    made = search.scene_of(design)
+    first = estimated(made, box, 2)
+    wrong = failing(made, box, 2, first, 0.97 * first.margin)
+    assert wrong
+    search.harden(design)
+    assert search.hard == wrong
+    found = estimated(made, box, 2, hard=search.hard)
+    assert 0.0 < found.margin < first.margin
+    assert failing(made, box, 2, found, 0.97 * found.margin) == []
+
+
 @pytest.mark.sweep
 def test_a_small_search_says_how_it_was_found(small):
     record = small.to_json()

@@ -141,6 +141,15 @@ def test_a_goal_that_fails_as_it_is_leaves_no_room():
     assert last["side"] != 2
 
 
+def test_what_needs_a_place_is_left_out_of_a_goal_without_one():
+    """The reason is the goal, but for a part that was not asked for."""
+    scene = with_tables(goal={"stays_on_arm": True}, world={"scatter": {"speed": "0.1 %"}})
+    for part, other in (("curve", "noise"), ("noise", "curve")):
+        found = ls.robustness(scene, leave_out=["margins", "joint", "audit", part])
+        assert found.left_out[part] == "it was not asked for"
+        assert "goals with an x and a side" in found.left_out[other]
+
+
 def no_goal():
     tree = ls.load("paper-designed").as_dict()
     del tree["goal"]

@@ -233,7 +233,7 @@ def test_wrong_questions():
         limit_set_of(maps.Henon(), {0: [(0.0, 1.0)]}, as_domain([(-2, 2), (-2, 2)]))
     with pytest.raises(AnswerError, match="start from"):
         limit_set_of(scene.map, {0: [(40.0, 50.0)]}, scene.domain)
-    with pytest.raises(AnswerError, match="side of the set"):
+    with pytest.raises(AnswerError, match="side of the set is 3; allowed: 0 to 2;"):
         limit_set_of(scene.map, {3: [(4.0, 5.0)]}, scene.domain)
 
 
