@@ -4,6 +4,7 @@ The certificates are put together here, not by the package.
 """
 
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -189,6 +190,13 @@ def test_brackets_of_the_checker_hold_what_is_thrown(good, thrown, tmp_path):
     assert 12.2 < times.mean() < 12.4  # its standard error is 0.02
     report = verdict(good, tmp_path)
     assert (report.verdict, report.reason) == ("proved", "")
+
+
+def test_a_hard_cell_is_compared_with_the_first_node_that_is_thrown_from():
+    """The node on its right; else one of the next three, nearer than a landing may be off; else that on its right."""
+    links = sys.modules[f"{checker.__name__}.links"].Links
+    side = SimpleNamespace(x=[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7], at_cut={1, 3, 6}, e=0.25)
+    assert [links.next_thrown(side, cell) for cell in range(7)] == [1, 3, 3, 4, 6, 6, 7]
 
 
 # ------------------------------------------------------------------------------------------------- forgeries

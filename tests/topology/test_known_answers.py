@@ -36,12 +36,14 @@ def decided(t):
 
 # ends of the windows of period 1, 2, 4 and 3: 3, 1 + sqrt 6, 3.544090359551922, 1 + sqrt 8 and 3.841499007543194
 # (Strogatz, Nonlinear Dynamics and Chaos, section 10; the last is the root of the discriminant of period 6)
+# beside such an end, at 3.001 and 1 + sqrt 8 + 1e-6, the multipliers are 0.996 and 0.983: orbits alone take thousands
+# of throws to the cycle
 PERIODS = {
     1: (1.2, 1.5, 2.0, 2.3, 2.95),
-    2: (3.05, 3.2, 1 + math.sqrt(5), 3.44),
+    2: (3.001, 3.05, 3.2, 1 + math.sqrt(5), 3.44),
     4: (3.46, 3.498561699327701, 3.53),
     8: (3.549, 3.5546438, 3.56),
-    3: (3.8305, 3.8312, 3.8318740552833155, 3.84),
+    3: (1 + math.sqrt(8) + 1e-6, 3.8305, 3.8312, 3.8318740552833155, 3.84),
 }
 
 
