@@ -50,6 +50,7 @@ CASES = {
     "logistic": (lambda: ls.map(logistic, r=3.2), [(0.4, 0.9)], 512, {}, "invariant cycles", (2, TWO)),
     "range": (lambda: ls.map(ricker, r=2.3), [(0.02, 2.6)], 1000, {"r": 2.35}, "trapping basin", None),
     "spiral": (lambda: ls.map(spiral), [(-1, 1), (-1, 1)], 64, {}, "trapping basin cycles", (1, 0.0)),
+    "leslie": (ls.maps.Leslie, [(-0.001, 90), (-0.001, 70)], 64, {}, "trapping basin", None),
     "textbook": (lambda: ls.maps.Logistic(2.5), [(0.1, 0.9)], 512, {}, "attracts-all", None),
 }
 
