@@ -220,7 +220,7 @@ class Atlas(Tabled):
         )
 
         plan = self.dataset.attrs["plan"]
-        levels = {} if depth is None else {"depth": depth}
+        levels: dict[str, Any] = {} if depth is None else {"depth": depth}
         if self.map is not None:
             if executor is not None or grid is None:
                 thing, given = ("executor", "given") if grid is not None else ("grid", None)

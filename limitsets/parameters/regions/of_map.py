@@ -147,6 +147,9 @@ class RegionsOfMap(Tabled):
         heads = ("region", "boxes", percent, "attractors", "periods of cycles")
         return whole, Table(heads, rows, "Regions: attractors that continue into each other", "proved")
 
+    def __str__(self) -> str:
+        return "\n\n".join(table.text() for table in self.tables())
+
     def _row(self, number: int) -> tuple[Any, ...]:
         mine = self.region == number
         held = [self.records[k] for k in np.flatnonzero(mine).tolist()]
