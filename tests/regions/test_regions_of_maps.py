@@ -93,6 +93,18 @@ def test_boxes_that_are_stretched_are_denied(line, tmp_path):
     assert ls.recheck(f.seal().write(tmp_path / "x.proof.zip")).verdict == "failed"
 
 
+@pytest.mark.parametrize("r", [("2.568359375", "2.56953125"), ("2.45", "2.46875"), ("2.4", "2.41")])
+def test_a_range_is_told_as_refuted_only_if_the_checker_confirms_it(r, tmp_path):
+    """In the boxes of a file, which are wider, the 4-cycle of the first range is not contracted, nor the second's."""
+    lower, upper = (ls.map(ricker, r=float(end)) for end in r)
+    goal = {"ends": [[(0.35, 1.65)]], "starts": [[(0.02, 2.6)]]}
+    proof = ls.certify(lower, ls.grid([(0.02, 2.6)], cells=50), upper=upper, **goal)
+    (claim,) = proof.claims
+    assert (claim.verdict == "refuted") is (r[0] == "2.4")
+    if claim.verdict == "refuted":
+        assert ls.recheck(proof.save(tmp_path / "x.zip")).verdict == "refuted"
+
+
 def test_cycles_split_where_the_period_doubles(tmp_path):
     lower, grid = ls.map(logistic, r=2.7), ls.grid([(0.1, 0.9)], cells=2048)
     found = certified_map(lower, grid, ["converges", "basin"], upper=lower.with_values(r=3.3), depth=8)
