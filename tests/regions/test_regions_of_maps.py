@@ -10,8 +10,8 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from limitsets.parameters.regions import CODES, certified_map
-from limitsets.parameters.regions.of_map import RecordOfMap, _corresponds, _halves
+from limitsets.parameters.regions import CODES, CellAxis, certified_map
+from limitsets.parameters.regions.of_map import RecordOfMap, RegionsOfMap, _corresponds, _halves
 from limitsets.parameters.regions.plane import neighbours, regions
 from limitsets.proofs.prover.certificate_of_map import Part
 from tests.proofs.forge import opened
@@ -148,6 +148,24 @@ def test_every_start_tends_to_one_cycle_where_all_cells_lead_there():
     )
     assert {record.exact for record in found.records} == {True}
     assert found.tables()[1].rows[0][3:] == ("1", "1")
+
+
+def test_the_figure_has_every_box_once_and_lines_between_regions():
+    """Four boxes: two proved, of one region, one refuted, one open, so that one line parts the region from none."""
+    axis = CellAxis("r", "", tuple(Fraction(k) for k in range(5)))
+    index, code = np.array([[k, k + 1] for k in range(4)], np.int32), np.array([1, 1, 2, 0], np.int8)
+    records = tuple(record_of([0])._replace(blocks=int(word == 1)) for word in code.tolist())
+    region = np.array([0, 0, -1, -1], np.int32)
+    found = RegionsOfMap(ls.grid([(0, 1)], cells=1), (axis,), index, records, code, region, None, 0.0)
+    figure = ls.plot.regions(found)
+    (axes,) = figure.axes
+    boxes = sorted((patch.get_x(), patch.get_width()) for patch in axes.patches)
+    assert boxes == [(0, 1), (1, 1), (2, 1), (3, 1)]
+    assert [line[0].tolist() for line in axes.collections[0].get_segments()] == [[2, 0]]
+    words = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert words == ["undecided: 25 %", "proved, at least 1 attractor: 50 %", "refuted: 25 %"]
+    with pytest.raises(AnswerError, match="of 3 parameters"):
+        ls.plot.regions(RegionsOfMap(found.grid, (axis,) * 3, index, records, code, region, None, 0.0))
 
 
 # ------------------------------------------------------------------------------------------------- cuts and glue
