@@ -239,12 +239,17 @@ WRONG_PLACE = {
         (lambda: ls.atlas(MAP, "r=3:4:3", domain=SQUARE), "the domain is 2; allowed: 1, that"),
         (lambda: ls.continuation(MAP, {"r": (3, 4)}, domain=SQUARE), "the domain is 2; allowed: 1, that"),
         (lambda: ls.design("paper-designed"), "the critical points wanted is ''.*one per side"),
-        (lambda: ls.atlas(maps.Henon(), "a=1:1.2:2", domain=SQUARE), "a task of your own"),
+        (
+            lambda: ls.atlas(
+                maps.Henon(), "a=1:1.2:2", domain=SQUARE, task="limitsets.sweep.of_topology:topology"
+            ),
+            "a task of your own",
+        ),
     ],
     LimitsetsError: [
         (
             lambda: ls.atlas(maps.Logistic(3.5), "r=3:3.2:2", task=of_map).certify(),
-            "the atlas to certify is 'of the map Logistic'; allowed: an atlas of a scene; limitsets.certify",
+            "the argument grid of certify is None; allowed: cells, and no executor, of an atlas of a map",
         ),
     ],
 }

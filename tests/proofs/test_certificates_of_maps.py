@@ -11,7 +11,7 @@ import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.proofs.prover import certificate_of_map
 from limitsets.proofs.prover.certificate import DeniedError
-from limitsets.proofs.prover.certificate_of_map import frames
+from limitsets.proofs.prover.certificate_of_map import frames_to_try
 
 
 def low(x, s):
@@ -50,6 +50,7 @@ CASES = {
     "logistic": (lambda: ls.map(logistic, r=3.2), [(0.4, 0.9)], 512, {}, "invariant cycles", (2, TWO)),
     "range": (lambda: ls.map(ricker, r=2.3), [(0.02, 2.6)], 1000, {"r": 2.35}, "trapping basin", None),
     "spiral": (lambda: ls.map(spiral), [(-1, 1), (-1, 1)], 64, {}, "trapping basin cycles", (1, 0.0)),
+    "leslie": (ls.maps.Leslie, [(-0.001, 90), (-0.001, 70)], 64, {}, "trapping basin", None),
     "textbook": (lambda: ls.maps.Logistic(2.5), [(0.1, 0.9)], 512, {}, "attracts-all", None),
 }
 
@@ -198,7 +199,7 @@ def test_boxes_that_cannot_be(claims, how, words):
 )
 def test_every_step_contracts_in_the_frames_of_an_attracting_orbit(slopes):
     slopes = np.array(slopes)
-    chosen = frames(slopes)
+    chosen = frames_to_try(slopes)[0]
     size = 1.0
     for k, slope in enumerate(slopes):
         after = chosen[(k + 1) % len(slopes)]

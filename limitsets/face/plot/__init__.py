@@ -26,13 +26,14 @@ if TYPE_CHECKING:
     from limitsets.face.plot.limit_sets import limit_set, map  # noqa: A004 - its public name
     from limitsets.face.plot.margins import audit, counterexample, margin_curve, tolerance_box, tornado
     from limitsets.face.plot.noise import fit_residuals, noise_arrivals, noise_density, noise_levels
+    from limitsets.face.plot.parameter_regions import regions
     from limitsets.face.plot.parts import flight, part
     from limitsets.face.plot.policies import policy
 
 __all__ = [
     "assembly", "atlas", "atlas_surface", "audit", "basins", "bifurcation", "counterexample", "design", "feeding",
     "fit_residuals", "flight", "limit_set", "map", "margin_curve", "morse", "noise_arrivals", "noise_density",
-    "noise_levels", "part", "policy", "robust_design", "tolerance_box", "tornado", "tray",
+    "noise_levels", "part", "policy", "regions", "robust_design", "tolerance_box", "tornado", "tray",
 ]  # fmt: skip
 
 _FILES = {
@@ -45,6 +46,7 @@ _FILES = {
     "limit_sets": ("limit_set", "map"),
     "margins": ("audit", "counterexample", "margin_curve", "tolerance_box", "tornado"),
     "noise": ("fit_residuals", "noise_arrivals", "noise_density", "noise_levels"),
+    "parameter_regions": ("regions",),
     "parts": ("flight", "part"),
     "policies": ("policy",),
 }

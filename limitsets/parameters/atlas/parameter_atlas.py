@@ -41,10 +41,12 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from limitsets.parameters.regions import Regions
+    from limitsets.parameters.regions import Regions, RegionsOfMap
+    from limitsets.systems.cells import Grid
 
 
-TOPOLOGY = "limitsets.sweep.of_topology:topology"  # by the public name: stores and plans hold it
+# By the public names: stores and plans hold them.
+TOPOLOGY, MORSE = "limitsets.sweep.of_topology:topology", "limitsets.sweep.of_morse:morse"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +62,15 @@ class Atlas(Tabled):
         Where it is kept.
     new, kept : int
         How many chunks were computed now, and by earlier calls.
+    map : NamedTuple or None
+        The map whose parameters vary; None of an atlas of a scene.
     """
 
     dataset: xr.Dataset
     store: Path | None
     new: int
     kept: int
+    map: Any = None
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -160,28 +165,41 @@ class Atlas(Tabled):
         }
 
     def certify(
-        self, *, depth: int = 2, executor: Executor | None = None, progress: Progress | None = None
-    ) -> Regions:
-        """Cut the window into as many cells as there are points, and prove of each what holds for all its parameters.
+        self,
+        grid: Grid | None = None,
+        claims: Sequence[str] | None = None,
+        *,
+        depth: int | None = None,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+        **asked: Any,
+    ) -> Regions | RegionsOfMap:
+        """Cut the window into cells of parameters, and prove of each what holds for all its parameters.
 
         Parameters
         ----------
-        depth : int
-            How often a cell is halved along both axes while it is undecided.
+        grid, claims
+            Of a map alone: the cells of its domain, and what is claimed (`limitsets.regions.certified_map`).
+        depth : int, optional
+            Of a scene, whose window is cut into as many cells as there are points: how often a cell is halved along
+            both axes while it is undecided, by default 2.  Of a map: how often the whole window is halved, by default
+            8.
         executor : concurrent.futures.Executor, optional
-            Where the cells are done; here by default.
+            Of a scene alone: where the cells are done; here by default.
         progress : callable, optional
             Told ``(step, done, of)``.
+        **asked
+            Of a map alone: `ends`, `starts`, `share`, `first` and `seconds` of `limitsets.regions.certified_map`.
 
         Returns
         -------
-        Regions
-            Codes, regions and a certificate to save (`limitsets.regions.certified`).
+        Regions or RegionsOfMap
+            Codes, regions and a certificate to save.
 
         Raises
         ------
         LimitsetsError
-            For an atlas of a map, or along one axis.
+            For an atlas of a scene along one axis, or arguments of the other kind of atlas.
 
         Examples
         --------
@@ -191,17 +209,32 @@ class Atlas(Tabled):
         >>> found = ls.atlas("paper-designed", x, y, task=task)
         >>> found.certify().shares()["proved"]
         1.0
+        >>> found = ls.atlas(ls.maps.Logistic(2.0), "r=2:2.5:5")
+        >>> found.certify(ls.grid([(0.1, 0.9)], cells=256), ["attracts-all", "trapping"]).shares()["proved"]
+        Fraction(1, 1)
         """
         from limitsets.parameters.regions import (  # lazily: an atlas without proofs does not load them
             certified,
+            certified_map,
             evenly,
         )
 
         plan = self.dataset.attrs["plan"]
-        if "scene" not in plan:
-            name = plan["map"].rpartition(":")[2]
-            remedy = "limitsets.certify(map, grid, claims, upper=...) proves claims for a box of parameters"
-            raise LimitsetsError("the atlas to certify", f"of the map {name}", "an atlas of a scene", remedy)
+        levels: dict[str, Any] = {} if depth is None else {"depth": depth}
+        if self.map is not None:
+            if executor is not None or grid is None:
+                thing, given = ("executor", "given") if grid is not None else ("grid", None)
+                way = "ask so: .certify(limitsets.grid([(lo, hi)], cells=1024), claims)"
+                allowed = "cells, and no executor, of an atlas of a map"
+                raise LimitsetsError(f"the argument {thing} of certify", given, allowed, way)
+            ends = [{name: float(self.dataset[name].values[end]) for name in self.axes} for end in (0, -1)]
+            lower, upper = (MapSubject(self.map, None).at(values) for values in ends)
+            return certified_map(lower, grid, claims, upper=upper, progress=progress, **levels, **asked)
+        if grid is not None or claims is not None or asked:
+            given = ", ".join(["grid"] * (grid is not None) + ["claims"] * (claims is not None) + [*asked])
+            raise LimitsetsError(
+                "the arguments of certify", given, "none of these of an atlas of a scene", "leave them out"
+            )
         if len(self.axes) != 2:
             raise LimitsetsError(
                 "the atlas", f"of {len(self.axes)} axes", "one with two axes", "give x and y"
@@ -212,7 +245,7 @@ class Atlas(Tabled):
             first, last = (f"{float(each)!r} {unit}" for each in (values[0], values[-1]))
             axes.append(evenly(name, first, last, values.size))
         x, y = axes
-        return certified(load(plan["scene"]), x, y, depth=depth, executor=executor, progress=progress)
+        return certified(load(plan["scene"]), x, y, executor=executor, progress=progress, **levels)
 
 
 def _table(variable: xr.DataArray) -> dict[str, Any]:
@@ -322,7 +355,8 @@ def atlas(
                 _require_importable(plan)
             with chosen_pool(of, executor, cluster, workers) as (pool, window):
                 drive(_work(plan), held, pool, window, progress)
-    return Atlas(opened(held.group.store), path, of - kept, kept)
+    varied = plan.subject.params if isinstance(plan.subject, MapSubject) else None
+    return Atlas(opened(held.group.store), path, of - kept, kept, varied)
 
 
 def opened(store: Any) -> xr.Dataset:
@@ -350,7 +384,9 @@ def plan_of(
     """Make the plan of an atlas, and refuse one that cannot be carried out (`atlas`)."""
     chosen = _subject(subject, domain)
     axes = tuple(axis_of(each, chosen.unit_of) for each in ((x,) if y is None else (y, x)))
-    name = named(TOPOLOGY if task is None else task)
+    box = chosen.domain if isinstance(chosen, MapSubject) else None
+    usual = TOPOLOGY if box is None or box.dimension == 1 else MORSE
+    name = named(usual if task is None else task)
     resolved(name)
     shape = tuple(axis.values.size for axis in axes)
     parts = chunk_shape(shape, name) if chunk is None else tuple(int(n) for n in chunk)

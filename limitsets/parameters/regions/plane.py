@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from fractions import Fraction
@@ -38,17 +38,21 @@ Extents = Mapping[int, Sequence[tuple[float, float]]]
 
 def neighbours(raster: Ints) -> Ints:
     """Pairs of numbers that stand side by side in a raster of cell numbers, each once; shape (n, 2)."""
-    pairs = [
-        np.stack([a.ravel(), b.ravel()], axis=1)
-        for a, b in ((raster[:-1], raster[1:]), (raster[:, :-1], raster[:, 1:]))
-    ]
-    both = np.concatenate(pairs)
-    both = np.sort(both[both[:, 0] != both[:, 1]], axis=1)
-    return np.unique(both, axis=0)
+    pairs = []
+    for turned in (np.moveaxis(raster, axis, 0) for axis in range(raster.ndim)):
+        apart = turned[:-1] != turned[1:]
+        pairs.append(np.stack([turned[:-1][apart], turned[1:][apart]], axis=1))
+    return np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
 
 
-def regions(records: Sequence[Record], raster: Ints) -> NDArray[np.int32]:
-    """Give each cell the number of its region, from 0 in the order of first cells; -1 without a block."""
+def regions(
+    records: Sequence[Any], raster: Ints, alike: Callable[[Any, Any], bool] | None = None
+) -> NDArray[np.int32]:
+    """Give each cell the number of its region, from 0 in the order of first cells; -1 without a block.
+
+    Neighbours are of one region where they are alike; by default where they correspond.
+    """
+    alike = alike or corresponds
     root = list(range(len(records)))
 
     def of(k: int) -> int:
@@ -58,7 +62,7 @@ def regions(records: Sequence[Record], raster: Ints) -> NDArray[np.int32]:
         return k
 
     for i, j in neighbours(raster).tolist():
-        if of(i) != of(j) and corresponds(records[i], records[j]):
+        if of(i) != of(j) and alike(records[i], records[j]):
             root[max(of(i), of(j))] = min(of(i), of(j))
     numbers: dict[int, int] = {}
     labels = [
@@ -111,6 +115,42 @@ CODES = ("undecided", "proved", "refuted")
 """The codes of `Regions.code`, in order."""
 
 Index = NDArray[np.int32]
+Cell = tuple[int, ...]
+
+
+def spread(axes: Sequence[CellAxis], index: Index, values: NDArray[Any]) -> NDArray[Any]:
+    """Spread numbers of cells over the raster of the smallest ones."""
+    out = np.zeros(tuple(len(axis.borders) - 1 for axis in axes), dtype=values.dtype)
+    for at, value in zip(index.tolist(), values, strict=True):
+        out[tuple(map(slice, at[::2], at[1::2]))] = value
+    return out
+
+
+def cut_where_open(
+    waiting: list[Cell],
+    ask: Callable[[list[Cell]], Iterable[Any]],
+    parts: Callable[[Cell], Iterable[Cell]],
+    depth: int,
+    progress: Progress | None,
+) -> tuple[Index, tuple[Any, ...]]:
+    """Cut each cell that is not settled into its parts, at most so many times; the cells in order, and their records.
+
+    Each record has `settled`: whether parts would not say more.
+    """
+    done: list[tuple[Cell, Any]] = []
+    level = 0
+    while waiting:
+        todo, waiting = waiting, []
+        for number, (at, record) in enumerate(zip(todo, ask(todo), strict=True)):
+            if progress is not None:
+                progress(f"cells of parameters, halved {level} times", number, len(todo))
+            if record.settled or level == depth:
+                done.append((at, record))
+            else:
+                waiting += parts(at)
+        level += 1
+    done.sort(key=lambda each: each[0])
+    return np.array([at for at, _ in done], dtype=np.int32), tuple(record for _, record in done)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +216,7 @@ class Regions(Tabled):
         -------
         ndarray, shape (cells of the first axis, cells of the second axis)
         """
-        return _spread(self.axes, self.index, np.arange(len(self.index)) if of is None else of)
+        return spread(self.axes, self.index, np.arange(len(self.index)) if of is None else of)
 
     def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
         """Write the certificate; it gets its name once `limitsets.recheck` has confirmed it.
@@ -188,13 +228,6 @@ class Regions(Tabled):
         """
         arrays: Arrays = {"cells": self.index, "goal": self.code, "region": self.region}
         return write(path, self.scene, self.axes, arrays, self.records, recheck=recheck, workers=workers)
-
-
-def _spread(axes: Sequence[CellAxis], index: Index, values: NDArray[Any]) -> NDArray[Any]:
-    out = np.zeros(tuple(len(axis.borders) - 1 for axis in axes), dtype=values.dtype)
-    for (a, b, c, d), value in zip(index.tolist(), values, strict=True):
-        out[a:b, c:d] = value
-    return out
 
 
 def certified(
@@ -245,30 +278,16 @@ def certified(
     loaded = placed(load(scene), (x, y))
     fine = (x.refined(depth), y.refined(depth))
     step = 2**depth
-    waiting = [
+    waiting: list[Cell] = [
         (i, i + step, j, j + step)
         for i in range(0, len(fine[0].borders) - 1, step)
         for j in range(0, len(fine[1].borders) - 1, step)
     ]
-    done: list[tuple[tuple[int, int, int, int], Record]] = []
     run = map if executor is None else partial(executor.map, chunksize=8)
-    task = partial(_one, loaded, fine, tuple(cells))
-    level = 0
-    while waiting:
-        todo, waiting = waiting, []
-        for number, (at, record) in enumerate(zip(todo, run(task, todo), strict=True)):
-            if progress is not None:
-                progress(f"cells of parameters, halved {level} times", number, len(todo))
-            if record.settled or level == depth:
-                done.append((at, record))
-            else:
-                waiting += _quarters(at)
-        level += 1
-    done.sort(key=lambda each: each[0])
-    index = np.array([at for at, _ in done], dtype=np.int32)
-    records = tuple(record for _, record in done)
+    ask = partial(run, partial(_one, loaded, fine, tuple(cells)))
+    index, records = cut_where_open(waiting, ask, _quarters, depth, progress)
     code = np.array([_code(record) for record in records], dtype=np.int8)
-    region = regions(records, _spread(fine, index, np.arange(len(index))))
+    region = regions(records, spread(fine, index, np.arange(len(index))))
     return Regions(loaded, fine, index, records, code, region)
 
 
@@ -283,7 +302,7 @@ def _one(scene: Scene, axes: tuple[CellAxis, CellAxis], cells: tuple[int, ...], 
     return certify_cell(scene, spans, cells)
 
 
-def _quarters(at: tuple[int, int, int, int]) -> Iterator[tuple[int, int, int, int]]:
+def _quarters(at: Cell) -> Iterator[Cell]:
     a, b, c, d = at
     i, j = (a + b) // 2, (c + d) // 2
     yield from ((a, i, c, j), (a, i, j, d), (i, b, c, j), (i, b, j, d))

@@ -180,19 +180,12 @@ def cycle_in_file(
     }
 
 
-def frames(slopes: Array) -> Array:
+def frames_to_try(slopes: Array) -> list[Array]:
     """Choose S_k so that S_(k+1)^-1 A_k S_k contracts, from the derivatives A_k of the steps of an attracting orbit.
 
-    Eigenvectors, or what Lyapunov's equation gives where these are nearly parallel or a step loses a direction.
-    """
-    return frames_to_try(slopes)[0]
-
-
-def frames_to_try(slopes: Array) -> list[Array]:
-    """Give frames by eigenvectors, where these are far from parallel, and by Lyapunov's equation for several rates.
-
-    Eigenvectors of the product of all steps are carried along the orbit, and stretched so that every step contracts
-    alike.  The largest norm of a frame is 1.
+    By eigenvectors, where these are far from parallel, and by Lyapunov's equation for several rates.  Eigenvectors of
+    the product of all steps are carried along the orbit, and stretched so that every step contracts alike.  The
+    largest norm of a frame is 1.
     """
     count, dimension = slopes.shape[:2]
     whole = reduce(lambda product, slope: slope @ product, slopes, np.eye(dimension))

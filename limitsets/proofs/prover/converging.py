@@ -26,17 +26,21 @@ Entries: TypeAlias = Sequence[Sequence[Intervals]]
 Slopes: TypeAlias = Callable[[Array, Array], Intervals | None]
 """From boxes around the points of a cycle, (p, d), to enclosures of the slopes (p, d, d); None where there is none."""
 
-# Steps until an orbit is taken to be at its cycle, and the longest period that is looked for.
-SETTLED, LONGEST = 20_000, 64
+# Steps until an orbit is taken to be at its cycle, fewer where all are by then; the longest period that is looked for.
+STAGES, LONGEST = (1_000, 19_000), 64
 
-# A state comes back if it is so near, relative to the extent of the states; orbits nearer than `SAME` are one.
-BACK, SAME = 1e-9, 1e-6
+# A state comes back if it is so near, relative to the extent of the states, at once by `SOON`; orbits nearer than
+# `SAME` are one.
+BACK, SOON, SAME = 1e-9, 1e-13, 1e-6
 
 # Halvings of a radius until its balls are contracted, then between the largest that are and the least that are not.
 HALVINGS, BETWEEN = 40, 6
 
 # Of the largest radius: a product of the checker's balls is wider than one of our boxes, by the product of their radii.
 SHARE = 0.9
+
+# Below 1 by more than what the product of the steps is rounded by, here and by the checker.
+ATTRACTS = 1.0 - 2.0**-20
 
 
 class Ball(NamedTuple):
@@ -64,22 +68,26 @@ def settled_orbits(params: Any, starts: Array, side: Ints) -> list[Cycle]:
         On which sides.
     """
     at = starts if starts.shape[1] > 1 else starts[:, 0]
-    x, side, _, made = advance(params, at, side, SETTLED)
-    x, side = x[made == SETTLED], side[made == SETTLED]
-    path, taken = [(x, side)], []
-    for _ in range(LONGEST):
-        x, side, code, _ = advance(params, *path[-1], 1)
-        path.append((x, side))
-        taken.append(code)
-    if not len(x):
-        return []
-    points = np.stack([each.reshape(len(each), -1) for each, _ in path], axis=1)
-    sides, branches = np.stack([on for _, on in path], axis=1), np.stack(taken, axis=1)
-    scale = float(np.abs(points[np.isfinite(points)]).max(initial=1.0))
-    stays = np.all(branches >= 0, axis=1, keepdims=True)
-    with np.errstate(invalid="ignore"):  # of states that leave
-        off = np.abs(points[:, 1:] - points[:, :1]).max(axis=2)
-    back = (off < BACK * scale) & (sides[:, 1:] == sides[:, :1]) & stays
+    for steps in STAGES:
+        at, side, _, made = advance(params, at, side, steps)
+        at, side = at[made == steps], side[made == steps]
+        if not len(at):
+            return []
+        path, taken = [(at, side)], []
+        for _ in range(LONGEST):
+            x, on, code, _ = advance(params, *path[-1], 1)
+            path.append((x, on))
+            taken.append(code)
+        points = np.stack([each.reshape(len(each), -1) for each, _ in path], axis=1)
+        sides, branches = np.stack([on for _, on in path], axis=1), np.stack(taken, axis=1)
+        scale = float(np.abs(points[np.isfinite(points)]).max(initial=1.0))
+        stays = np.all(branches >= 0, axis=1, keepdims=True)
+        with np.errstate(invalid="ignore"):  # of states that leave
+            off = np.abs(points[:, 1:] - points[:, :1]).max(axis=2)
+        off[(sides[:, 1:] != sides[:, :1]) | ~stays] = np.inf
+        if (off.min(axis=1) < SOON * scale).all():
+            break
+    back = off < BACK * scale
     orbits: list[Cycle] = []
     for k in np.unique(np.nonzero(back)[0]).tolist():
         p = int(back[k].argmax()) + 1
@@ -128,13 +136,24 @@ def _around(frames: Array, radius: float, lo: Array, hi: Array) -> tuple[Array, 
 
 
 @np.errstate(all="ignore")  # nan and inf prove nothing
-def _contracts(frames: Array, slopes: Intervals | None) -> bool:
+def _stretches(frames: Array, slopes: Intervals | None) -> Array:
+    """Bound |S_(k+1)^-1 DF S_k|^2 of each step, shape (p,)."""
     if slopes is None:
-        return False
+        return np.full(len(frames), np.inf)
     ahead = _inverse(np.roll(frames, -1, axis=0))
     b = _times(ahead, _times(_entries(slopes.lo, slopes.hi), _entries(frames, frames)))
     rows = _times([*zip(*b, strict=True)], b)
-    return all(bool((reduce(add, [v.absolute() for v in row]).hi < 1.0).all()) for row in rows)
+    return np.asarray(np.max([reduce(add, [v.absolute() for v in row]).hi for row in rows], axis=0))
+
+
+def _contracts(frames: Array, slopes: Intervals | None) -> bool:
+    return bool((_stretches(frames, slopes) < 1.0).all())
+
+
+def attracting_frames(middle_slopes: Array, slopes: Intervals | None) -> Array | None:
+    """Choose frames in which all steps together contract, on the boxes that the certificate has; None for none."""
+    tried = frames_to_try(middle_slopes)
+    return next((frames for frames in tried if np.prod(_stretches(frames, slopes)) < ATTRACTS), None)
 
 
 def contracted_ball(lo: Array, hi: Array, middle_slopes: Array, slopes: Slopes, extent: float) -> Ball | None:

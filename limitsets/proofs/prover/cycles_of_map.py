@@ -20,7 +20,7 @@ from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, prove_orbit, slopes_of, slopes_on
 from limitsets.proofs.prover.programs import names_alone
 from limitsets.proofs.prover.proof import Claim
-from limitsets.proofs.prover.proof_of_map import ProofOfMap
+from limitsets.proofs.prover.proof_of_map import ProofOfMap, frames_of
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.maps import has_slope, kind_of
 from limitsets.systems.maps.contract import between
@@ -192,7 +192,7 @@ def refuted_by_cycle(proof: ProofOfMap) -> ProofOfMap:
         return proof
     for cycle in _attracting(proof, goal.spread(ORBITS))[0]:
         leaves = goal.is_left_by(*widened(cycle.lo, cycle.hi), cycle.side)
-        if leaves:
+        if leaves and frames_of((proof.map, proof.upper), cycle) is not None:
             why = f"a cycle of period {cycle.period} attracts: {leaves}"
             claims = (
                 Claim(each.claim, "refuted", why, {})

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base.arrays import Array, Ints
+from limitsets.proofs.prover.certificate_of_map import widened
 from limitsets.proofs.prover.converging import Ball
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.programs import names_alone
@@ -35,6 +36,9 @@ Lies: TypeAlias = Callable[
 
 # X is K(X) of the step before and so much more of its width, until it holds its own; relative to the point at first.
 MORE, FIRST, TRIES = 0.125, 2.0**-40, 24
+
+# Of a box, between its ends and K(X): the balls of the checker are wider than our boxes.
+ROOM = 2.0**-20
 
 OPEN = -1  # a side or a branch that is not known yet
 
@@ -241,6 +245,18 @@ def prove_orbit(corners: Corners, cycle: Cycle, lies: Lies) -> CycleOfMap | str:
     return "no box is found that Newton's operator contracts"
 
 
+def _confirmed(corners: Corners, lo: Array, hi: Array, cycle: Cycle) -> bool:
+    """Whether Newton's operator leads the boxes of a certificate into their interior, as the checker asks of them."""
+    middle = 0.5 * (lo + hi)
+    first, step = (_sure_steps(corners, *ends, cycle) for ends in ((middle, middle), (lo, hi)))
+    if isinstance(first, str) or isinstance(step, str):
+        return False
+    off, wide = first[0] - exactly(np.roll(middle, -1, axis=0)[None]), Intervals(lo, hi) - exactly(middle)
+    held = krawczyk(middle[None], inverse(step[1]), off, step[1], Intervals(wide.lo[None], wide.hi[None]))
+    room = ROOM * (hi - lo)
+    return bool(((lo + room < held.lo[0]) & (held.hi[0] < hi - room)).all())
+
+
 def _proved(corners: Corners, at: Intervals, cycle: Cycle, lies: Lies) -> CycleOfMap | str:
     """Prove the sides, branches, period and slope of an orbit that lies in boxes; or say what is missing."""
     step = _sure_steps(corners, at.lo, at.hi, cycle)
@@ -254,5 +270,7 @@ def _proved(corners: Corners, at: Intervals, cycle: Cycle, lies: Lies) -> CycleO
         return "its period may be smaller"
     if not lies(at.lo, at.hi, cycle.side):
         return "its boxes do not lie in the cells that it is looked for in"
+    if not _confirmed(corners, *widened(at.lo, at.hi), cycle):
+        return "its boxes are too wide for a certificate"
     slope = reduce(lambda product, each: _times(each, product), map(_matrix, step[1].lo[0], step[1].hi[0]))
     return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))

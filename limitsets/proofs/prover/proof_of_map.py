@@ -19,17 +19,18 @@ from limitsets.base import (
     bands_of,
     picked,
 )
-from limitsets.base.arrays import Arrays
+from limitsets.base.arrays import Array, Arrays
 from limitsets.proofs.prover.certificate import require_proved
 from limitsets.proofs.prover.certificate_of_map import (
     Part,
     cells_of,
     cycle_in_file,
-    frames,
+    widened,
     write_map,
 )
+from limitsets.proofs.prover.converging import attracting_frames
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, within_ends
-from limitsets.proofs.prover.orbits_of_map import CycleOfMap, slopes_of
+from limitsets.proofs.prover.orbits_of_map import CycleOfMap, slopes_of, slopes_on
 from limitsets.proofs.prover.proof import Claim, left_of
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph
@@ -219,6 +220,12 @@ def _missing(claim: Claim) -> str | None:
     return claim.reason or (f"{rest[0]}{more}" if rest else None)
 
 
+def frames_of(corners: tuple[Any, Any], cycle: CycleOfMap) -> Array | None:
+    """Choose frames by which the checker sees that an orbit attracts; None where its boxes are too wide for any."""
+    slopes = slopes_on(corners, *widened(cycle.lo, cycle.hi), cycle)
+    return attracting_frames(slopes_of(corners, cycle), slopes)
+
+
 def _cycle_section(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
     """Write a proved orbit as a certificate has it."""
     # branches that are names alone are one in the file
@@ -226,6 +233,4 @@ def _cycle_section(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
     boxes = cycle.lo, cycle.hi, cycle.side, branches
     if cycle.ball is not None:
         return cycle_in_file(*boxes, cycle.ball.frames, cycle.ball.radius)
-    return cycle_in_file(
-        *boxes, frames(slopes_of((proof.map, proof.upper), cycle)) if cycle.attracts else None
-    )
+    return cycle_in_file(*boxes, frames_of((proof.map, proof.upper), cycle) if cycle.attracts else None)

@@ -44,7 +44,7 @@ def _image(params: Leslie, x: Point, side: int) -> tuple[Point, int, int]:
 
 
 def _image_on(params: Leslie, x: Point, side: int, branch: int) -> tuple[Point, int, tuple[Point, Point]]:
-    decay = exponential(-params.crowding * (x[0] + x[1]))
+    decay = math.exp(-params.crowding * (x[0] + x[1]))
     born = params.young * x[0] + params.old * x[1]
     fewer = params.crowding * born
     slope = (((params.young - fewer) * decay, (params.old - fewer) * decay), (params.survival, 0.0))
