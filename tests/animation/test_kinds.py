@@ -18,6 +18,7 @@ from limitsets.feeder.engine import Crowd
 from limitsets.feeder.engine.crowd import depth_of_overlap
 from limitsets.feeder.engine.member import Recording, ground_of
 from limitsets.feeder.thrower import trace
+from limitsets.systems.maps import advance
 from tests.assembly.pairs import pair as pair_of_tests
 from tests.cli.command import refusal
 from tests.feeding.scenes import with_cavity
@@ -251,6 +252,15 @@ def test_it_tips_as_fast_as_it_came_down():
         shown = film.times[tipping[-1]] - film.times[tipping[0] - 1]
         beyond = np.array([film.rests[-1].x - 20.0])
         assert shown == pytest.approx(float(tipping_times(scene, 2)(beyond)[0]), rel=1e-4)
+
+
+def test_a_part_that_lands_where_the_next_throw_acts_beyond_the_end_is_said_to_be_not_simulated():
+    end = arm_end_of(with_cavity())
+    x = np.linspace(12.0, 19.0, 2000)
+    to, on, _, _ = advance(end.scene.map, x, np.full(x.size, 2), 1)
+    film = film_of(end, start=(float(x[np.flatnonzero(end.at_edge(to, on))[0]]), 2))
+    assert "not simulated" in film.notes[film.note[-1]]
+    assert set(film.stage.tolist()) == {-1}  # no controller
 
 
 def test_a_part_from_which_the_throw_acts_beyond_the_end_is_not_thrown():

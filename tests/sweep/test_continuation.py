@@ -12,6 +12,7 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.base.errors import AnswerError, MapError, SceneError
 from limitsets.base.files import as_json
+from limitsets.parameters.continuation import following
 from limitsets.parameters.continuation.path import Place, between
 from limitsets.systems.maps import advance
 from limitsets.systems.sets import limit_set_of
@@ -315,8 +316,18 @@ def test_the_set_begins_where_the_longest_jog_ends_on_the_arm():
 # ---------------------------------------------------------------- cells, numbers, forms
 
 
-def test_births_and_deaths_on_cells():
+def test_births_and_deaths_on_cells(monkeypatch):
     """Below r = 1/2 all goes to the origin, from there on to one of (r, r) and (-r, -r)."""
+    looks, confirmed = [], following.confirmed
+
+    def counted(snapshot):
+        looks.append(snapshot)
+        assert (
+            len(looks) <= 40
+        )  # at the 4 ends of steps, at 3 places for each of log2(1/3 / 1e-4) < 12 halvings
+        return confirmed(snapshot)
+
+    monkeypatch.setattr(following, "confirmed", counted)
     square = [(-2.0, 2.0), (-2.0, 2.0)]
     found = ls.continuation(TwoState(1.0), {"r": (0.3, 0.8)}, steps=3, cells=64, domain=square)
     assert sorted(event.kind for event in found.events) == ["birth", "birth", "death"]
