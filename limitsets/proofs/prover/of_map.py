@@ -267,6 +267,7 @@ def certify_map(
     if grid is None:
         way = "limitsets.certify(map, limitsets.grid([(lo, hi)], cells=1024))"
         raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
+    grid.domain.require_ends("the grid of certify and margin")
     goal = None if ends is None else read_goal(ends, starts, grid.domain)
     guard()
     _require_provable(map)
