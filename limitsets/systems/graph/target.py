@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.numbers.jit import kernel
-from limitsets.systems.cells import Grid
+from limitsets.systems.cells import Domain, Grid
 from limitsets.systems.maps import codes
 
 
@@ -174,6 +174,21 @@ def place(
         elif (lo > top) & (lo - pad * (top - target.edges[begin + n - 1]) <= top):
             first, last = n - 1, n - 1
     return first, last, leaves
+
+
+@kernel(entry=True, counting=False)
+def _fill_round(target: Target, lo: Any, hi: Any, first: Any, last: Any) -> None:
+    for k in range(lo.size):
+        first[k], last[k], _ = _place_round(target, 0, 0, lo[k], hi[k], 0)
+
+
+def met_round(edges: NDArray[np.float64], lo: Any, hi: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and last cell of an axis that closes that intervals meet, counted on beyond the seam."""
+    domain = Domain(edges[None, :1], edges[None, -1:], periodic=(True,))
+    target = Target.of(Grid(domain, ((edges,),)), {})
+    first, last = np.empty(lo.size, np.int64), np.empty(lo.size, np.int64)
+    _fill_round(target, np.ascontiguousarray(lo), np.ascontiguousarray(hi), first, last)
+    return first, last
 
 
 # ----------------------------------------------------------------

@@ -210,7 +210,8 @@ def _refined(graph: TransitionGraph, component: Integers, parts: int) -> Integer
 def _axes(grid: Grid, here: Integers, side: int, parts: int) -> list[_Axis]:
     """Cut the axes of a side; in one dimension, where an axis is as long as the side, but for the cells looked at."""
     axes = []
-    for edges, period in zip(grid.edges[side], grid.domain.period[side].tolist(), strict=True):
+    for k, edges in enumerate(grid.edges[side]):
+        period = float(grid.domain.period[side, k])
         cells = here - grid.offset[side] if grid.dimension == 1 else np.arange(edges.size - 1)
         ends = edges[cells, None] + np.arange(parts + 1) / parts * (edges[cells + 1] - edges[cells])[:, None]
         ends[:, -1] = edges[cells + 1]
