@@ -83,6 +83,13 @@ def test_true_certificates_are_proved(made, tmp_path):
     assert [claim[1] for claim in report.claims] == ["proved", "proved"]
 
 
+def test_images_that_go_round_are_the_whole_circle(tmp_path):
+    made = on_circle(lambda x, p: 100 * x[0] + p.a, claims=["invariant"])
+    made.arrays["0.target.0"][:] = [0, CELLS - 1]
+    made.arrays["0.component"][:] = made.arrays["0.rank"][:] = 0
+    assert made.recheck(tmp_path).verdict == "proved"
+
+
 def test_the_report_names_the_period_and_where_the_formula_is_evaluated(tmp_path, capsys):
     show(on_circle(lo=-0.25, seam=CELLS // 4).recheck(tmp_path), "circle.proof.zip")
     text = capsys.readouterr().out
@@ -162,6 +169,7 @@ FALSE = {
     "component without the cell before the seam": both(
         cell("component", CELLS - 1, -1), cell("rank", CELLS - 1, 1)
     ),
+    "component without the cell behind the seam": both(cell("component", 0, -1), cell("rank", 0, 1)),
     "rank of a cell that stays": both(cell("rank", CELLS // 2, 30), cell("rank", CELLS // 2 - 1, 30)),
     "rank lowered": cell("rank", 20, 1),
     "component of a far cell": both(cell("component", 20, 0), cell("rank", 20, 0)),
@@ -180,7 +188,7 @@ def test_false_certificates_are_denied(name, tmp_path):
 
 def test_an_image_on_the_seam_is_of_the_first_cell(tmp_path):
     """x' = 1 is the state 0, whose formula is evaluated at 0: the last cell does not hold it."""
-    made = on_circle(lambda x, p: 1 + 0 * x[0])
+    made = on_circle(lambda x, p: 1 + 0 * x[0], claims=["invariant", "basin"])
     assert made.recheck(tmp_path).verdict == "proved"
     made.arrays["0.target.0"][:] = [CELLS - 1, CELLS - 1]
     made.arrays["0.component"][0], made.arrays["0.rank"][0] = -1, 1
@@ -197,7 +205,14 @@ def second_box(made, first):
     made.arrays["1.edges.0.0"] += first
 
 
+def last_edge_at_the_double(made):
+    """0.7 stands for the double below it too."""
+    made.header["map"].update(periodic=[["0.7"]])
+    made.arrays["0.edges.0.0"] = np.append(0.69 * np.arange(CELLS - 1) / CELLS, 0.7)
+
+
 ODD = {
+    "last edge on a seam that is no double": last_edge_at_the_double,
     "more than a turn": cell("target.0", 20, [3, 3 + CELLS]),
     "a range of many turns": cell("target.0", 20, [3, 2**31 - 1]),
     "first cell beyond the circle": cell("target.0", 20, [CELLS, CELLS]),

@@ -185,7 +185,10 @@ def _refined(graph: TransitionGraph, component: Integers, parts: int) -> Integer
             (np.searchsorted(axis.cells, at)[:, None] * parts + s).ravel()
             for axis, at, s in zip(axes[side], grid.axes(here, side), sub, strict=True)
         ]
-        lo, hi = (tuple(axis[end][at] for axis, at in zip(axes[side], place, strict=True)) for end in (0, 1))
+        lo, hi = (
+            tuple((axis.lower, axis.upper)[end][at] for axis, at in zip(axes[side], place, strict=True))
+            for end in (0, 1)
+        )
         boxes, clear = (_enclosed if proved else _hulls)(graph, lo, hi, side)
         longest[begun : begun + clear.size][~clear] = ENDLESS
         for least, most, to, given in boxes:
