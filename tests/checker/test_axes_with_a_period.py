@@ -157,6 +157,13 @@ def both(*forges):
     return lambda made: [forge(made) for forge in forges]
 
 
+def drops_the_first_cell(made):
+    """Leave the cell behind the seam out of the component; it and all others are a step farther."""
+    rank = made.arrays["0.rank"]
+    rank[rank > 0] += 1
+    made.arrays["0.component"][0], rank[0] = -1, 1
+
+
 FALSE = {
     "half a turn more": formula(lambda x, p: pulled(x, p) + 0.5),
     "a hair more than a turn": formula(lambda x, p: pulled(x, p) + 1.01),
@@ -169,7 +176,7 @@ FALSE = {
     "component without the cell before the seam": both(
         cell("component", CELLS - 1, -1), cell("rank", CELLS - 1, 1)
     ),
-    "component without the cell behind the seam": both(cell("component", 0, -1), cell("rank", 0, 1)),
+    "component without the cell behind the seam": drops_the_first_cell,
     "rank of a cell that stays": both(cell("rank", CELLS // 2, 30), cell("rank", CELLS // 2 - 1, 30)),
     "rank lowered": cell("rank", 20, 1),
     "component of a far cell": both(cell("component", 20, 0), cell("rank", 20, 0)),
