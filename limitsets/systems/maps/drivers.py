@@ -439,8 +439,10 @@ def orbit(params: Any, x: Any, side: int, count: int, *, domain: Domain | None =
     >>> import limitsets as ls
     >>> ls.orbit(ls.maps.Logistic(4.0), 0.75, 0, 2).x
     array([0.75, 0.75, 0.75])
+    >>> def turn(x):
+    ...     return x + 0.375
     >>> circle = ls.grid([(0.0, 1.0)], periodic=True)
-    >>> ls.orbit(ls.map(lambda x: x + 0.375), 0.5, 0, 3, domain=circle.domain).x
+    >>> ls.orbit(ls.map(turn), 0.5, 0, 3, domain=circle.domain).x
     array([0.5  , 0.875, 0.25 , 0.625])
     """
     start = _start_in(params, x, side, domain)
