@@ -78,9 +78,9 @@ def read_map(raw: object) -> Shape:
     return Shape(dimension, sides, branches, names, images=images, to=to, margins=margins, periods=periods)
 
 
-def period_of(text: str) -> Arb:
-    """Enclose a period."""
-    return 2 * arb.pi() if text == "tau" else number(text, "a period")
+def period_of(text: str | None) -> Arb | None:
+    """Enclose a period; None where there is none."""
+    return None if text is None else 2 * arb.pi() if text == "tau" else number(text, "a period")
 
 
 def map_in_words(shape: Shape, firsts: list[list[float]] | None = None) -> Iterator[str]:

@@ -29,11 +29,9 @@ class MapCells:
 
     def __init__(self, arrays: Arrays, prefix: str, shape: Shape, *, exits: bool):
         sides, d = range(shape.sides), shape.dimension
-        self.periods = [[None if t is None else period_of(t) for t in shape.periods[s]] for s in sides]
+        self.periods = [[period_of(text) for text in axes] for axes in shape.periods]
         self.closed = [np.array([period is not None for period in axes]) for axes in self.periods]
-        self.edges = [[arrays.read(f"{prefix}edges.{s}.{a}", "<f8") for a in range(d)] for s in sides]
-        pairs = [zip(*both, strict=True) for both in zip(self.edges, self.periods, strict=True)]
-        self.edges = [[closed_axis(e, period) for e, period in axes] for axes in pairs]
+        self.edges = [read_edges(arrays, f"{prefix}edges.{s}.", self.periods[s]) for s in sides]
         ascending = all(len(e) > 1 and bool((e[1:] > e[:-1]).all()) for axes in self.edges for e in axes)
         require(ascending, "the edges of the cells do not ascend")
         counts = [[len(e) - 1 for e in axes] for axes in self.edges]
@@ -227,6 +225,11 @@ def map_tasks(c: MapCells, box: int, chosen: Array, strict: Array, least: Array)
             yield MapTask(box, s, part, c.ends(part, s), targets=targets, strict=alone, least=least[part])
 
 
+def read_edges(arrays: Arrays, prefix: str, periods: list[Arb | None]) -> list[Array]:
+    """Read the edges of the cells of a side, along each axis."""
+    return [closed_axis(arrays.read(f"{prefix}{a}", "<f8"), period) for a, period in enumerate(periods)]
+
+
 def closed_axis(edges: Array, period: Arb | None) -> Array:
     """Return the edges of an axis; of one with a period also the end of its last cell, rounded up."""
     if period is None or not len(edges) or not math.isfinite(edges[0]):
@@ -305,9 +308,8 @@ def turned(
     near = the_map.image[key].at([ball.mid() for ball in the_map.piece(box).balls])
     shifted, d = [], shape.dimension
     for (axis, above, low), (_, below, high) in zip(bounds[:d], bounds[d:], strict=True):
-        text = shape.periods[shape.to[key]][axis]
-        if text is not None and low.is_finite():
-            period = period_of(text)
+        period = period_of(shape.periods[shape.to[key]][axis])
+        if period is not None and low.is_finite():
             turns = ((near[axis] - low) / period).mid().floor() if near[axis].is_finite() else ZERO
             high = high + period if high <= low else high
             low, high, below = low + turns * period, high + turns * period, operator.lt

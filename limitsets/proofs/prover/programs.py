@@ -323,8 +323,9 @@ class Formulas:
 
     def _periods(self, names: list[str], side: int) -> list[str]:
         """Say which results are taken modulo a period, and from where on."""
-        begins = [0.0] * len(names) if self.begins is None else self.begins[side]
-        axes = zip(names, self.table["periodic"][side], begins, strict=True)
+        if self.begins is None:
+            return []
+        axes = zip(names, self.table["periodic"][side], self.begins[side], strict=True)
         return [f"    {name} modulo {p}, in [{lo!r}, {lo!r} + {p})" for name, p, lo in axes if p is not None]
 
     @functools.cached_property

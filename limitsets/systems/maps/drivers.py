@@ -539,7 +539,7 @@ def advance(
     if kind_of(params).on_arrays is None:
         _advance(params, first, count, xs, sides, code, steps, closing_of(domain))
     else:
-        _advanced_on_arrays(params, count, xs, sides, code, steps, domain)
+        _advanced_on_arrays(params, count, xs, sides, code, steps, domain=domain)
     return rows(xs), sides, code, steps
 
 
