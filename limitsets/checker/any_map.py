@@ -34,6 +34,12 @@ class Shape(NamedTuple):
     images: dict[tuple[int, int], Formulas]  # by side and branch
     to: dict[tuple[int, int], int]  # the side that they lead to
     margins: list[Formulas]  # by side, where there are two branches
+    periods: list[list[str | None]]  # by side and axis a period, None where the axis ends
+
+    @property
+    def closes(self) -> bool:
+        """Whether some axis has a period."""
+        return any(period is not None for axes in self.periods for period in axes)
 
 
 def read_map(raw: object) -> Shape:
@@ -45,11 +51,15 @@ def read_map(raw: object) -> Shape:
     names = rows(known["parameters"], "map: parameters", 0, 1_000)
     fine = all(isinstance(name, str) and NAME.fullmatch(name) for name in names)
     require(fine and len(set(names)) == len(names), "map: the name of a parameter is odd, or stands twice")
-    for axes in rows(known["periodic"], "map: periodic", sides, sides):
-        closed = [
-            period for period in rows(axes, "map: periodic", dimension, dimension) if period is not None
-        ]
-        require(not closed, "map: this checker does not know axes with a period")
+    where = "map: periodic"
+    periods = [
+        rows(axes, where, dimension, dimension) for axes in rows(known["periodic"], where, sides, sides)
+    ]
+    for period in itertools.chain(*periods):
+        fits = period is None or (
+            isinstance(period, str) and (period == "tau" or rational(period, where) > 0)
+        )
+        require(fits, f"{where}: a period is neither null nor above 0")
     keys = list(itertools.product(range(sides), range(branches)))
     images, to = {}, {}
     for key, one in zip(keys, rows(known["programs"], "map: programs", len(keys), len(keys)), strict=True):
@@ -65,14 +75,24 @@ def read_map(raw: object) -> Shape:
         table(one, where, "side ops out")
         require(is_whole(one["side"], side, side), f"{where} is missing, or not in its place")
         margins.append(read_formulas(one, dimension, names, 1, where))
-    return Shape(dimension, sides, branches, names, images=images, to=to, margins=margins)
+    return Shape(dimension, sides, branches, names, images=images, to=to, margins=margins, periods=periods)
 
 
-def map_in_words(shape: Shape) -> Iterator[str]:
-    """Write the formulas that are checked."""
+def period_of(text: str | None) -> Arb | None:
+    """Enclose a period; None where there is none."""
+    return None if text is None else 2 * arb.pi() if text == "tau" else number(text, "a period")
+
+
+def map_in_words(shape: Shape, firsts: list[list[float]] | None = None) -> Iterator[str]:
+    """Write the formulas that are checked; `firsts`: by side and axis where the domain begins, for axes that close."""
     for (side, branch), formulas in shape.images.items():
-        yield f"side {side}, branch {branch}, to side {shape.to[side, branch]}:"
+        to = shape.to[side, branch]
+        yield f"side {side}, branch {branch}, to side {to}:"
         yield from ("    " + line for line in in_words(formulas, [f"x{i}'" for i in range(shape.dimension)]))
+        for axis, period in enumerate(shape.periods[to]):
+            if period is not None:
+                first = "e" if firsts is None else repr(firsts[to][axis])
+                yield f"    x{axis}' modulo {period}, in [{first}, {first} + {period})"
     for side, formulas in enumerate(shape.margins):
         yield f"side {side}: branch 1 if and only if margin > 0, else branch 0"
         yield from ("    " + line for line in in_words(formulas, ["margin"]))

@@ -13,8 +13,8 @@ import flint
 import numpy as np
 from flint import arb
 
-from .any_map import Bound, CellClaim, Map, Shape, check_map_cell
-from .balls import PRECISION, Array, Pair
+from .any_map import Bound, CellClaim, Map, Shape, check_map_cell, floats_around, period_of
+from .balls import PRECISION, ZERO, Arb, Array, Pair
 from .cells import CHUNK, Failure
 from .file import Arrays, require
 
@@ -29,7 +29,9 @@ class MapCells:
 
     def __init__(self, arrays: Arrays, prefix: str, shape: Shape, *, exits: bool):
         sides, d = range(shape.sides), shape.dimension
-        self.edges = [[arrays.read(f"{prefix}edges.{s}.{a}", "<f8") for a in range(d)] for s in sides]
+        self.periods = [[period_of(text) for text in axes] for axes in shape.periods]
+        self.closed = [np.array([period is not None for period in axes]) for axes in self.periods]
+        self.edges = [read_edges(arrays, f"{prefix}edges.{s}.", self.periods[s]) for s in sides]
         ascending = all(len(e) > 1 and bool((e[1:] > e[:-1]).all()) for axes in self.edges for e in axes)
         require(ascending, "the edges of the cells do not ascend")
         counts = [[len(e) - 1 for e in axes] for axes in self.edges]
@@ -56,6 +58,14 @@ class MapCells:
                 cells = slice(int(self.start[s]), int(self.start[s + 1]))
                 (first, last), far = np.hsplit(target[cells], 2), beyond[cells, None]
                 fits = (first >= -far) & (first <= last) & (last < self.counts[to] + far)
+                # along an axis that closes cells are counted on beyond the seam, none twice
+                round_it = (
+                    (first >= 0)
+                    & (first < self.counts[to])
+                    & (first <= last)
+                    & (last - first < self.counts[to])
+                )
+                fits = np.where(self.closed[to], round_it, fits)
                 sound = bool((fits.all(axis=1) | (target[cells] == -2).all(axis=1)).all())
                 require(sound, f"side {s}, branch {b}: target cells are out of range")
 
@@ -85,6 +95,18 @@ class MapCells:
         side, box = self.box(cell)
         return f"side {side}, cell {cell}, x in {' x '.join(f'[{lo!r}, {hi!r}]' for lo, hi in box)}"
 
+    def first_edges(self) -> list[list[float]]:
+        """Return by side and axis where the cells begin."""
+        return [[float(e[0]) for e in axes] for axes in self.edges]
+
+    def meets_seam(self, side: int, box: list[Pair]) -> bool:
+        """Whether a box may hold a state beyond the seam of an axis, whose cell is another, and not all of the axis."""
+        axes = zip(self.edges[side], self.periods[side], box, strict=True)
+        return any(
+            period is not None and lo > e[0] and not arb(hi) < arb(e[0]) + period
+            for e, period, (lo, hi) in axes
+        )
+
     def in_domain(self, side: int, box: list[Pair]) -> bool:
         """Whether a box lies in the domain."""
         return all(e[0] <= lo and hi <= e[-1] for e, (lo, hi) in zip(self.edges[side], box, strict=True))
@@ -100,7 +122,9 @@ class MapCells:
             to, own = self.to[branch][s], np.flatnonzero(side == s)
             table = labels[self.start[to] : self.start[to + 1]].reshape(tuple(self.counts[to]))
             first, last = np.hsplit(self.target[branch][cells[own]].astype(np.int64), 2)
-            first, last = np.maximum(first, 0), np.minimum(last, self.counts[to] - 1)
+            for axis in np.flatnonzero(self.closed[to]).tolist():
+                table = np.concatenate([table, table], axis=axis)  # cells are counted on beyond the seam
+            first, last = np.maximum(first, 0), np.minimum(last, np.array(table.shape) - 1)
             met = (first <= last).all(axis=1)
             whole = table.astype(np.int64)
             least[own[met]] = -box_max(-whole, first[met], last[met])
@@ -192,24 +216,46 @@ def map_tasks(c: MapCells, box: int, chosen: Array, strict: Array, least: Array)
     for s in np.unique(side).tolist():
         own = chosen[side == s]
         for part in np.array_split(own, max(1, -(-len(own) // CHUNK))):
-            both = [ends_of_targets(c.edges[c.to[b][s]], target[part]) for b, target in enumerate(c.target)]
+            to = [c.to[b][s] for b in range(len(c.target))]
+            both = [
+                ends_of_targets(c.edges[t], target[part], c.closed[t])
+                for t, target in zip(to, c.target, strict=True)
+            ]
             targets, alone = [ends for ends, _ in both], [strict[part] | beyond for _, beyond in both]
             yield MapTask(box, s, part, c.ends(part, s), targets=targets, strict=alone, least=least[part])
 
 
-def ends_of_targets(edges: list[Array], rows: Array) -> tuple[Array, Array]:
+def read_edges(arrays: Arrays, prefix: str, periods: list[Arb | None]) -> list[Array]:
+    """Read the edges of the cells of a side, along each axis."""
+    return [closed_axis(arrays.read(f"{prefix}{a}", "<f8"), period) for a, period in enumerate(periods)]
+
+
+def closed_axis(edges: Array, period: Arb | None) -> Array:
+    """Return the edges of an axis; of one with a period also the end of its last cell, rounded up."""
+    if period is None or not len(edges) or not math.isfinite(edges[0]):
+        return edges
+    end = arb(float(edges[0])) + period
+    require(bool(arb(float(edges[-1])) < end), "the last edge is not before the first and the period")
+    last = float(end.upper())
+    return np.append(edges, last if arb(last) >= end else floats_around(end)[1])
+
+
+def ends_of_targets(edges: list[Array], rows: Array, closed: Array) -> tuple[Array, Array]:
     """Return the ends of target cells, nan where the branch is impossible; and whether an image is beyond the grid.
 
     It is where along an axis all targets are; then it has to be so strictly, since the last edge belongs to the domain,
-    and the other axes do not matter.  Where a part of them is beyond the grid there is no end.
+    and the other axes do not matter.  Where a part of them is beyond the grid there is no end.  Along axes that are
+    closed there is none where they are the whole axis, and an upper end that is not above the lower one is that of the
+    next turn.
     """
     (first, last), n = np.hsplit(rows, 2), np.array([len(e) - 1 for e in edges])
-    alone = (last == -1) | (first == n)
+    alone = ((last == -1) | (first == n)) & ~closed
     beyond = alone.any(axis=1)
-    free = beyond[:, None] & ~alone
+    free = (beyond[:, None] & ~alone) | (closed & (last - first == n - 1))
+    until = np.where(closed, (last + 1) % n, np.clip(last + 1, 0, n))
     lower = np.stack([e[np.maximum(k, 0)] for e, k in zip(edges, first.T, strict=True)], axis=1)
-    upper = np.stack([e[np.clip(k + 1, 0, len(e) - 1)] for e, k in zip(edges, last.T, strict=True)], axis=1)
-    lower[free | (first < 0)], upper[free | (last == n)] = -math.inf, math.inf
+    upper = np.stack([e[k] for e, k in zip(edges, until.T, strict=True)], axis=1)
+    lower[free | (first < 0)], upper[free | (~closed & (last == n))] = -math.inf, math.inf
     ends = np.stack([lower, upper], axis=2).reshape(len(rows), -1)
     ends[rows[:, 0] == -2] = math.nan
     return ends, beyond
@@ -238,12 +284,37 @@ def check_map_task(task: MapTask) -> tuple[int, Failure | None, int]:
         pairs = zip(task.targets, task.strict, strict=True)
         bounds = [bounds_of(target[i].tolist(), bool(strict[i])) for target, strict in pairs]
         box = list(zip(ends[::2], ends[1::2], strict=True))
+        if MAP_SETUP[0].closes:
+            bounds = [turned(MAPS[task.box], (task.side, b), box, each) for b, each in enumerate(bounds)]
         claimed = CellClaim(task.side, box, bounds, arb(least) if least > 0 else None)
         failure, pieces = check_map_cell(MAPS[task.box], claimed)
         total += pieces
         if failure is not None:
             return cell, failure, total
     return -1, None, total
+
+
+def turned(
+    the_map: Map, key: tuple[int, int], box: list[Pair], bounds: list[Bound] | None
+) -> list[Bound] | None:
+    """Turn bounds along axes that close to where an image is: any whole number of periods is as good.
+
+    The image has to lie strictly before the upper end: on the seam it is a state of the first cell alone, since there
+    the formulas are evaluated at the lower end of the domain.
+    """
+    shape = the_map.shape
+    if bounds is None:
+        return None
+    near = the_map.image[key].at([ball.mid() for ball in the_map.piece(box).balls])
+    shifted, d = [], shape.dimension
+    for (axis, above, low), (_, below, high) in zip(bounds[:d], bounds[d:], strict=True):
+        period = period_of(shape.periods[shape.to[key]][axis])
+        if period is not None and low.is_finite():
+            turns = ((near[axis] - low) / period).mid().floor() if near[axis].is_finite() else ZERO
+            high = high + period if high <= low else high
+            low, high, below = low + turns * period, high + turns * period, operator.lt
+        shifted += [(axis, above, low), (axis, below, high)]
+    return shifted
 
 
 def bounds_of(ends: list[float], strict: bool) -> list[Bound] | None:

@@ -153,6 +153,8 @@ def check_ends_in(c: MapCells, attracting: Array, hulls: Regions, goal: Goal) ->
     for side, start in goal.starts or []:
         if not c.in_domain(side, start):
             return "a start of the goal lies outside the domain"
+        if c.meets_seam(side, start):
+            return "a start of the goal meets the seam of an axis, and not the cells on both sides of it"
         boxes, (lo, hi) = c.boxes(c.rank < 0, side), np.array(start).T
         if ((boxes[:, :, 0] < hi) & (boxes[:, :, 1] > lo)).all(axis=1).any():
             return f"side {side}, {box_in_words(start)}: starts of the goal lie in cells that have no rank"

@@ -67,6 +67,7 @@ class MapFile(NamedTuple):
     parts: list[Part]
     axes: list[ParameterAxis]  # of a region, none where the boxes are no region
     places: list[RegionPlace]  # of the boxes in it
+    firsts: list[list[float]] | None  # by side and axis where the cells begin, None without cells
 
 
 # ----------------------------------------------------------------
@@ -91,11 +92,16 @@ def read_map_file(header: dict[str, Any], entries: dict[str, memoryview]) -> Map
     given = [part.parameters for part in parts]
     places = read_region_boxes(axes, [box["at"] for box in boxes], given) if axes else []
     require(any(part.claims or part.unknown for part in parts), "nothing is claimed")
+    # the value at which the formulas are evaluated is a part of the map
+    begun = [part.cells.first_edges() for part in parts if part.cells is not None]
+    require(
+        not shape.closes or all(one == begun[0] for one in begun), "the cells of the boxes begin elsewhere"
+    )
     if not any(part.unknown for part in parts):  # which may need arrays
         arrays.require_no_others(
             "the header describes arrays that no claim needs", "it holds arrays that no claim needs"
         )
-    return MapFile(shape, goal, parts, axes=axes, places=places)
+    return MapFile(shape, goal, parts, axes=axes, places=places, firsts=begun[0] if begun else None)
 
 
 def read_map_goal(raw: object, shape: Shape) -> Goal:
@@ -123,6 +129,12 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     known = {name: section for name, section in claims.items() if name in CLAIMS_OF_MAP}
     for name, section in known.items():
         table(section, f"{where}: section of {name}", CLAIMS_OF_MAP[name])
+    cells_alone = not shape.closes or not {"cycles", "all-cycles", "converges", "escapes", "refuted"} & set(
+        known
+    )
+    require(
+        cells_alone, f"{where}: this checker knows no claim about orbits, or exits, beside axes with a period"
+    )
     require(goal is not None or not {"ends-in", "refuted"} & set(known), f"{where}: there is no goal")
     if "refuted" in known:
         require(set(claims) == {"refuted", "cycles"}, f"{where}: a refutation has to stand with cycles alone")

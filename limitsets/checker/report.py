@@ -286,7 +286,7 @@ def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report)
         "dimension": file.shape.dimension,
         "sides": file.shape.sides,
         "branches": file.shape.branches,
-        "formulas": list(map_in_words(file.shape)),
+        "formulas": list(map_in_words(file.shape, file.firsts)),
         "boxes": [outcome._asdict() for outcome in outcomes],
     }
     report.cells = sum(len(part.cells.rank) for part in file.parts if part.cells is not None)

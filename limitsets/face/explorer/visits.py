@@ -155,6 +155,7 @@ class Explorer(pn.viewable.Viewer):  # type: ignore[misc]  # panel is not follow
             name = f"the domain of {type(chosen).__name__}"
             raise AnswerError(name, domain, "one (lo, hi) per axis", "pass domain=[(lo, hi), ...]") from None
         require_dimension(chosen, "domain", where.dimension)
+        where.require_ends("the domain of the explorer")
         return cls(lambda: MapPage(chosen, where), type(chosen).__name__)
 
     def __repr__(self) -> str:

@@ -106,6 +106,7 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
         raise AnswerError(
             "the dimension of the map", source.grid.dimension, "1", "draw its basins, or a section of it"
         )
+    domain.require_ends("the grid of a picture of the map, or of a limit set")
     kind = kind_of(source.map)
     return Subject(
         type(source.map).__name__,

@@ -426,6 +426,7 @@ def _subject(subject: Any, domain: Any) -> Subject:
     box = _own_domain(chosen) if domain is None else as_domain(domain)
     if box is not None:
         require_dimension(subject, "domain", box.dimension)
+        box.require_ends("the domain of the atlas")
     return MapSubject(chosen, box)
 
 

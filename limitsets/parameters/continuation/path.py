@@ -187,6 +187,7 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
     compiled_kind_of(params, "continuation")
     box = as_domain(domain_of(params) if domain is None else domain)
     require_dimension(params, "domain", box.dimension)
+    box.require_ends("the domain of continuation")
     curve = _curve(path, dict)
 
     def at(t: float) -> Place:

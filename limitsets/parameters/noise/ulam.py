@@ -374,6 +374,7 @@ def transfer(
         )
     if landing is not None and kind.dimension != 1:
         raise AnswerError("the noise of x", landing, "none in more than one dimension", "leave it out")
+    grid.domain.require_ends("the grid of the noisy chain")
     finer = max(strata, min(LANDING_STRATA, LANDING_BOXCARS // grid.n_cells))
     added = None if landing is None else landing.strata(finer)
     reach = (0.0, 0.0) if added is None else (added.lo, added.hi)

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Arrays, Ints
 from limitsets.proofs.prover.certificate import FORMAT, written
-from limitsets.proofs.prover.programs import recorded_map, require_same
+from limitsets.proofs.prover.programs import periods_of, recorded_map, require_same
 from limitsets.proofs.prover.recording import decimal, names_of
 from limitsets.systems.cells import Domain, Grid
 from limitsets.systems.graph.components import attracting_of, ranks, reach, strong_components
 from limitsets.systems.graph.ranges import Ranges, build
+from limitsets.systems.graph.target import TargetBoxes, cut_at_seams, met_round
 from limitsets.systems.maps import kind_of
 from limitsets.systems.maps.derived import NEVER, UNKNOWN, branch_boxes
 
@@ -83,20 +84,28 @@ def cells_of(
         boxes = branch_boxes(lower, upper, side, branch, *grid.boxes(mine, side))
         cells = _target_cells(grid, boxes.side, boxes.lo, boxes.hi)
         first, last = cells[:, :dimension], cells[:, dimension:]
-        inside = ((first >= 0) & (last < grid.shape[boxes.side])).all(axis=1) & (boxes.state != UNKNOWN)
+        within = (first >= 0) & ((last < grid.shape[boxes.side]) | grid.domain.periodic)
+        inside = within.all(axis=1) & (boxes.state != UNKNOWN)
         lost[mine[(boxes.state != NEVER) & ~inside]] = True
         chosen = (boxes.state != NEVER) & inside
         target[branch, mine[chosen]], to[branch, mine] = cells[chosen], boxes.side
     if final is not None:
         target[:, final >= 0], lost[final >= 0] = IMPOSSIBLE, False
     component, rank = _labels(_ranges_of(grid, target, to, lost), lost, ends, final)
-    edges = {f"edges.{s}.{axis}": e for s, axes in enumerate(grid.edges) for axis, e in enumerate(axes)}
+    edges = {
+        f"edges.{s}.{axis}": e[:-1] if grid.domain.periodic[axis] else e  # the last is the first again
+        for s, axes in enumerate(grid.edges)
+        for axis, e in enumerate(axes)
+    }
     targets = {f"target.{branch}": each for branch, each in enumerate(target)}
     return {"component": component, "rank": rank, **edges, **targets}
 
 
 def _target_cells(grid: Grid, side: int, lo: Array, hi: Array) -> Ints:
-    """First and last cell along each axis that boxes meet, shape (n, 2 d); outside the grid where they reach beyond."""
+    """First and last cell along each axis that boxes meet, shape (n, 2 d); outside the grid where they reach beyond.
+
+    Along axes that close they are counted on beyond the seam.
+    """
     slack = OF_WIDTH * (hi - lo) + OF_SIZE * np.maximum(np.abs(lo), np.abs(hi))
     axes, bottom, top = grid.edges[side], grid.domain.lo[side], grid.domain.hi[side]
     # An image proved to stay within a face of the domain does so for the checker too: it reaches such an end exactly.
@@ -104,6 +113,9 @@ def _target_cells(grid: Grid, side: int, lo: Array, hi: Array) -> Ints:
     high_ends = np.where(hi <= top, np.minimum(hi + slack, top), hi + slack)
     first = [np.searchsorted(e, low, "right") - 1 for e, low in zip(axes, low_ends.T, strict=True)]
     last = [np.searchsorted(e, high, "left") - 1 for e, high in zip(axes, high_ends.T, strict=True)]
+    for axis in np.flatnonzero(grid.domain.periodic).tolist():
+        wide = slack[:, axis] + OF_SIZE * (top - bottom)[axis]
+        first[axis], last[axis] = met_round(axes[axis], lo[:, axis] - wide, hi[:, axis] + wide)
     return np.stack([*first, *last], axis=1)
 
 
@@ -113,6 +125,11 @@ def _ranges_of(grid: Grid, target: Numbers, to: Numbers, lost: NDArray[np.bool_]
     boxes, sides = target[branch, cell], to[branch, cell]
     begin = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=grid.n_cells))])
     first, last = (np.ascontiguousarray(part) for part in np.hsplit(boxes, 2))
+    if grid.domain.closes:
+        whole = TargetBoxes(cell, sides, first, last, np.zeros(grid.n_cells, np.uint8), 0.0)
+        parts = cut_at_seams(whole, grid.shape)
+        begin = np.concatenate([[0], np.cumsum(np.bincount(parts.cell, minlength=grid.n_cells))])
+        sides, first, last = parts.side, parts.lo, parts.hi
     return build(grid, begin, sides, first, last, lost.astype(np.uint8))
 
 
@@ -306,7 +323,7 @@ def write_map(
     DeniedError
         The checker does not confirm it: it is kept as NAME.denied.zip.
     """
-    table = recorded_map(parts[0].corners[0], domain.sides)
+    table = recorded_map(parts[0].corners[0], domain.sides) | {"periodic": periods_of(domain)}
     boxes, arrays, verdicts = list[dict[str, Any]](), Arrays(), dict[str, str]()
     for k, part in enumerate(parts):
         require_same(*part.corners, table, domain)

@@ -91,6 +91,10 @@ def read_goal(ends: Any, starts: Any, domain: Domain) -> GoalOfMap:
             raise AnswerError(
                 "the starts", shown([*map(tuple, np.stack([lo, hi], 1).tolist())]), allowed, "clip them"
             )
+        # a start on the seam is one of the first cells too
+        if (np.array(domain.periodic) & (lo > domain.lo[side]) & (hi == domain.hi[side])).any():
+            allowed = "boxes that end before the seam of an axis that closes, or go round it"
+            raise AnswerError("the starts", shown(tuple(hi.tolist())), allowed, "end them a little before")
     return goal
 
 

@@ -8,6 +8,7 @@ code do differently for all x at once (`isinstance`, whole numbers beyond 64 bit
 from __future__ import annotations
 
 import functools
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from limitsets.base import AnswerError, arguments_checked
 from limitsets.base.arrays import Array
-from limitsets.proofs.prover.recording import LEAVES, entries_of, names_of, recorded
+from limitsets.proofs.prover.recording import LEAVES, decimal, entries_of, names_of, recorded
 from limitsets.systems.cells import Domain, Grid, as_domain
 from limitsets.systems.maps import codes, coerce, images, images_on, kernels, kind_of
 from limitsets.systems.maps.contract import (
@@ -312,10 +313,20 @@ class Formulas:
         `dimension`, `sides`, `branches`, `parameters` (names), `programs` (one for each side and branch: `side`,
         `branch`, `to`, `ops`, `out`), `margins`, `periodic`.  An operation is a list of its word and of what it takes:
         numbers of earlier operations, or the axis of x, a parameter's name, a decimal, a whole power.
+    begins : list of list of float, or None
+        By side and axis where the domain begins: along axes that close x is taken from there on.
     """
 
     map: Any
     table: dict[str, Any]
+    begins: list[list[float]] | None = None
+
+    def _periods(self, names: list[str], side: int) -> list[str]:
+        """Say which results are taken modulo a period, and from where on."""
+        if self.begins is None:
+            return []
+        axes = zip(names, self.table["periodic"][side], self.begins[side], strict=True)
+        return [f"    {name} modulo {p}, in [{lo!r}, {lo!r} + {p})" for name, p, lo in axes if p is not None]
 
     @functools.cached_property
     def lines(self) -> list[str]:
@@ -324,6 +335,7 @@ class Formulas:
         for program in self.table["programs"]:
             lines += [f"side {program['side']}, branch {program['branch']}, to side {program['to']}:"]
             lines += _lines(program, names)
+            lines += self._periods(names, program["to"])
         for program in self.table["margins"]:
             lines += [f"side {program['side']}: branch 1 if and only if margin > 0, else branch 0"]
             lines += _lines(program, ["margin"])
@@ -342,6 +354,12 @@ class Formulas:
         return "\n".join(lines)
 
     __repr__ = __str__
+
+
+def periods_of(domain: Domain) -> list[list[str | None]]:
+    """Write the periods of the axes by side: a decimal, a whole turn as "tau", None where an axis ends."""
+    named = {0.0: None, math.tau: "tau"}
+    return [[named[p] if p in named else decimal(p) for p in axes] for axes in domain.period.tolist()]
 
 
 @arguments_checked
@@ -388,6 +406,8 @@ def formulas(params: Any, domain: Grid | Domain | ArrayLike | None = None, *, si
     given = domain.domain if isinstance(domain, Grid) else domain
     box = Domain(-corner, corner) if given is None else as_domain(given)
     require_dimension(params, "domain", box.dimension)
-    answer = Formulas(params, recorded_map(params, box.sides))
+    answer = Formulas(
+        params, recorded_map(params, box.sides) | {"periodic": periods_of(box)}, box.lo.tolist()
+    )
     require_same(params, params, answer.table, box)
     return answer

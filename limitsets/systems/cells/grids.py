@@ -27,12 +27,14 @@ class Domain:
         Corners of the boxes.  A side without states has ``lo == hi``: a chamfer on which a part cannot rest.
     anchor : ndarray, shape (n_sides,), or None
         In one dimension: a point below `lo` towards which graded cells shrink (the throw: R = a_i).
+    periodic : tuple of bool
+        Which axes close, on all sides: there x and x + (hi - lo) are one state.  Default: none.
 
     Raises
     ------
     GridError
         For shapes that do not fit, boxes that end before they begin, no side with states, numbers that are not finite,
-        or an anchor inside a box.
+        an anchor inside a box, or one beside an axis that closes.
 
     Examples
     --------
@@ -44,6 +46,7 @@ class Domain:
     lo: NDArray[np.float64]
     hi: NDArray[np.float64]
     anchor: NDArray[np.float64] | None = None
+    periodic: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
         lo, hi = (np.array(corner, dtype=np.float64) for corner in (self.lo, self.hi))
@@ -77,6 +80,73 @@ class Domain:
                     "correct the anchor",
                 )
             object.__setattr__(self, "anchor", anchor)
+        object.__setattr__(self, "periodic", _periodic(self.periodic, lo.shape[1], self.anchor is not None))
+
+    @property
+    def closes(self) -> bool:
+        """Whether some axis closes."""
+        return any(self.periodic)
+
+    @property
+    def period(self) -> NDArray[np.float64]:
+        """Extent of each axis that closes, 0 of the others, shape (n_sides, dimension)."""
+        return np.where(self.periodic, self.hi - self.lo, 0.0)
+
+    def wrapped(self, x: ArrayLike, side: int | NDArray[np.int64]) -> NDArray[np.float64]:
+        """Give the states of the domain that some states are: along axes that close in [lo, hi), as they are elsewhere.
+
+        Parameters
+        ----------
+        x : array_like, shape (n, dimension), or (n,) in one dimension
+            States, anywhere.
+        side : int or ndarray of int, shape (n,)
+            Their side, or the side of each.
+
+        Returns
+        -------
+        ndarray, shape of x
+
+        Examples
+        --------
+        >>> import limitsets as ls
+        >>> ls.grid([(0.0, 1.0)], periodic=True).domain.wrapped([1.0, -0.25, 0.5], 0)
+        array([0.  , 0.75, 0.5 ])
+        """
+        if not self.closes:
+            return np.asarray(x, dtype=np.float64)
+        states = np.array(x, dtype=np.float64)
+        columns = states.reshape(-1, self.dimension)  # a view
+        lo, hi, period = (
+            np.broadcast_to(end[side], columns.shape) for end in (self.lo, self.hi, self.period)
+        )
+        turned = (period > 0.0) & np.isfinite(columns)
+        some = columns[turned]
+        some -= period[turned] * np.floor((some - lo[turned]) / period[turned])
+        inside = (some >= lo[turned]) & (some < hi[turned])  # rounding may end on the seam
+        columns[turned] = np.where(inside, some, lo[turned])
+        return states
+
+    def shortest(self, x: NDArray[np.float64], side: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Give differences of states, of shape (..., dimension), by the shortest way round axes that close."""
+        period = self.period[side]
+        turns = np.round(x / np.where(period > 0.0, period, 1.0))
+        return np.where(period > 0.0, x - turns * period, x)
+
+    def require_ends(self, door: str) -> None:
+        """Refuse axes that close, for `door`, which knows none.
+
+        Raises
+        ------
+        GridError
+            Some axis closes.
+        """
+        if self.closes:
+            raise GridError(
+                f"the axes of {door}",
+                f"periodic={self.periodic}",
+                "axes that end",
+                "leave periodic= out there",
+            )
 
     @property
     def sides(self) -> int:
@@ -92,6 +162,25 @@ class Domain:
     def dimension(self) -> int:
         """Number of coordinates of x."""
         return int(self.lo.shape[1])
+
+
+def _periodic(periodic: Any, dimension: int, graded: bool) -> tuple[bool, ...]:
+    """Read which axes close."""
+    given = (periodic,) * dimension if isinstance(periodic, bool | np.bool_) else periodic
+    listed = isinstance(given, Sequence | np.ndarray) and all(
+        isinstance(one, bool | np.bool_) for one in given
+    )
+    axes = tuple(map(bool, given)) if listed else (False,)
+    if not listed or len(axes) not in (0, dimension):
+        allowed = f"{dimension} of True and False" if dimension > 1 else "True or False"
+        remedy = (
+            f"pass periodic=({', '.join(['True'] * dimension)})" if dimension > 1 else "pass periodic=True"
+        )
+        raise GridError("the argument periodic of grid", shown(periodic), allowed, remedy)
+    if any(axes) and graded:
+        allowed = "no axis that closes beside an anchor"
+        raise GridError("the argument periodic of grid", axes, allowed, "leave the anchor out")
+    return axes or (False,) * dimension
 
 
 def as_domain(domain: Domain | ArrayLike) -> Domain:
@@ -229,7 +318,7 @@ class Grid(Tabled):
         Returns
         -------
         ndarray of int, shape (n,)
-            Numbers of the cells.
+            Numbers of the cells; along an axis that closes there is no outside.
         """
         states = np.asarray(x, dtype=np.float64).reshape(-1, self.dimension)
         if isinstance(side, np.ndarray):
@@ -237,6 +326,7 @@ class Grid(Tabled):
             for s in range(self.sides):
                 cells[side == s] = self.index(states[side == s], s)
             return cells
+        states = self.domain.wrapped(states, side)
         inside = np.ones(len(states), dtype=bool)
         number = np.zeros(len(states), dtype=np.int64)
         for axis, edges in enumerate(self.edges[side]):
@@ -345,6 +435,7 @@ def grid(
     *,
     depth: int | None = None,
     grading: str | None = None,
+    periodic: bool | Sequence[bool] | None = None,
 ) -> Grid:
     """Cut a domain into cells.
 
@@ -358,6 +449,9 @@ def grid(
         Instead of `cells`: halve the box `depth` times, the axes in turn beginning with the first.
     grading : {"uniform", "graded"}, optional
         Default: graded where the domain has an anchor.
+    periodic : bool or sequence of bool, optional
+        Which axes close, one word for all or one per axis; default: those of the domain, of a list of pairs none.  The
+        period is the extent of the axis, and images of the map may lie anywhere: they are taken modulo the period.
 
     Returns
     -------
@@ -374,8 +468,12 @@ def grid(
     >>> import limitsets as ls
     >>> ls.grid(ls.load("paper-designed").domain, cells=1024).n_cells
     3072
+    >>> ls.grid([(0.0, 1.0), (-1.0, 1.0)], cells=4, periodic=(True, False)).index([[1.2, 0.9], [0.2, 1.2]], 0)
+    array([ 3, -1])
     """
     region = as_domain(domain)
+    if periodic is not None:
+        region = Domain(region.lo, region.hi, region.anchor, periodic)  # type: ignore[arg-type]  # read there
     counts = _counts(cells, depth, region.dimension)
     words = ("uniform", "graded")
     if grading is not None and not (isinstance(grading, str) and grading in words):
@@ -500,7 +598,7 @@ class CellSet:
             cell = self.grid.index(x, side)
             return self.mask[cell] & (cell >= 0)
         # The borders of the set are fewer than those of the cells.
-        states, edges = np.asarray(x, dtype=np.float64).ravel(), self.grid.edges[side][0]
+        states, edges = self.grid.domain.wrapped(x, side).ravel(), self.grid.edges[side][0]
         met = self.mask[self.grid.of_side(side)].astype(np.int8)
         border = edges[np.flatnonzero(np.diff(np.concatenate([[0], met, [0]])))]
         inside: NDArray[np.bool_] = np.searchsorted(border, states, side="right") % 2 == 1
@@ -510,6 +608,8 @@ class CellSet:
 
     def extents(self, axis: int = 0) -> dict[int, list[tuple[float, float]]]:
         """Per side the intervals that the cells make up; in more dimensions their ranges along one axis.
+
+        Of an axis that closes they are those of [lo, hi]: one that passes the seam is two.
 
         Parameters
         ----------
@@ -549,6 +649,8 @@ class CellSet:
 
     def pieces(self) -> dict[int, list[tuple[tuple[float, float], ...]]]:
         """Per side the boxes that hold its connected pieces, a pair (lo, hi) for each axis.
+
+        Where an axis closes, a piece that passes the seam is two.
 
         Returns
         -------

@@ -15,7 +15,7 @@ from limitsets.systems.graph.agreement import require_agreement
 from limitsets.systems.graph.graph import TransitionGraph
 from limitsets.systems.graph.images import METHODS
 from limitsets.systems.graph.ranges import build
-from limitsets.systems.graph.target import Target, no_boxes
+from limitsets.systems.graph.target import Target, cut_at_seams, no_boxes
 from limitsets.systems.maps import kind_of
 from limitsets.systems.maps.contract import compiled_kind_of, require_dimension, require_sides
 
@@ -141,6 +141,8 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
         METHODS[chosen](map, grid, side, target, **options) if some else no_boxes(grid.dimension)
         for side, some in enumerate(inhabited)
     ]
+    if grid.domain.closes:
+        parts = [cut_at_seams(part, grid.shape) for part in parts]
     if len(parts) == 1:
         cell, side, lo, hi, exits = (
             getattr(parts[0], name) for name in ("cell", "side", "lo", "hi", "exits")

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.numbers.jit import kernel
-from limitsets.systems.cells import Grid
+from limitsets.systems.cells import Domain, Grid
 from limitsets.systems.maps import codes
 
 
@@ -20,6 +21,7 @@ class Target(NamedTuple):
     begin: NDArray[np.int64]  # (n_sides, dimension): where an axis begins in `edges`
     cells: NDArray[np.int64]  # (n_sides, dimension)
     per_length: NDArray[np.float64]  # cells per length of a uniform axis, 0 on a graded one
+    period: NDArray[np.float64]  # (n_sides, dimension): extent of an axis that closes, 0 of another
     sink_below: int
     sink_above: int
     sink_of_code: NDArray[np.int64]  # exit number of code -k at [k]
@@ -43,6 +45,7 @@ class Target(NamedTuple):
             begin.reshape(shape),
             grid.shape,
             per_length=np.array(rate).reshape(shape),
+            period=grid.domain.period,
             sink_below=below,
             sink_above=above,
             sink_of_code=sink,
@@ -76,6 +79,65 @@ def holding(target: Target, side: Any, axis: Any, x: Any, hint: Any) -> Any:
     return low
 
 
+# Rounding of a state less whole turns, in units of the last place of both.
+EPS = 4.0 * 2.0**-53
+
+
+@kernel(counting=False)
+def turned(x: Any, bottom: float, period: float, way: float) -> tuple[Any, Any]:
+    """Whole turns from an axis that closes to x, and what is left: of a number at or beyond x on the given way.
+
+    What is left lies in [bottom, bottom + period] to rounding; on the seam it is at that end from which the way goes.
+    """
+    turns = math.floor((x - bottom) / period)
+    slack = EPS * (abs(x) + abs(turns) * period) if turns != 0.0 else 0.0
+    rest = x - turns * period + way * slack
+    slack = EPS * (abs(x) + abs(turns) * period + period)
+    if way < 0.0 and rest <= bottom:
+        return turns - 1.0, rest + period - slack
+    if way > 0.0 and rest >= bottom + period:
+        return turns + 1.0, rest - period + slack
+    return turns, rest
+
+
+@kernel(counting=False)
+def goes_round(lo: Any, hi: Any, bottom: float, period: float) -> bool:
+    """Whether an interval may be a whole circle; or is so far away, or none, that nothing better is known."""
+    far = EPS * max(abs(lo), abs(hi), abs(bottom))
+    return not ((hi - lo < period) & (far < 2.0**-20 * period))
+
+
+@kernel(counting=False)
+def _place_round(target: Target, side: Any, axis: Any, lo: Any, hi: Any, pad: int) -> tuple[Any, Any, Any]:
+    """Do what `place` does along an axis that closes; only what is not finite leaves."""
+    begin, n = target.begin[side, axis], np.int64(target.cells[side, axis])
+    bottom, period = target.edges[begin], target.period[side, axis]
+    leaves = 0
+    if not (lo > -math.inf):
+        leaves |= 1 << target.sink_below
+    if not (hi < math.inf):
+        leaves |= 1 << target.sink_above
+    if goes_round(lo, hi, bottom, period):
+        return np.int64(0), n - 1, leaves
+    turns, rest = turned(lo, bottom, period, -1.0)
+    first = np.int64(holding(target, side, axis, rest, np.int64(0)))
+    while first > 0 and target.edges[begin + first] >= rest:
+        first -= 1
+    while first < n - 1 and target.edges[begin + first + 1] < rest:
+        first += 1
+    more, rest = turned(hi, bottom, period, 1.0)
+    last = np.int64(holding(target, side, axis, rest, first))
+    while last < n - 1 and target.edges[begin + last + 1] <= rest:
+        last += 1
+    while last > 0 and target.edges[begin + last] > rest:
+        last -= 1
+    first, last = first - pad, last + pad + n * np.int64(more - turns)
+    if last >= first + n - 1:
+        return np.int64(0), n - 1, leaves
+    around = first % n
+    return around, last - first + around, leaves
+
+
 @kernel(counting=False)
 def place(
     target: Target, side: Any, axis: Any, lo: Any, hi: Any, pad: int, hint: Any
@@ -83,8 +145,11 @@ def place(
     """First and last position that [lo, hi] meets along one axis, and the exits it reaches past, a bit each.
 
     Cells are closed, so an interval that ends on a border meets both cells there.  First larger than last: no cell.
+    Along an axis that closes the positions go on beyond the seam: 0 <= first < n, and last < first + n.
     """
     begin, n = target.begin[side, axis], target.cells[side, axis]
+    if target.period[side, axis] > 0.0:
+        return _place_round(target, side, axis, lo, hi, pad)
     leaves = 0
     if lo < target.edges[begin]:
         leaves |= 1 << target.sink_below
@@ -111,6 +176,21 @@ def place(
     return first, last, leaves
 
 
+@kernel(entry=True, counting=False)
+def _fill_round(target: Target, lo: Any, hi: Any, first: Any, last: Any) -> None:
+    for k in range(lo.size):
+        first[k], last[k], _ = _place_round(target, 0, 0, lo[k], hi[k], 0)
+
+
+def met_round(edges: NDArray[np.float64], lo: Any, hi: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and last cell of an axis that closes that intervals meet, counted on beyond the seam."""
+    domain = Domain(edges[None, :1], edges[None, -1:], periodic=(True,))
+    target = Target.of(Grid(domain, ((edges,),)), {})
+    first, last = np.empty(lo.size, np.int64), np.empty(lo.size, np.int64)
+    _fill_round(target, np.ascontiguousarray(lo), np.ascontiguousarray(hi), first, last)
+    return first, last
+
+
 # ----------------------------------------------------------------
 # Boxes of target cells, before they become ranges.
 
@@ -125,6 +205,22 @@ class TargetBoxes:
     hi: NDArray[np.int32]
     exits: NDArray[np.uint8]
     second_pass: float
+
+
+def cut_at_seams(boxes: TargetBoxes, shape: NDArray[np.int64]) -> TargetBoxes:
+    """Cut the boxes that pass a seam in two; `shape` has the cells per side and axis."""
+    for axis in range(shape.shape[1]):
+        n = shape[boxes.side, axis]
+        beyond = boxes.hi[:, axis] >= n
+        if not beyond.any():
+            continue
+        corners = {"lo": boxes.lo[beyond], "hi": boxes.hi[beyond]}
+        rest = replace(boxes, cell=boxes.cell[beyond], side=boxes.side[beyond], **corners)
+        boxes.hi[beyond, axis] = n[beyond] - 1
+        rest.lo[:, axis] = 0
+        rest.hi[:, axis] -= n[beyond]
+        boxes = merged([boxes, rest], boxes.exits.size, boxes.second_pass)
+    return boxes
 
 
 def no_boxes(dimension: int) -> TargetBoxes:

@@ -170,6 +170,9 @@ class Sides(Protocol):
     def sides(self) -> int:
         """Number of sides."""
 
+    def require_ends(self, door: str) -> None:
+        """Refuse axes that close, for `door`."""
+
 
 def require_domain(params: Any, domain: Any, samples: int) -> None:
     """Refuse a map of more dimensions, where branches have no order, a domain that is none, and too few samples."""

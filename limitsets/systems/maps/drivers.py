@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from limitsets.base import MapError, Table, Tabled, arguments_checked, shown
 from limitsets.numbers.jit import generic, kernel
+from limitsets.systems.cells import Domain
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.contract import (
     compiled_kind_of,
@@ -22,14 +23,17 @@ from limitsets.systems.maps.contract import (
     kind_of,
     or_register,
     require_codes,
+    require_dimension,
     require_sides,
 )
 from limitsets.systems.maps.kernels import (
+    Closing,
     displacement,
     entries_of,
     fallback,
     image,
     image_on,
+    in_domain,
     on_side,
     pick,
     put,
@@ -140,11 +144,11 @@ def _images_on(params: Any, side: int, branch: int, xs: Any, after: Any, side_af
 
 
 @kernel(entry=True)
-def _orbit(params: Any, start: int, xs: Any, sides: Any, code_after: Any) -> Any:
+def _orbit(params: Any, start: int, xs: Any, sides: Any, code_after: Any, axes: Closing | None) -> Any:
     """Fill an orbit from its first state; the number of steps made before an exit."""
     for k in range(code_after.size):
         x, side, code = step(scattered(params, start, k), pick(xs, k), sides[k])
-        put(xs, k + 1, x)
+        put(xs, k + 1, in_domain(x, side, axes))
         sides[k + 1] = side
         code_after[k] = code
         if code < 0:
@@ -153,12 +157,22 @@ def _orbit(params: Any, start: int, xs: Any, sides: Any, code_after: Any) -> Any
 
 
 @kernel(entry=True)
-def _advance(params: Any, first: int, count: int, xs: Any, sides: Any, code_after: Any, steps: Any) -> None:
+def _advance(
+    params: Any,
+    first: int,
+    count: int,
+    xs: Any,
+    sides: Any,
+    code_after: Any,
+    steps: Any,
+    axes: Closing | None,
+) -> None:
     for k in range(steps.size):
         x, side, code = pick(xs, k), sides[k], 0
         made = 0
         while made < count and code >= 0:
-            x, side, code = step(scattered(params, first + k, made), x, side)
+            after, side, code = step(scattered(params, first + k, made), x, side)
+            x = in_domain(after, side, axes)
             made += 1
         put(xs, k, x)
         sides[k] = side
@@ -265,14 +279,27 @@ def _codes_of(after: tuple[NDArray[np.float64], ...]) -> NDArray[np.int64]:
     return np.where(undefined, codes.UNDEFINED, 0).astype(np.int64)
 
 
-def _advanced_on_arrays(params: Any, count: int, xs: Any, sides: Any, code_after: Any, steps: Any) -> None:
+def _arrays_after(params: Any, xs: Any, domain: Domain | None) -> tuple[NDArray[np.float64], ...]:
+    """Images by a function of arrays, turned to a domain."""
+    after: tuple[NDArray[np.float64], ...] = kind_of(params).on_arrays(params, xs)  # type: ignore[misc]
+    return after if domain is None else columns(domain.wrapped(rows(after), 0), len(after))
+
+
+def closing_of(domain: Domain | None) -> Closing | None:
+    """Give the axes of a domain that close, as kernels take them; None where none does."""
+    return None if domain is None or not domain.closes else Closing(domain.lo, domain.period)
+
+
+def _advanced_on_arrays(
+    params: Any, count: int, xs: Any, sides: Any, code_after: Any, steps: Any, domain: Domain | None
+) -> None:
     """Do what `_advance` does, of all starts that go on at once."""
     code_after[:], steps[:], sides[:] = 0, 0, 0
     going = np.arange(steps.size)
     for _ in range(count):
         if not going.size:
             return
-        after = kind_of(params).on_arrays(params, tuple(values[going] for values in xs))  # type: ignore[misc]
+        after = _arrays_after(params, tuple(values[going] for values in xs), domain)
         for values, each in zip(xs, after, strict=True):
             values[going] = each
         code_after[going] = _codes_of(after)
@@ -366,8 +393,20 @@ def start_of(params: Any, x: Any, side: int) -> tuple[float, ...]:
     return tuple(float(v) for v in start)
 
 
+def _start_in(params: Any, x: Any, side: int, domain: Domain | None) -> tuple[float, ...]:
+    """Check one start of a map, as `start_of`, and turn it to a domain."""
+    start = start_of(params, x, side)
+    if domain is None:
+        return start
+    require_dimension(params, "domain", domain.dimension)
+    require_sides(params, 0, domain.sides - 1)
+    if side >= domain.sides:
+        raise MapError("the side", side, f"one of the {domain.sides} of the domain", "name one of these")
+    return tuple(domain.wrapped(np.array([start]), side)[0].tolist())
+
+
 @arguments_checked
-def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
+def orbit(params: Any, x: Any, side: int, count: int, *, domain: Domain | None = None) -> Orbit:
     """Follow one start for `count` steps, or until it leaves or stalls.
 
     Parameters
@@ -381,6 +420,9 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
         Side of the start.
     count : int
         Steps.
+    domain : Domain, optional
+        Of a grid with axes that close, ``grid.domain``: start and states are turned to it, each before the next step.
+        Without it the orbit follows the formulas wherever they lead.
 
     Returns
     -------
@@ -397,17 +439,22 @@ def orbit(params: Any, x: Any, side: int, count: int) -> Orbit:
     >>> import limitsets as ls
     >>> ls.orbit(ls.maps.Logistic(4.0), 0.75, 0, 2).x
     array([0.75, 0.75, 0.75])
+    >>> def turn(x):
+    ...     return x + 0.375
+    >>> circle = ls.grid([(0.0, 1.0)], periodic=True)
+    >>> ls.orbit(ls.map(turn), 0.5, 0, 3, domain=circle.domain).x
+    array([0.5  , 0.875, 0.25 , 0.625])
     """
-    start = start_of(params, x, side)
+    start = _start_in(params, x, side, domain)
     if count < 0:
         raise MapError("the number of steps", count, "an integer from 0", "pass count=100")
     xs, sides, code = empty_orbit(start, side, count)
     on_arrays = kind_of(params).on_arrays
     if on_arrays is None:
-        return as_orbit(params, xs, sides, code, _orbit(params, 0, xs, sides, code))
+        return as_orbit(params, xs, sides, code, _orbit(params, 0, xs, sides, code, closing_of(domain)))
     sides[:], code[:], made = 0, 0, 0
     while made < count and not (made and code[made - 1] < 0):
-        after = on_arrays(params, tuple(values[made : made + 1] for values in xs))
+        after = _arrays_after(params, tuple(values[made : made + 1] for values in xs), domain)
         for values, each in zip(xs, after, strict=True):
             values[made + 1] = each[0]
         code[made] = _codes_of(after)[0]
@@ -442,7 +489,7 @@ def as_orbit(params: Any, xs: Any, sides: Any, code: Any, made: int) -> Orbit:
 
 @arguments_checked
 def advance(
-    params: Any, x: ArrayLike, side: ArrayLike, count: int, *, first: int = 0
+    params: Any, x: ArrayLike, side: ArrayLike, count: int, *, first: int = 0, domain: Domain | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Send many starts `count` steps ahead: states, sides, last codes, steps made before an exit.
 
@@ -463,6 +510,8 @@ def advance(
         Number of steps.
     first : int
         Number of the first start.
+    domain : Domain, optional
+        With axes that close: each state is turned to it, as by `orbit`.
 
     Returns
     -------
@@ -488,9 +537,9 @@ def advance(
         require_sides(params, int(sides.min()), int(sides.max()))
     code, steps = np.empty(sides.size, np.int64), np.empty(sides.size, np.int64)
     if kind_of(params).on_arrays is None:
-        _advance(params, first, count, xs, sides, code, steps)
+        _advance(params, first, count, xs, sides, code, steps, closing_of(domain))
     else:
-        _advanced_on_arrays(params, count, xs, sides, code, steps)
+        _advanced_on_arrays(params, count, xs, sides, code, steps, domain=domain)
     return rows(xs), sides, code, steps
 
 
@@ -536,7 +585,9 @@ CHUNK = 16_384
 
 
 @kernel(entry=True)
-def _growth(params: Any, xs: Any, sides: Any, code_after: Any, tangents: Any, sums: Any) -> int:
+def _growth(
+    params: Any, xs: Any, sides: Any, code_after: Any, tangents: Any, sums: Any, axes: Closing | None
+) -> int:
     """Fill an orbit from its first state and carry a tangent vector along; the number of steps before an exit.
 
     `sums`: logarithm of the growth so far, size of the vector since it was scaled back last, the scale to come, and
@@ -549,7 +600,7 @@ def _growth(params: Any, xs: Any, sides: Any, code_after: Any, tangents: Any, su
     for k in range(code_after.size):
         x, side = pick(xs, k), sides[k]
         after, side_after, code = step(params, x, side)
-        put(xs, k + 1, after)
+        put(xs, k + 1, in_domain(after, side_after, axes))
         sides[k + 1], code_after[k] = side_after, code
         if code < 0:
             made = k + 1
@@ -590,7 +641,9 @@ class Lyapunov:
 
 
 @arguments_checked
-def lyapunov(params: Any, x: Any, side: int, count: int, skip: int = 1000) -> Lyapunov:
+def lyapunov(
+    params: Any, x: Any, side: int, count: int, skip: int = 1000, *, domain: Domain | None = None
+) -> Lyapunov:
     """Largest Lyapunov exponent along one orbit.
 
     Parameters
@@ -605,6 +658,8 @@ def lyapunov(params: Any, x: Any, side: int, count: int, skip: int = 1000) -> Ly
         Steps to take the mean over.
     skip : int
         Steps made before, so that the orbit has reached its attractor and the displacement its direction.
+    domain : Domain, optional
+        With axes that close: each state is turned to it, as by `orbit`.
 
     Returns
     -------
@@ -627,7 +682,7 @@ def lyapunov(params: Any, x: Any, side: int, count: int, skip: int = 1000) -> Ly
     >>> round(maps.lyapunov(maps.Logistic(4.0), 0.3, 0, 100_000).exponent, 2)  # ln 2
     0.69
     """
-    tangent = _Tangent(params, x, side, count, skip)
+    tangent = _Tangent(params, x, side, count, skip, domain=domain)
     xs, sides, code = empty_orbit(tangent.start, side, min(max(skip, count), CHUNK))
     for steps in (skip, count):
         tangent.begin()
@@ -640,9 +695,11 @@ def lyapunov(params: Any, x: Any, side: int, count: int, skip: int = 1000) -> Ly
     return tangent.answer(skip)
 
 
-def orbit_with_exponent(params: Any, x: Any, side: int, skip: int, count: int) -> tuple[Orbit, Lyapunov]:
+def orbit_with_exponent(
+    params: Any, x: Any, side: int, skip: int, count: int, *, domain: Domain | None = None
+) -> tuple[Orbit, Lyapunov]:
     """`orbit` of skip + count steps and `lyapunov` of the same start, in one pass, for a map that does not scatter."""
-    tangent = _Tangent(params, x, side, count, skip)
+    tangent = _Tangent(params, x, side, count, skip, domain=domain)
     xs, sides, code = empty_orbit(tangent.start, side, skip + count)
     made = 0
     for begin, end in ((0, skip), (skip, skip + count)):
@@ -657,9 +714,11 @@ def orbit_with_exponent(params: Any, x: Any, side: int, skip: int, count: int) -
 class _Tangent:
     """A tangent vector on its way along an orbit, beginning where `start` is."""
 
-    def __init__(self, params: Any, x: Any, side: int, count: int, skip: int) -> None:
+    def __init__(
+        self, params: Any, x: Any, side: int, count: int, skip: int, *, domain: Domain | None
+    ) -> None:
         self.params, self.kind = params, compiled_kind_of(params, "lyapunov")
-        self.start = start_of(params, x, side)
+        self.start, self.axes = _start_in(params, x, side, domain), closing_of(domain)
         if not has_slope(params):
             raise MapError(
                 "the map", self.kind.name, "a map with image_on", "register its slope with image_on=..."
@@ -680,7 +739,7 @@ class _Tangent:
 
     def follow(self, xs: Any, sides: Any, code: Any) -> int:
         """Fill an orbit; steps made before an exit."""
-        made = int(_growth(self.params, xs, sides, code, self.tangents, self.sums))
+        made = int(_growth(self.params, xs, sides, code, self.tangents, self.sums, self.axes))
         if made and code[made - 1] < 0:
             self.left = True
             self.stopped = next(

@@ -5,7 +5,8 @@ What each of them takes and gives is the table of `limitsets.systems.maps.contra
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 from limitsets.numbers.interval import seed, slope_of
 from limitsets.numbers.jit import generic, kernel, of_entries
@@ -124,6 +125,33 @@ def state_of(entries: Any) -> Any:
 @generic(default=lambda x: (x,))
 def entries_of(x: Any) -> Any:
     """Undo `state_of`."""
+
+
+class Closing(NamedTuple):
+    """Lower ends and periods of the axes of a domain, shape (sides, dimension); a period is 0 where none closes."""
+
+    lo: Any
+    period: Any
+
+
+@of_entries
+def _turned(x: Any, k: int, side: Any, axes: Closing) -> Any:
+    """Turn a coordinate to the domain, exactly where it lies there; rounding may not leave it on the seam."""
+    if (side < 0) | (side >= axes.lo.shape[0]):  # the domain says nothing of that side
+        return x
+    lo, period = axes.lo[side, k], axes.period[side, k]
+    if not ((period > 0.0) & (abs(x) < math.inf)):
+        return x
+    after = x - period * math.floor((x - lo) / period)
+    return after if (after >= lo) & (after < lo + period) else lo
+
+
+@kernel
+def in_domain(x: Any, side: Any, axes: Closing | None) -> Any:
+    """State of a domain that a state is; of one that no axis closes, None, it is x."""
+    if axes is None:
+        return x
+    return state_of(_turned(entries_of(x), side, axes))
 
 
 @generic(default=lambda given, params, x, side, branch: given)

@@ -227,6 +227,7 @@ def follow(
     for step in range(steps + 1):
         if step:
             x, side, code = stepped(graph.map, x, side)
+            x = grid.domain.wrapped(x, side)
             made[going] = step
         label = np.where(code < 0, code, codes.UNDECIDED)
         here = np.flatnonzero(code >= 0)

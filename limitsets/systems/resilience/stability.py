@@ -505,6 +505,7 @@ def minimal_fatal_shock(
     >>> found.how, found.lo <= 1.5**0.5 - 0.5**0.5 <= found.hi, round(found.hi - found.lo, 2)
     ('proved', True, 0.0)
     """
+    graph.grid.domain.require_ends("the grid of minimal_fatal_shock")
     parted = colours(graph, found)
     state, cell = _place(parted, x, side)
     if starts is not None:

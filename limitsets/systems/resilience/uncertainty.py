@@ -186,6 +186,7 @@ def uncertainty_exponent(
             f"{FEWEST} at least, 400 for two decades",
             "ask for finer cells",
         )
+    graph.grid.domain.require_ends("the grid of uncertainty_exponent")
     parted, rng = colours(graph, found), np.random.default_rng(seed)
     farthest = min(FARTHEST, fewest // PARTS)
     if starts is None:
@@ -431,6 +432,7 @@ def wada(
     """
     if boxes < 1:
         raise AnswerError("the number of boxes", boxes, "an integer from 1", "pass boxes=400")
+    graph.grid.domain.require_ends("the grid of wada")
     parted, rng = colours(graph, found), np.random.default_rng(seed)
     if starts is None:
         cell, label = np.arange(graph.n_cells), labelled_starts(parted, steps, rng)

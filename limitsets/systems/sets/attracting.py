@@ -167,14 +167,14 @@ def _start(cells: CellSet) -> tuple[Any, int]:
 
 def _attractor(graph: TransitionGraph, cells: CellSet, throws: int) -> Attractor:
     x, side = _start(cells)
-    exponent = None
+    exponent, domain = None, graph.grid.domain
     if has_slope(graph.map) and type(graph.map) not in scattered.methods:
-        path, growth = orbit_with_exponent(graph.map, x, side, TRANSIENT, throws)
+        path, growth = orbit_with_exponent(graph.map, x, side, TRANSIENT, throws, domain=domain)
         exponent = growth.exponent
     else:
-        path = orbit(graph.map, x, side, TRANSIENT + throws)
+        path = orbit(graph.map, x, side, TRANSIENT + throws, domain=domain)
         if has_slope(graph.map):  # of the map without its scatter
-            exponent = lyapunov(graph.map, x, side, throws, skip=TRANSIENT).exponent
+            exponent = lyapunov(graph.map, x, side, throws, skip=TRANSIENT, domain=domain).exponent
     skip = min(TRANSIENT, path.code.size)
     sides, states = path.side[skip:], path.x[skip:]
     met = sum(int(cells.holds(states[sides == s], s).sum()) for s in range(graph.grid.sides))

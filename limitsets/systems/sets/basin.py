@@ -17,6 +17,7 @@ from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.graph.components import reach
 from limitsets.systems.graph.images.enclosed import BOTH, NOTHING, BoxImages
 from limitsets.systems.graph.ranges import RUN, SIDE
+from limitsets.systems.graph.target import goes_round, turned
 from limitsets.systems.maps import codes, images
 from limitsets.systems.sets.attracting import Attractor
 
@@ -139,7 +140,7 @@ def _link(
         for place in range(total):
             rest, coarse, within = place, 0, 0
             for axis in range(len(axes)):
-                at = first[axis][k] + rest % count[axis][k]
+                at = (first[axis][k] + rest % count[axis][k]) % (axes[axis].size * parts)
                 rest //= count[axis][k]
                 coarse = coarse * shape[axis] + axes[axis][at // parts]
                 within = within * parts + at % parts
@@ -152,11 +153,16 @@ def _link(
 
 
 class _Axis(NamedTuple):
-    """Fine cells along one axis of a side: their ends, and the cells they are parts of, those that are looked at."""
+    """Fine cells along one axis of a side: their ends, and the cells they are parts of, those that are looked at.
+
+    `bottom` and `period` are those of the axis; 0 is the period of one that does not close.
+    """
 
     lower: Floats
     upper: Floats
     cells: Integers
+    bottom: float
+    period: float
 
 
 def _refined(graph: TransitionGraph, component: Integers, parts: int) -> Integers:
@@ -179,7 +185,10 @@ def _refined(graph: TransitionGraph, component: Integers, parts: int) -> Integer
             (np.searchsorted(axis.cells, at)[:, None] * parts + s).ravel()
             for axis, at, s in zip(axes[side], grid.axes(here, side), sub, strict=True)
         ]
-        lo, hi = (tuple(axis[end][at] for axis, at in zip(axes[side], place, strict=True)) for end in (0, 1))
+        lo, hi = (
+            tuple((axis.lower, axis.upper)[end][at] for axis, at in zip(axes[side], place, strict=True))
+            for end in (0, 1)
+        )
         boxes, clear = (_enclosed if proved else _hulls)(graph, lo, hi, side)
         longest[begun : begun + clear.size][~clear] = ENDLESS
         for least, most, to, given in boxes:
@@ -204,11 +213,12 @@ def _refined(graph: TransitionGraph, component: Integers, parts: int) -> Integer
 def _axes(grid: Grid, here: Integers, side: int, parts: int) -> list[_Axis]:
     """Cut the axes of a side; in one dimension, where an axis is as long as the side, but for the cells looked at."""
     axes = []
-    for edges in grid.edges[side]:
+    for k, edges in enumerate(grid.edges[side]):
+        period = float(grid.domain.period[side, k])
         cells = here - grid.offset[side] if grid.dimension == 1 else np.arange(edges.size - 1)
         ends = edges[cells, None] + np.arange(parts + 1) / parts * (edges[cells + 1] - edges[cells])[:, None]
         ends[:, -1] = edges[cells + 1]
-        axes.append(_Axis(ends[:, :-1].ravel(), ends[:, 1:].ravel(), cells))
+        axes.append(_Axis(ends[:, :-1].ravel(), ends[:, 1:].ravel(), cells, float(edges[0]), period))
     return axes
 
 
@@ -235,14 +245,36 @@ def _enclosed(graph: TransitionGraph, lo: Any, hi: Any, side: int) -> tuple[list
     return boxes, enclosures.count != NOTHING
 
 
+@kernel(entry=True, counting=False)
+def _turn(bottom: float, period: float, lo: Any, hi: Any, laps: Any) -> None:
+    """Turn the ends of intervals to an axis that closes; the turns from the first to the last, -1 for all of it."""
+    for k in range(lo.size):
+        if goes_round(lo[k], hi[k], bottom, period):
+            laps[k] = -1
+            continue
+        begun, lo[k] = turned(lo[k], bottom, period, -1.0)
+        ended, hi[k] = turned(hi[k], bottom, period, 1.0)
+        laps[k] = np.int64(ended - begun)
+
+
 def _met(axes: list[_Axis], lo: Floats, hi: Floats, some: Integers, pad: int) -> tuple[Any, Any]:
-    """Fine cells of one side that some boxes meet, and so many more around: the first on each axis, and how many."""
+    """Fine cells of one side that some boxes meet, and so many more around: the first on each axis, and how many.
+
+    Along an axis that closes they go on beyond the seam, at both ends.
+    """
     first, count = [], []
     for k, axis in enumerate(axes):
-        begin = np.maximum(np.searchsorted(axis.upper, lo[some, k], side="left") - pad, 0)
-        end = np.minimum(np.searchsorted(axis.lower, hi[some, k], side="right") + pad, axis.lower.size)
+        n, least, most, laps = axis.lower.size, lo[some, k], hi[some, k], np.zeros_like(some)
+        if axis.period:
+            _turn(axis.bottom, axis.period, least, most, laps)
+        begin = np.searchsorted(axis.upper, least, side="left") - pad
+        end = np.searchsorted(axis.lower, most, side="right") + pad
+        if axis.period:
+            begin, end = np.where(laps < 0, 0, begin), np.where(laps < 0, n, end + n * laps)
+        else:
+            begin, end = np.maximum(begin, 0), np.minimum(end, n)
         first.append(begin)
-        count.append(np.maximum(end - begin, 0))
+        count.append(np.clip(end - begin, 0, n))
     return tuple(first), tuple(count)
 
 
@@ -390,7 +422,7 @@ def _left_by_rounding(graph: TransitionGraph) -> bool:
     for s, share in product(np.unique(side).tolist(), (0.0, 0.5, 1.0)):
         starts = (lo + share * (hi - lo))[side == s]
         image = images(graph.map, starts if domain.dimension > 1 else starts[:, 0], s)
-        x = image.x.reshape(starts.shape)
+        x = domain.wrapped(image.x.reshape(starts.shape), image.side)
         if not ((domain.lo[image.side] <= x) & (x <= domain.hi[image.side])).all():
             return False
     return True

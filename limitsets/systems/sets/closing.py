@@ -9,14 +9,16 @@ where noise is how far images of points very near the orbit are from the tangent
 orbit counts where |f(x_j) - x_j+1| <= a_j for each j, with f the kernel `image` on whatever branch it takes.  Then its
 points are known to |J^-1| a, with J the matrix of the equations: orbits nearer than that are one.
 
-A map on a circle or torus has a seam, where a formula jumps by one turn.  A point on it has two names, 0 and 1, and
-rounding chooses.  Two such orbits are one if their points differ by the jump and their slopes do not differ.
+A map on a circle or torus has a seam, where a formula jumps by one turn, or the domain closes.  A point on it has two
+names, 0 and 1, and rounding chooses.  Two such orbits are one if their points differ by the jump and their slopes do
+not differ.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple, Self
 
@@ -24,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base import AnswerError, Column, Table, Tabled
+from limitsets.systems.cells import Domain
 from limitsets.systems.maps.drivers import images
 from limitsets.systems.sets.end_points import EPS
 
@@ -130,6 +133,9 @@ AT_ONCE = 1 << 22
 Slopes = Callable[[Array, Ints, Ints], Array]
 """Derivatives (n, d, d) of the steps from states (n, d) with sides and branches."""
 
+Onward = Callable[[Array, Ints], tuple[Array, Ints, Ints]]
+"""From points of cycles (m, p, d) with sides to their images, sides, codes."""
+
 Measured = Callable[[Array], tuple[Array, Array]]
 
 
@@ -151,6 +157,22 @@ def stepped(params: Any, x: Array, side: Ints) -> tuple[Array, Ints, Ints]:
         image = images(params, flat[mine, 0] if flat.shape[1] == 1 else flat[mine], s)
         after[mine], to[mine], code[mine] = image.x.reshape(-1, flat.shape[1]), image.side, image.code
     return after.reshape(x.shape), to.reshape(side.shape), code.reshape(side.shape)
+
+
+def _onward(params: Any, domain: Domain | None, x: Array, side: Ints) -> tuple[Array, Ints, Ints]:
+    """Step from the points of cycles (m, p, d); along axes that close, to the image nearest to the next point."""
+    after, to, code = stepped(params, x, side)
+    if domain is not None and domain.closes:
+        after = _ahead(x) + domain.shortest(after - _ahead(x), _ahead(side))
+    return after, to, code
+
+
+def _at_seam(domain: Domain | None, x: Array, side: Ints, near: float) -> Array:
+    """Period where a coordinate has two names, one at each end of an axis that closes; 0 elsewhere."""
+    if domain is None:
+        return np.zeros_like(x)
+    seam = np.minimum(x - domain.lo[side], domain.hi[side] - x) <= near
+    return np.where(seam, domain.period[side], 0.0)
 
 
 def _ahead(x: Any) -> Any:
@@ -193,12 +215,12 @@ def corrected(measured: Measured, x: Array, scale: float, steps: int) -> Array:
     return x
 
 
-def _beside(params: Any, slopes: Slopes, side: Ints, scale: float) -> Measured:
+def _beside(onward: Onward, slopes: Slopes, side: Ints, scale: float) -> Measured:
     """Measure steps by `image`, of points on the far side of a seam by a point just across it."""
 
     def measured(x: Array) -> tuple[Array, Array]:
         at = x.copy()
-        after, to, code = stepped(params, x, side)
+        after, to, code = onward(x, side)
 
         def miss(after: Array, to: Ints, code: Ints) -> Array:
             far = np.abs(after - _ahead(x)).max(axis=-1)
@@ -209,7 +231,7 @@ def _beside(params: Any, slopes: Slopes, side: Ints, scale: float) -> Measured:
             if not (best > FARTHEST * scale).any():
                 break
             tried = x + BESIDE * scale * way
-            step = stepped(params, tried, side)
+            step = onward(tried, side)
             better = (best > FARTHEST * scale) & (miss(*step) < best)
             at[better], after[better], code[better] = tried[better], step[0][better], step[2][better]
             best = np.where(better, miss(*step), best)
@@ -226,12 +248,12 @@ def _slopes(slopes: Slopes, x: Array, side: Ints, code: Ints) -> Array:
 
 @np.errstate(all="ignore")  # images that are not there
 def _noise(
-    params: Any, x: Array, side: Ints, after: Array, slope: Array, scale: float
+    onward: Onward, x: Array, side: Ints, after: Array, slope: Array, scale: float
 ) -> tuple[Array, Array]:
     """How far images just beside each point are from the tangent: rounding, and jumps, along each coordinate."""
     noise, jumps = np.zeros_like(x), np.zeros_like(x)
     for way in _offsets(x.shape[-1]):
-        there, to, code = stepped(params, x + BESIDE * scale * way, side)
+        there, to, code = onward(x + BESIDE * scale * way, side)
         off = np.abs(there - after - BESIDE * scale * slope @ way)
         off[~np.isfinite(off) | (code < 0)[..., None] | (to != _ahead(side))[..., None]] = 0.0
         jumps = np.maximum(jumps, np.where(off > NEAR * scale, off, 0.0))
@@ -240,26 +262,36 @@ def _noise(
 
 
 def closed(
-    params: Any, x: Array, side: Ints, scale: float, slopes: Slopes, *, seams: bool = False
+    params: Any,
+    x: Array,
+    side: Ints,
+    scale: float,
+    slopes: Slopes,
+    *,
+    seams: bool = False,
+    domain: Domain | None = None,
 ) -> list[Closed]:
     """Orbits (m, p, d) with sides (m, p) that close under `image`, each corrected; the others are left out.
 
-    `seams`: names of points on a seam are tried until `image` keeps to them.
+    `seams`: names of points on a seam are tried until `image` keeps to them.  `domain`: axes of it may close.
     """
     some = max(1, AT_ONCE // (x.shape[1] * x.shape[2]) ** 2)
     return [
         one
         for k in range(0, len(x), some)
-        for one in _closed(params, x[k : k + some], side[k : k + some], scale, slopes, seams=seams)
+        for one in _closed(params, domain, x[k : k + some], side[k : k + some], scale, slopes, seams=seams)
     ]
 
 
 @np.errstate(all="ignore")  # orbits that run away, which are left out
-def _closed(params: Any, x: Array, side: Ints, scale: float, slopes: Slopes, *, seams: bool) -> list[Closed]:
-    measured = _beside(params, slopes, side, scale)
+def _closed(
+    params: Any, domain: Domain | None, x: Array, side: Ints, scale: float, slopes: Slopes, *, seams: bool
+) -> list[Closed]:
+    onward = partial(_onward, params, domain)
+    measured = _beside(onward, slopes, side, scale)
     x = corrected(measured, x, scale, 3)
     after, slope = measured(x)
-    noise, jumps = _noise(params, x, side, after, slope, scale)
+    noise, jumps = _noise(onward, x, side, after, slope, scale)
     size = scale + np.abs(after) + np.einsum("mpij,mpj->mpi", np.abs(slope), np.abs(x))
     rounding = ROUNDING * EPS * size + 4.0 * noise.max(axis=(1, 2))[:, None, None]
     done, points, branches, missed = (
@@ -271,14 +303,16 @@ def _closed(params: Any, x: Array, side: Ints, scale: float, slopes: Slopes, *, 
     for way in (None, np.zeros(x.shape[-1]), *(_offsets(x.shape[-1]) if seams else ())):
         tried = x
         if way is not None:  # what `image` itself calls the points
-            tried = np.roll(stepped(params, x + 4.0 * EPS * scale * way, side)[0], 1, axis=1)
-        landing, to, code = stepped(params, tried, side)
+            tried = np.roll(onward(x + 4.0 * EPS * scale * way, side)[0], 1, axis=1)
+        landing, to, code = onward(tried, side)
         miss = np.abs(landing - _ahead(tried))
         good = ((code >= 0) & (to == _ahead(side)) & (miss <= rounding).all(axis=-1)).all(axis=1) & ~done
         points[good], branches[good], missed[good] = tried[good], code[good], miss[good]
         done |= good
         if done.all():
             break
+    if domain is not None:
+        points = domain.wrapped(points.reshape(side.size, -1), side.ravel()).reshape(x.shape)
     kept: list[Closed] = []
     for k in np.flatnonzero(done).tolist():
         slope_of = _slopes(slopes, points[k : k + 1], side[k : k + 1], branches[k : k + 1])[0]
@@ -287,6 +321,7 @@ def _closed(params: Any, x: Array, side: Ints, scale: float, slopes: Slopes, *, 
         first = int(np.lexsort((*points[k].T[::-1], side[k]))[0])
         turned = [np.roll(each, -first, axis=0) for each in (points[k], side[k], branches[k], slope_of)]
         jump = np.roll(jumps[k], 1 - first, axis=0)  # of the image that lands there
+        jump = np.maximum(jump, _at_seam(domain, turned[0], turned[1], near))
         at = turned[0][:, 0] if x.shape[-1] == 1 else turned[0]
         most = float(missed[k].max()), float(rounding[k].max())
         cycle = Cycle(at, turned[1], turned[2], _multiplier(turned[3]), *most)

@@ -483,6 +483,7 @@ def limit_set_of(
     >>> print(band.ends[0].origin)
     critical point x = 0.5 on side 0, left, right
     """
+    domain.require_ends("the domain of a limit set")
     forward = IntervalMap(params, domain)
     union = read(extents, domain)
     scale = float(np.max(domain.hi - domain.lo))

@@ -27,8 +27,8 @@ from limitsets.systems.sets.end_points import Extents
 #
 # In one dimension cells are cut where the map changes its branch, turns or jumps; what is left is monotone, and a piece
 # is spread evenly between the images of its two ends.  Sample points would leave an error of about one sample in each
-# share, and so an error of the density that finer cells do not reduce.  In more dimensions, and for maps without forced
-# branches, which give the one-sided limits, points spread evenly in the cell are counted.
+# share, and so an error of the density that finer cells do not reduce.  In more dimensions, on axes that close, and for
+# maps without forced branches, which give the one-sided limits, points spread evenly in the cell are counted.
 
 
 # Points per cell and axis, by dimension.
@@ -137,7 +137,7 @@ def ulam_matrix(graph: TransitionGraph, cells: NDArray[np.int64]) -> UlamMatrix:
         Weights from one cell add up to 1 less what leaves the grid.
     """
     grid = graph.grid
-    exact = grid.dimension == 1 and has_slope(graph.map)
+    exact = grid.dimension == 1 and has_slope(graph.map) and not grid.domain.closes
     pieces = monotone_pieces(graph.map, grid.domain) if exact else {}
     parts: list[UlamMatrix] = []
     for side in range(grid.sides):

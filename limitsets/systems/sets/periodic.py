@@ -1,4 +1,4 @@
-"""Periodic orbits, stable or not, inside an answer: by itinerary on a line, by Newton's method in the plane."""
+"""Periodic orbits, stable or not: by itinerary on a line, by Newton's method in the plane and on axes that close."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from limitsets.base import AnswerError, arguments_checked, shown
 from limitsets.numbers.jit import kernel
-from limitsets.systems.cells import CellSet
+from limitsets.systems.cells import CellSet, Domain
 from limitsets.systems.graph.graph import TransitionGraph
 from limitsets.systems.maps.contract import compiled_kind_of, has_slope
 from limitsets.systems.maps.critical import Flags, Sides, bisected
-from limitsets.systems.maps.drivers import step
-from limitsets.systems.maps.kernels import image_on
+from limitsets.systems.maps.drivers import closing_of, step
+from limitsets.systems.maps.kernels import Closing, image_on, in_domain
 from limitsets.systems.maps.pieces import along, monotone_pieces
 from limitsets.systems.sets.closing import (
     NEAR,
@@ -28,6 +28,7 @@ from limitsets.systems.sets.closing import (
     corrected,
     distinct,
     require_period,
+    stepped,
 )
 from limitsets.systems.sets.end_points import EPS, Extents
 
@@ -305,6 +306,7 @@ def cycles_of(
     [(1, -1.2), (2, 0.16)]
     """
     require_period(up_to)
+    domain.require_ends("the domain of cycles by itinerary")
     alphabet = alphabet_of(params, extents, domain)
     words = letters_alone(alphabet)
     closed_orbits: list[Closed] = []
@@ -321,10 +323,10 @@ def cycles_of(
 
 
 # ----------------------------------------------------------------
-# Cycles of a map of the plane by Newton's method on F^p(x) = x from many starts.
+# Cycles of a map of the plane, or on axes that close, by Newton's method on F^p(x) = x from many starts.
 #
 # In the plane pieces have no order and words no intervals; nothing tells whether all cycles were found, and the answer
-# says so.
+# says so.  Along an axis that closes F^p(x) = x up to whole turns: a step of Newton's is taken towards the nearest.
 
 
 NEWTON_STEPS = 60
@@ -334,7 +336,15 @@ ARRIVED = 1e-7
 
 @kernel(entry=True)
 def _returns(
-    params: Any, count: int, u: Any, v: Any, side: Any, after: Any, jacobian: Any, ends: Any
+    params: Any,
+    count: int,
+    u: Any,
+    v: Any,
+    side: Any,
+    after: Any,
+    jacobian: Any,
+    ends: Any,
+    axes: Closing | None,
 ) -> None:
     """F^count of starts in the plane and its derivative; `ends` is the side, or -1 for an orbit that leaves."""
     for k in range(u.size):
@@ -347,35 +357,63 @@ def _returns(
             _, _, slope = image_on(params, x, at, code)
             (p, q), (r, s) = slope
             a, b, c, d = p * a + q * c, p * b + q * d, r * a + s * c, r * b + s * d
-            x, at = to, side_to
+            x, at = in_domain(to, side_to, axes), side_to
         after[0, k], after[1, k] = x
         jacobian[0, k], jacobian[1, k], jacobian[2, k], jacobian[3, k] = a, b, c, d
         ends[k] = at if code >= 0 else -1
 
 
-def _returned(params: Any, count: int, x: Array, side: Ints) -> tuple[Array, Array, Ints]:
-    """F^count, its derivative (n, 4) and the side reached (-1: left) of states (n, 2)."""
+def _returned_on_line(
+    params: Any, count: int, x: Array, side: Ints, domain: Domain | None
+) -> tuple[Array, Array, Ints]:
+    """Do what `_returned` does, in one dimension."""
+    slope, stays = np.ones(len(x)), np.ones(len(x), dtype=bool)
+    for _ in range(count):
+        after, to, code = stepped(params, x, side)
+        stays &= code >= 0
+        slope = slope * along(params, x[:, 0], side, np.maximum(code, 0)[:, None])[2]
+        side = np.where(stays, to, 0)
+        x = after if domain is None else domain.wrapped(after, side)
+    return x, slope[:, None], np.where(stays, side, -1)
+
+
+def _returned(
+    params: Any, count: int, x: Array, side: Ints, domain: Domain | None
+) -> tuple[Array, Array, Ints]:
+    """F^count, its derivative (n, d^2) and the side reached (-1: left) of states (n, d), d up to 2."""
+    if x.shape[1] == 1:
+        return _returned_on_line(params, count, x, side, domain)
     after, jacobian, ends = np.empty((2, len(x))), np.empty((4, len(x))), np.empty(len(x), np.int64)
     u, v = np.ascontiguousarray(x[:, 0]), np.ascontiguousarray(x[:, 1])
-    _returns(params, count, u, v, np.ascontiguousarray(side), after, jacobian, ends)
+    _returns(params, count, u, v, np.ascontiguousarray(side), after, jacobian, ends, closing_of(domain))
     return after.T.copy(), jacobian.T.copy(), ends
 
 
-def _newton(params: Any, count: int, x: Array, side: Ints, scale: float) -> tuple[Array, Ints]:
+def _move(jacobian: Array, miss: Array) -> Array:
+    """Solve (J - 1) move = miss for many starts; nan or huge where that is singular."""
+    if miss.shape[1] == 1:
+        return np.asarray(miss / (jacobian - 1.0))
+    a, b, c, d = jacobian[:, 0] - 1.0, jacobian[:, 1], jacobian[:, 2], jacobian[:, 3] - 1.0
+    det = a * d - b * c
+    return np.stack(
+        [(d * miss[:, 0] - b * miss[:, 1]) / det, (a * miss[:, 1] - c * miss[:, 0]) / det], axis=1
+    )
+
+
+def _newton(
+    params: Any, count: int, x: Array, side: Ints, scale: float, domain: Domain | None
+) -> tuple[Array, Ints]:
     """Newton's method on F^count(x) = x from all starts at once: the roots reached and their sides."""
-    roots, sides = [np.empty((0, 2))], [np.empty(0, np.int64)]
+    roots, sides = [x[:0]], [np.empty(0, np.int64)]
     for _ in range(NEWTON_STEPS):
         if not len(x):
             break
-        y, j, ends = _returned(params, count, x, side)
-        a, b, c, d = j[:, 0] - 1.0, j[:, 1], j[:, 2], j[:, 3] - 1.0
+        y, jacobian, ends = _returned(params, count, x, side, domain)
         with np.errstate(all="ignore"):  # starts that run away
-            f = y - x
-            det = a * d - b * c
-            move = np.stack([(d * f[:, 0] - b * f[:, 1]) / det, (a * f[:, 1] - c * f[:, 0]) / det], axis=1)
+            move = _move(jacobian, y - x if domain is None else domain.shortest(y - x, side))
             size = np.abs(move).max(axis=1)
             alive = (ends == side) & np.isfinite(size) & (size < 10.0 * scale)
-            better = x - move
+            better = x - move if domain is None else domain.wrapped(x - move, side)
         arrived = alive & (size <= ARRIVED * scale)
         roots.append(better[arrived])
         sides.append(side[arrived])
@@ -383,31 +421,37 @@ def _newton(params: Any, count: int, x: Array, side: Ints, scale: float) -> tupl
     return np.concatenate(roots), np.concatenate(sides)
 
 
-def _followed(params: Any, roots: Array, side: Ints, period: int) -> tuple[Array, Ints]:
-    """Follow roots around: points (n, period, 2) and sides of those that do not leave."""
-    points, sides = np.empty((len(roots), period, 2)), np.empty((len(roots), period), np.int64)
+def _followed(
+    params: Any, roots: Array, side: Ints, period: int, domain: Domain | None
+) -> tuple[Array, Ints]:
+    """Follow roots around: points (n, period, d) and sides of those that do not leave."""
+    points, sides = np.empty((len(roots), period, roots.shape[1])), np.empty((len(roots), period), np.int64)
     stays = np.ones(len(roots), dtype=bool)
     at, on = roots, side
     for j in range(period):
         points[:, j], sides[:, j] = at, on
-        at, _, on = _returned(params, 1, at, np.maximum(on, 0))
+        at, _, on = _returned(params, 1, at, np.maximum(on, 0), domain)
         stays &= on >= 0
     return points[stays], sides[stays]
 
 
-def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> Cycles:
-    """Find periodic orbits of a map of the plane by Newton's method from given starts.
+def cycles_from(
+    params: Any, starts: ArrayLike, side: ArrayLike, up_to: int, *, domain: Domain | None = None
+) -> Cycles:
+    """Find periodic orbits of a map of the plane, or on axes that close, by Newton's method from given starts.
 
     Parameters
     ----------
     params : NamedTuple
-        A two-dimensional map with `image_on`.
-    starts : array_like, shape (n, 2)
+        A two-dimensional map with `image_on`; a one-dimensional one where the axis of the domain closes.
+    starts : array_like, shape (n, 2) or (n, 1)
         Starts, such as the centres of recurrent cells.
     side : int or array_like of int, shape (n,)
         Their sides.
     up_to : int
         Largest period.
+    domain : Domain, optional
+        With axes that close: an orbit closes there up to whole periods, and is shown in the domain.
 
     Returns
     -------
@@ -429,22 +473,24 @@ def cycles_from(params: Any, starts: ArrayLike, side: ArrayLike, up_to: int) -> 
     """
     require_period(up_to)
     kind = compiled_kind_of(params, "cycles")
-    if kind.dimension != 2 or not has_slope(params):
+    line = kind.dimension == 1 and domain is not None and domain.closes
+    if not (kind.dimension == 2 or line) or not has_slope(params):
         raise AnswerError("the map", kind.name, "a map of the plane with image_on", "register image_on")
-    x = np.asarray(starts, dtype=np.float64).reshape(-1, 2)
+    x = np.asarray(starts, dtype=np.float64).reshape(-1, kind.dimension)
     sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), (len(x),)))
     scale = float(np.abs(x).max())
     closed_orbits: list[Closed] = []
 
     def slopes(at: Array, on: Ints, _: Ints) -> Array:
-        return _returned(params, 1, at, on)[1]
+        return _returned(params, 1, at, on, domain)[1]
 
     for period in range(1, up_to + 1):
-        roots, on = _newton(params, period, x, sides, scale)
+        roots, on = _newton(params, period, x, sides, scale, domain)
         keys = np.column_stack([np.round(roots / (NEAR * scale)), on])
         _, one_of_each = np.unique(keys, axis=0, return_index=True)
-        orbits = _followed(params, roots[one_of_each], on[one_of_each], period)
-        closed_orbits += closed(params, *orbits, scale, slopes, seams=len(kind.branches) == 1)
+        orbits = _followed(params, roots[one_of_each], on[one_of_each], period, domain)
+        seams = len(kind.branches) == 1
+        closed_orbits += closed(params, *orbits, scale, slopes, seams=seams, domain=domain)
     return Cycles(
         distinct(closed_orbits),
         complete=False,
@@ -482,12 +528,14 @@ def cycles(graph: TransitionGraph, up_to: int, within: Any = None) -> Cycles:
     up_to : int
         Largest period.
     within : Attractor, LimitSet or CellSet, optional
-        Where to look; default all recurrent cells.  In two dimensions a set of cells, or an answer with `cells`.
+        Where to look; default all recurrent cells.  In two dimensions, and on axes that close, a set of cells, or an
+        answer with `cells`.
 
     Returns
     -------
     Cycles
-        A tuple of `Cycle`; its `complete` says whether every itinerary was followed (one dimension only).
+        A tuple of `Cycle`; its `complete` says whether every itinerary was followed (one dimension only, and no axis
+        that closes).
 
     Raises
     ------
@@ -503,18 +551,19 @@ def cycles(graph: TransitionGraph, up_to: int, within: Any = None) -> Cycles:
     """
     compiled_kind_of(graph.map, "cycles")
     cells = _cells(graph, within)
-    if graph.grid.dimension == 1:
+    domain = graph.grid.domain
+    if graph.grid.dimension == 1 and not domain.closes:
         extents = cells.extents() if cells is not None else getattr(within, "extents", None)
         if not isinstance(extents, Mapping):
             raise AnswerError(
                 "the set to look in", shown(within), "an attractor, limit set or cells", "pass one of these"
             )
-        return cycles_of(graph.map, extents, graph.grid.domain, up_to)
+        return cycles_of(graph.map, extents, domain, up_to)
     if cells is None:
         raise AnswerError(
             "the set to look in", shown(within), "cells, or an answer with cells", "pass an attractor"
         )
-    answer = cycles_from(graph.map, *_middles(cells), up_to)
+    answer = cycles_from(graph.map, *_middles(cells), up_to, domain=domain)
     if within is None:
         return answer
     inside = (cycle for cycle in answer if cells.holds(cycle.x, cycle.side).all())
