@@ -4,6 +4,7 @@ The certificates are put together here, not by the package.
 """
 
 import sys
+from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
@@ -197,6 +198,29 @@ def test_a_hard_cell_is_compared_with_the_first_node_that_is_thrown_from():
     links = sys.modules[f"{checker.__name__}.links"].Links
     side = SimpleNamespace(x=[0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7], at_cut={1, 3, 6}, e=0.25)
     assert [links.next_thrown(side, cell) for cell in range(7)] == [1, 3, 3, 4, 6, 6, 7]
+
+
+def test_bounds_of_a_step_are_not_below_the_exact_sums():
+    """A step with nothing but a mean, or a hard cell: the sum of two numbers, which floats round either way."""
+    chain, generator = sys.modules[f"{checker.__name__}.landings"].Chain, np.random.default_rng(5)
+    none = np.zeros(0, np.int64)
+    for most, mean, more in generator.uniform(0.0, 1.0, (100, 3)):
+        step = SimpleNamespace(
+            rows=SimpleNamespace(times=lambda values: np.full(4, mean), off=np.zeros(4)),  # noqa: B023  # called here
+            nodes=SimpleNamespace(at=none, much=np.zeros(0), ends=lambda values: (np.zeros(0), np.zeros(0))),
+            deficits=lambda values: np.zeros(4),
+            hard=SimpleNamespace(
+                at=np.array([2]),
+                much=np.array([np.inf]),
+                ends=lambda values: (np.zeros(1), np.array([most])),  # noqa: B023  # called here
+            ),
+            live=np.array([0]),
+            beside=np.array([0]),
+        )
+        bounds = chain.above(step, np.ones(4), np.full(4, -np.inf), more)
+        exact = [Fraction(mean) + Fraction(more)] * 2 + [Fraction(most) + Fraction(more)] * 2
+        assert all(Fraction(bound) >= sum_ for bound, sum_ in zip(bounds.tolist(), exact, strict=True))
+        assert bounds.tolist() == pytest.approx([float(sum_) for sum_ in exact], abs=1e-14)
 
 
 # ------------------------------------------------------------------------------------------------- forgeries
