@@ -233,7 +233,7 @@ class Place:
     def fill(self) -> None:
         source, copy = Path(limitsets.__file__).parent, self.copy / "limitsets"
         # the box kernels of the maps stand on the wings below
-        for part in ("base", "numbers", "systems/maps"):
+        for part in ("base", "numbers", "systems/maps", "systems/cells"):
             shutil.copytree(source / part, copy / part, ignore=shutil.ignore_patterns("__pycache__"))
         (copy / "systems" / "__init__.py").touch()
         shutil.copy(source / "__init__.py", copy / "__init__.py")
