@@ -16,7 +16,6 @@ from limitsets.base import (
     Column,
     Progress,
     Table,
-    Tabled,
     arguments_checked,
     as_table,
     picked,
@@ -41,6 +40,7 @@ from limitsets.feeder.scene import LaidLike, Model, Scene, load
 from limitsets.parameters.noise.sampling import require_seed
 from limitsets.parameters.sheet.summary import still
 from limitsets.proofs.chances.absorption import AbsorptionBrackets
+from limitsets.proofs.prover.certificate import Saved
 
 Verdict = TypeVar("Verdict", Safe, Fed)
 
@@ -61,7 +61,7 @@ FED = {
 
 
 @dataclass(frozen=True, eq=False)
-class Feeding(Tabled):
+class Feeding(Saved):
     """What becomes of parts at the end of the arm.
 
     Attributes
@@ -155,30 +155,13 @@ class Feeding(Tabled):
         """Whether a certificate can hold something of the proof: not of a map with effects, that nothing rechecks."""
         return self.proof is not None and holds(self.proof, self.end)
 
-    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
-        """Write the certificate of what is proved; it gets its name once `recheck` has confirmed it.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, replaced whole.
-        recheck : bool
-            Whether to have it checked first.
-        workers : int, optional
-            Processes that check it, as in `limitsets.recheck`.
-
-        Raises
-        ------
-        AnswerError
-            Nothing is proved, or it is proved of a map that no recheck knows.
-        DeniedError
-            The checker does not confirm it: it is kept as NAME.denied.zip, and what it holds is undecided.
-        """
+    def _write(self, path: str | Path, **how: Any) -> None:
+        """Write what is proved."""
         if self.proof is None:
             raise AnswerError(
                 "the certificate", "without a proof", "safety or progress", "ask for the proof: prove=True"
             )
-        return write_proof(path, self.proof, self.end, recheck=recheck, workers=workers)
+        write_proof(path, self.proof, self.end, **how)
 
     def denied(self, reason: str) -> Feeding:
         """Return what is left of it where the checker denies the certificate: safety and progress are undecided."""

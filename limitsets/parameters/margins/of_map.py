@@ -18,7 +18,6 @@ from limitsets.base import (
     Column,
     Progress,
     Table,
-    Tabled,
     arguments_checked_as,
     as_table,
     picked,
@@ -27,6 +26,7 @@ from limitsets.base import (
 )
 from limitsets.parameters.margins.brackets import NARROWER, Bracket, bracket_fixed
 from limitsets.parameters.margins.margin_result import bound, bound_above
+from limitsets.proofs.prover.certificate import Saved
 from limitsets.proofs.prover.certificate_of_map import write_map
 from limitsets.proofs.prover.numbers import RationalInterval
 from limitsets.proofs.prover.of_map import certify_map, proved_again, refuted_again
@@ -126,7 +126,7 @@ class _Scale:
 
 
 @dataclass(frozen=True, eq=False)
-class MarginOfMap(Tabled):
+class MarginOfMap(Saved):
     """How far one parameter of a map may deviate while every start of some boxes ends in others.
 
     Attributes
@@ -195,25 +195,8 @@ class MarginOfMap(Tabled):
             timings={"margin": self.seconds},
         )
 
-    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
-        """Write one file with the ranges that are proved and the value that is refuted, each a box of parameters.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, replaced whole.
-        recheck : bool
-            Whether to have it checked first.
-        workers : int, optional
-            Processes that check it, as in `limitsets.recheck`.
-
-        Raises
-        ------
-        AnswerError
-            Nothing is proved or refuted, or the map cannot be recorded.
-        DeniedError
-            The checker does not confirm it: it is kept as NAME.denied.zip.
-        """
+    def _write(self, path: str | Path, **how: Any) -> None:
+        """Write the ranges that are proved and the value that is refuted, each a box of parameters."""
         proofs = [*self.pieces, *([] if self.against is None else [self.against])]
         if not proofs:
             raise AnswerError("the margin", "neither proved nor refuted", "one of both", "see its reason")
@@ -223,10 +206,8 @@ class MarginOfMap(Tabled):
             proofs[0].graph.grid.domain,
             [proof.part() for proof in proofs],
             goal=proofs[0].goal.in_file(),
-            recheck=recheck,
-            workers=workers,
+            **how,
         )
-        return Path(path)
 
 
 def require_width(width: float) -> None:

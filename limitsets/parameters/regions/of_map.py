@@ -23,10 +23,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base import AnswerError, Column, Progress, Table, Tabled, arguments_checked, shown
+from limitsets.base import AnswerError, Column, Progress, Table, arguments_checked, shown
 from limitsets.base.arrays import Ints
 from limitsets.parameters.regions.plane import CODES, Cell, Index, cut_where_open, regions, spread
 from limitsets.parameters.regions.writing import CellAxis
+from limitsets.proofs.prover.certificate import Saved
 from limitsets.proofs.prover.certificate_of_map import Part, write_map
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, read_goal
 from limitsets.proofs.prover.of_map import certify_map
@@ -74,7 +75,7 @@ class RecordOfMap(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class RegionsOfMap(Tabled):
+class RegionsOfMap(Saved):
     """A box of parameters of a map in boxes, and what is proved of each.
 
     Attributes
@@ -157,27 +158,8 @@ class RegionsOfMap(Tabled):
         periods = sorted({period for record in held for period in record.periods})
         return number, len(held), self.share(mine), f"{words}{held[0].blocks}", ", ".join(map(str, periods))
 
-    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
-        """Write one file with all boxes, of type `plane`; it gets its name once `limitsets.recheck` has confirmed it.
-
-        Regions do not stand in the file, which is about each box by itself.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, replaced whole.
-        recheck : bool
-            Whether to have it checked first.
-        workers : int, optional
-            Processes that check it, as in `limitsets.recheck`.
-
-        Raises
-        ------
-        AnswerError
-            Nothing is proved or refuted, or the map cannot be recorded.
-        DeniedError
-            The checker does not confirm it: it is kept as NAME.denied.zip.
-        """
+    def _write(self, path: str | Path, **how: Any) -> None:
+        """Write one file of type `plane` with all boxes, each by itself: regions do not stand in it."""
         if not self.code.any():
             remedy = "take finer cells, more halvings or fewer claims"
             raise AnswerError("the regions", "undecided everywhere", "a box that is proved", remedy)
@@ -187,10 +169,8 @@ class RegionsOfMap(Tabled):
             [record.part for record in self.records],
             goal=None if self.goal is None else self.goal.in_file(),
             region=[axis.quantity for axis in self.axes],
-            recheck=recheck,
-            workers=workers,
+            **how,
         )
-        return Path(path)
 
 
 @arguments_checked

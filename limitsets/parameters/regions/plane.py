@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base import AnswerError, Column, Progress, Table, Tabled
+from limitsets.base import AnswerError, Column, Progress, Table
 from limitsets.base.arrays import Array, Arrays, Ints
 from limitsets.feeder.scene import Model, Scene, load
 from limitsets.feeder.scene.quantities import find
@@ -23,6 +23,7 @@ from limitsets.parameters.margins.margin_result import Margin
 from limitsets.parameters.margins.single import goals_of
 from limitsets.parameters.regions.record import CELLS, Record, certify_cell
 from limitsets.parameters.regions.writing import CellAxis, placed, write
+from limitsets.proofs.prover.certificate import Saved
 
 # ----------------------------------------------------------------
 # Regions: cells of parameters that share a face are one where their blocks intersect one to one.
@@ -154,7 +155,7 @@ def cut_where_open(
 
 
 @dataclass(frozen=True, eq=False)
-class Regions(Tabled):
+class Regions(Saved):
     """A plane of two quantities in cells, and the proved record of each.
 
     Attributes
@@ -218,16 +219,10 @@ class Regions(Tabled):
         """
         return spread(self.axes, self.index, np.arange(len(self.index)) if of is None else of)
 
-    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
-        """Write the certificate; it gets its name once `limitsets.recheck` has confirmed it.
-
-        Raises
-        ------
-        DeniedError
-            The checker does not confirm it: it is kept as NAME.denied.zip.
-        """
+    def _write(self, path: str | Path, **how: Any) -> None:
+        """Write all cells, with what is proved of each."""
         arrays: Arrays = {"cells": self.index, "goal": self.code, "region": self.region}
-        return write(path, self.scene, self.axes, arrays, self.records, recheck=recheck, workers=workers)
+        write(path, self.scene, self.axes, arrays, self.records, **how)
 
 
 def certified(

@@ -12,7 +12,6 @@ import numpy as np
 from limitsets.base import (
     AnswerError,
     Table,
-    Tabled,
     arguments_checked,
     as_table,
     facts,
@@ -23,7 +22,7 @@ from limitsets.base.arrays import Arrays
 from limitsets.feeder.scene import BeyondSensor, Model, Scene, Sensor, exact_text, load
 from limitsets.proofs.policies.board import Board, Progress, Starts, board_of
 from limitsets.proofs.policies.policy import NONE, NOT_DECIDED, SOLVED, Found, Policy, search
-from limitsets.proofs.prover.certificate import brackets, pack, tidy
+from limitsets.proofs.prover.certificate import Saved, brackets, pack, tidy
 from limitsets.proofs.prover.cover import Cover, targets
 from limitsets.systems.cells import CellSet, Grid
 
@@ -128,7 +127,7 @@ class Limits(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Synthesis(Board, Tabled):
+class Synthesis(Board, Saved):
     """The answer of a search for a policy with one bit of feedback, and the game that was searched.
 
     Attributes
@@ -169,30 +168,13 @@ class Synthesis(Board, Tabled):
         """Play with another sensor on the same cells, whose images are not computed again."""
         return _play(self, sensor, self.limits)
 
-    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
-        """Write the certificate of a policy that was found; it gets its name once `limitsets.recheck` has confirmed it.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, replaced whole.
-        recheck : bool
-            Whether to have it checked first.
-        workers : int, optional
-            Processes that check it, as in `limitsets.recheck`.
-
-        Raises
-        ------
-        AnswerError
-            There is no policy, or it is one of throws with effects, which no recheck knows.
-        DeniedError
-            The checker does not confirm it: it is kept as NAME.denied.zip.
-        """
+    def _write(self, path: str | Path, **how: Any) -> None:
+        """Write the policy that was found."""
         if self.found.policy is None:
             raise AnswerError(
                 "the certificate", self.found.verdict, "of a policy that was found", "see .found"
             )
-        return write(path, self, self.sensor, self.found.policy, recheck=recheck, workers=workers)
+        write(path, self, self.sensor, self.found.policy, **how)
 
     def denied(self, why: str) -> Synthesis:
         """Return the answer where the checker denies its certificate: nothing is decided."""

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.base import AnswerError, arguments_checked, bar, in_notebook, replaced
+from limitsets.base import AnswerError, Tabled, arguments_checked, bar, in_notebook, replaced
 from limitsets.base.arrays import Array, Arrays
 from limitsets.feeder.scene.units import spelled_plainly
 from limitsets.feeder.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
@@ -154,6 +154,36 @@ def recheck(
 
 # ----------------------------------------------------------------
 # Writing a certificate: all data that a recheck needs, none that it has to trust.
+
+
+class Saved(Tabled):
+    """An answer that can be saved as a certificate: `_write` says what stands in the file."""
+
+    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
+        """Write the certificate of what is proved; it gets its name once `limitsets.recheck` has confirmed it.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, replaced whole.
+        recheck : bool
+            Whether to have it checked first.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
+
+        Raises
+        ------
+        AnswerError
+            Nothing is proved, or it is proved of a map that no recheck knows or that cannot be recorded: the line names
+            the way out.
+        DeniedError
+            The checker does not confirm it: it is kept as NAME.denied.zip, and what it denies is undecided.
+        """
+        self._write(path, recheck=recheck, workers=workers)
+        return Path(path)
+
+    def _write(self, path: str | Path, **how: Any) -> None:
+        raise NotImplementedError  # each answer has its own
 
 
 FORMAT, VERSION = "limitsets-proof", 2

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base import AnswerError, Column, Table, Tabled, as_table, bands_of, picked
+from limitsets.base import AnswerError, Column, Table, as_table, bands_of, picked
 from limitsets.feeder.goals import Goal, Laid, by_side
 from limitsets.feeder.scene import Model, Scene
 from limitsets.feeder.scene.quantities import text_at, texts
 from limitsets.feeder.scene.units import convert, parse
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.certificate import require_proved, write
+from limitsets.proofs.prover.certificate import Saved, require_proved, write
 from limitsets.proofs.prover.end_points import union_of
 from limitsets.proofs.prover.goals import State, hexed, rechecked
 from limitsets.proofs.prover.parameters import whole
@@ -233,7 +233,7 @@ def _starts(starts: Any) -> str | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Proof(Tabled):
+class Proof(Saved):
     """What was proved of a scene.
 
     Attributes
@@ -413,25 +413,8 @@ class Proof(Tabled):
             intervals.setdefault(lo["side"], []).append(pair)
         return intervals
 
-    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
-        """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, replaced whole.
-        recheck : bool
-            Whether to have it checked first.
-        workers : int, optional
-            Processes that check it, as in `limitsets.recheck`.
-
-        Raises
-        ------
-        AnswerError
-            Nothing is proved, or it is proved of a map that no recheck knows.
-        DeniedError
-            The checker does not confirm it: it is kept as NAME.denied.zip, and what it denies is undecided.
-        """
+    def _write(self, path: str | Path, **how: Any) -> None:
+        """Write the claims that are proved."""
         goals = [self.scene.goal for claim in self.claims if claim.claim == "goal"]
         require_checkable(self.effects, goals, "the proof stands in .claims and .to_json()")
         good = [
@@ -447,10 +430,8 @@ class Proof(Tabled):
             noise=self.noise,
             tolerance=self.tolerance,
             unit=self.scene.unit,
-            recheck=recheck,
-            workers=workers,
+            **how,
         )
-        return Path(path)
 
     def denied(self, claims: Mapping[str, str]) -> Proof:
         """Return the proof where the checker denies some claims: these are undecided."""

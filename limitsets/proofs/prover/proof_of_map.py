@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from limitsets.base import (
     Column,
     Table,
-    Tabled,
     as_table,
     bands_of,
     picked,
 )
 from limitsets.base.arrays import Array, Arrays
-from limitsets.proofs.prover.certificate import require_proved
+from limitsets.proofs.prover.certificate import Saved, require_proved
 from limitsets.proofs.prover.certificate_of_map import (
     Part,
     cells_of,
@@ -42,7 +41,7 @@ OF_SLOPES = ("all-cycles", "converges", "cycles", "expanding")
 
 
 @dataclass(frozen=True, eq=False)
-class ProofOfMap(Tabled):
+class ProofOfMap(Saved):
     """What was proved of a map on a grid.
 
     Attributes
@@ -102,28 +101,8 @@ class ProofOfMap(Tabled):
         ends = None if self.goal is None else within_ends(self.goal, grid)
         return cells_of(self.map, self.upper, grid, ends, self.final)
 
-    def save(self, path: str | Path, *, recheck: bool = True, workers: int | None = 1) -> Path:
-        """Write the certificate of the claims that are proved; it gets its name once `recheck` has confirmed it.
-
-        The file holds the formulas of `image_on` (of `image` where a map of one branch has no other) and `margin`, as
-        `limitsets.formulas` shows them, and the proof is of these.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, replaced whole.
-        recheck : bool
-            Whether to have it checked first.
-        workers : int, optional
-            Processes that check it, as in `limitsets.recheck`.
-
-        Raises
-        ------
-        AnswerError
-            Nothing is proved, or the map cannot be recorded: the line names the function and the way out.
-        DeniedError
-            The checker does not confirm it: it is kept as NAME.denied.zip.
-        """
+    def _write(self, path: str | Path, **how: Any) -> None:
+        """Write the claims that are proved, of the formulas that `limitsets.formulas` shows."""
         part = self.part()
         require_proved(part.claims)
         needs_goal = {"ends-in", "refuted"} & set(part.claims)
@@ -132,10 +111,8 @@ class ProofOfMap(Tabled):
             self.graph.grid.domain,
             [part],
             goal=self.goal.in_file() if self.goal and needs_goal else None,
-            recheck=recheck,
-            workers=workers,
+            **how,
         )
-        return Path(path)
 
     def denied(self, claims: Mapping[str, str]) -> ProofOfMap:
         """Return the proof where the checker denies some claims: these are undecided."""
