@@ -32,6 +32,7 @@ class Listed(NamedTuple):
     attracts: bool
     frames: list[list[list[float]]]  # by point a matrix, [] where none is needed
     radius: float | None  # of the balls in these frames that the map contracts
+    unstable: bool
 
 
 def read_box(raw: object, dimension: int, where: str) -> list[Pair]:
@@ -44,7 +45,7 @@ def read_box(raw: object, dimension: int, where: str) -> list[Pair]:
 
 def read_cycle(raw: object, shape: Shape, where: str) -> Listed:
     """Read one orbit."""
-    known, d = table(raw, where, "boxes side branch attracts frames radius"), shape.dimension
+    known, d = table(raw, where, "boxes side branch attracts frames radius", "unstable"), shape.dimension
     boxes = [read_box(box, d, where) for box in rows(known["boxes"], where, 1, MOST_POINTS)]
     p = len(boxes)
     sides = [read_side(side, shape.sides) for side in rows(known["side"], where, p, p)]
@@ -53,6 +54,8 @@ def read_cycle(raw: object, shape: Shape, where: str) -> Listed:
         all(is_whole(b, 0, shape.branches - 1) for b in branches), f"{where}: a branch is not one of the map"
     )
     require(isinstance(known["attracts"], bool), f"{where}: attracts is neither true nor false")
+    unstable = known.get("unstable", False)
+    require(isinstance(unstable, bool), f"{where}: unstable is neither true nor false")
     radius = None if known["radius"] is None else hex_float(known["radius"], where)
     require(radius is None or radius > 0, f"{where}: its radius is not above 0")
     needed = known["attracts"] or radius is not None
@@ -61,7 +64,9 @@ def read_cycle(raw: object, shape: Shape, where: str) -> Listed:
         [[hex_float(v, where) for v in rows(row, where, d, d)] for row in rows(frame, where, d, d)]
         for frame in (rows(known["frames"], where, p, p) if needed else [])
     ]
-    return Listed(boxes, sides, branches, attracts=known["attracts"], frames=frames, radius=radius)
+    return Listed(
+        boxes, sides, branches, attracts=known["attracts"], frames=frames, radius=radius, unstable=unstable
+    )
 
 
 def read_cycles(raw: object, shape: Shape, where: str) -> list[Listed]:
@@ -103,7 +108,7 @@ class Cycle:
         self.hulls: list[tuple[int, list[Pair]]] = []  # side and box around each ball
 
     def prove(self) -> str:
-        """Prove existence, period and, where claimed, that it attracts; "" or the reason."""
+        """Prove existence, period and, where claimed, that it attracts or is unstable; "" or the reason."""
         slopes, bad = slopes_along(self.map, self.listed, self.listed.boxes)
         bad = bad or self.krawczyk(slopes)
         if bad:
@@ -117,8 +122,10 @@ class Cycle:
             self.inverses = [frame.inv() for frame in self.frames]
         except ZeroDivisionError:
             return "a frame is singular"
-        attracts = self.listed.attracts and math.prod(self.stretches(slopes), start=ONE) < 1
-        return "" if attracts or not self.listed.attracts else "that it attracts is not proved"
+        if self.listed.attracts and not math.prod(self.stretches(slopes), start=ONE) < 1:
+            return "that it attracts is not proved"
+        unstable = not self.listed.unstable or self.has_multiplier_above_one(slopes)
+        return "" if unstable else "that it is unstable is not proved"
 
     def krawczyk(self, slopes: list[list[list[Arb]]]) -> str:
         """Prove that K(X), of all points together, lies in the interior of X, and store it; "" or the reason."""
@@ -139,6 +146,12 @@ class Cycle:
             sums = [sum(map(abs, row), ZERO) for row in (b.transpose() * b).tolist()]
             bounds.append(functools.reduce(arb.max, sums).upper().sqrt())  # the ball itself may reach below 0
         return bounds
+
+    def has_multiplier_above_one(self, slopes: list[list[list[Arb]]]) -> bool:
+        """Whether the product of all derivatives has an eigenvalue beyond the unit circle: two, or a real one."""
+        one = matrix(np.eye(self.map.dimension).tolist())
+        whole = functools.reduce(lambda product, slope: matrix(slope) * product, slopes, one)
+        return bool(abs(whole.det()) > 1 or (one - whole).det() < 0 or (one + whole).det() < 0)
 
     def is_apart_from(self, other: "Cycle") -> bool:
         """Whether it is proved that two orbits differ; both are proved."""
@@ -182,7 +195,8 @@ class Cycle:
         """Write period, place and kind."""
         where = " x ".join(interval_in_words(floats_around(v)) for v in self.points[0])
         side = f", side {self.listed.side[0]}" if self.map.shape.sides > 1 else ""
-        return f"period {self.period} in {where}{side}{', attracting' if self.listed.attracts else ''}"
+        kind = ", attracting" if self.listed.attracts else ", unstable" if self.listed.unstable else ""
+        return f"period {self.period} in {where}{side}{kind}"
 
 
 def newton_image(

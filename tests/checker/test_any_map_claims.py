@@ -224,6 +224,35 @@ def test_claims_about_orbits_alone_need_no_cells_and_may_be_many(tmp_path):
     assert "2 periodic orbits: period 1 in [0.749999, 0.750001]; period 2 in" in report.statement[0]
 
 
+@pytest.mark.parametrize(
+    ("slope", "unstable"),
+    [
+        ([[2.0]], True),
+        ([[-1.001]], True),
+        ([[0.999]], False),
+        ([[0.5, 3.0], [0.0, -1.01]], True),  # a real eigenvalue below -1
+        ([[1.01, 3.0], [0.0, 0.2]], True),  # one above 1
+        ([[0.8, -0.8], [0.8, 0.8]], True),  # a spiral, |det| = 1.28
+        ([[0.6, -0.8], [0.8, 0.61]], True),  # |det| = 1.006
+        ([[0.6, -0.8], [0.8, 0.6]], False),  # a rotation
+        ([[0.6, -0.8], [0.8, 0.59]], False),
+        ([[0.5, 0.0, 0.0], [0.0, 0.0, 2.0], [0.0, 0.6, 0.0]], True),  # +- sqrt(1.2): det = -0.6
+        ([[0.5, 0.0, 0.0], [0.0, 0.0, 2.0], [0.0, 0.4, 0.0]], False),
+    ],
+)
+def test_a_fixed_point_is_unstable_where_an_eigenvalue_lies_beyond_the_unit_circle(slope, unstable, tmp_path):
+    def linear(x, *_):
+        return tuple(
+            sum((v * y for v, y in zip(row[1:], x[1:], strict=True)), row[0] * x[0]) for row in slope
+        )
+
+    claims = {"cycles": {"cycles": [cycle([[0.0] * len(slope)]) | {"unstable": True}]}}
+    report = small(linear, None, claims=claims, dimension=len(slope)).recheck(tmp_path)
+    assert report.verdict == ("proved" if unstable else "failed")
+    said = report.statement[0] if unstable else report.reason
+    assert said.endswith(", unstable" if unstable else "that it is unstable is not proved")
+
+
 def test_attracts_all_with_the_ball_of_a_cycle(tmp_path):
     """x' = x/2: every start tends to 0; the number of attractors is exact."""
     half = Example(1, "", lambda x, *_: 0.5 * x[0])

@@ -212,6 +212,16 @@ def attracts_of_an_unstable_cycle(c):
     cycle_of(c).update(attracts=True, frames=[[hexed([1.0])]] * 2)
 
 
+@false(known.seven, "unstable")
+def unstable_though_it_attracts(c):
+    cycle_of(c).update(attracts=False, frames=None, unstable=True)
+
+
+@false(known.seven, "unstable")
+def unstable_and_attracting(c):
+    cycle_of(c)["unstable"] = True
+
+
 @false(known.seven, "frame is singular")
 def singular_frame(c):
     cycle_of(c)["frames"][0] = [hexed([1.0, 2.0]), hexed([1.0, 2.0])]
@@ -468,6 +478,8 @@ ODD_CYCLES = {
     "side true": {"side": [False] * 7},
     "branch 1": {"branch": [1] * 7},
     "attracts is a number": {"attracts": 1},
+    "unstable is a number": {"unstable": 1},
+    "unstable is null": {"unstable": None},
     "frames missing": {"frames": None},
     "frames too few": {"frames": [[hexed([1, 0]), hexed([0, 1])]]},
     "frames of one row": {"frames": [[hexed([1, 0])]] * 7},

@@ -85,6 +85,7 @@ def test_what_is_proved_is_saved_and_rechecked(name, tmp_path):
         ends = [[float.fromhex(end) for end in box[0]] for each in listed for box in each["boxes"]]
         assert any(lo < point < hi and hi - lo < 1e-6 for lo, hi in ends)
         assert listed[0]["attracts"] is (name != "gap")  # 1.4^2 > 1
+        assert listed[0].get("unstable", False) is (name == "gap")
 
 
 def test_a_range_of_parameters_stands_in_the_file_as_it_was_written(tmp_path):

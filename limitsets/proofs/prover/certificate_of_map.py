@@ -47,6 +47,53 @@ NO_CLAIM = -1  # the rank of cells of which nothing is claimed
 IMPOSSIBLE = -2  # the target of a branch that is not taken
 
 
+class Targets(NamedTuple):
+    """The target cells of all cells, on all branches.
+
+    Attributes
+    ----------
+    cells : ndarray of int32, shape (branches, n_cells, 2 d)
+        The first along each axis, then the last: -1 and the number of cells where the image may lie beyond the domain,
+        `IMPOSSIBLE` where the branch is not taken or its image not enclosed.
+    to : ndarray of int32, shape (branches, n_cells)
+        The side that each branch leads to.
+    beyond : ndarray of bool, shape (branches, n_cells)
+        Whether a part of the image may lie beyond the domain.
+    unknown : ndarray of bool, shape (n_cells,)
+        Cells with an image that is not enclosed.
+    """
+
+    cells: Numbers
+    to: Numbers
+    beyond: NDArray[np.bool_]
+    unknown: NDArray[np.bool_]
+
+    @property
+    def lost(self) -> NDArray[np.bool_]:
+        """Cells whose images are not proved to lie in the domain."""
+        return np.asarray(self.unknown | self.beyond.any(axis=0))
+
+
+def targets_of(lower: Any, upper: Any, grid: Grid) -> Targets:
+    """Find the target cells of all cells, for all maps between two corners of parameters."""
+    count, dimension = grid.n_cells, grid.dimension
+    branches = len(kind_of(lower).branches) if kind_of(lower).has_margin else 1
+    cells = np.full((branches, count, 2 * dimension), IMPOSSIBLE, np.int32)
+    to, beyond = np.zeros((branches, count), np.int32), np.zeros((branches, count), dtype=bool)
+    unknown = np.zeros(count, dtype=bool)
+    for side, branch in np.ndindex(grid.sides, branches):
+        mine = np.arange(count)[grid.of_side(side)]
+        boxes = branch_boxes(lower, upper, side, branch, *grid.boxes(mine, side))
+        met, after = _target_cells(grid, boxes.side, boxes.lo, boxes.hi), np.tile(grid.shape[boxes.side], 2)
+        ends = ~np.tile(grid.domain.periodic, 2)
+        enclosed = (boxes.state != NEVER) & (boxes.state != UNKNOWN)
+        unknown[mine] |= boxes.state == UNKNOWN
+        beyond[branch, mine] = enclosed & (((met < 0) | (met >= after)) & ends).any(axis=1)
+        kept = np.where(ends, np.clip(met, -1, after), met)
+        cells[branch, mine[enclosed]], to[branch, mine] = kept[enclosed], boxes.side
+    return Targets(cells, to, beyond, unknown)
+
+
 def cells_of(
     lower: Any,
     upper: Any,
@@ -75,23 +122,11 @@ def cells_of(
         ``edges.S.A``, ``target.B``, `rank` and `component`.  A cell from which an image may leave the domain, is not
         enclosed, or may come to recurrent cells that do not attract, has rank -1.
     """
-    count, dimension = grid.n_cells, grid.dimension
-    branches = len(kind_of(lower).branches) if kind_of(lower).has_margin else 1
-    target = np.full((branches, count, 2 * dimension), IMPOSSIBLE, np.int32)
-    to, lost = np.zeros((branches, count), np.int32), np.zeros(count, dtype=bool)
-    for side, branch in np.ndindex(grid.sides, branches):
-        mine = np.arange(count)[grid.of_side(side)]
-        boxes = branch_boxes(lower, upper, side, branch, *grid.boxes(mine, side))
-        cells = _target_cells(grid, boxes.side, boxes.lo, boxes.hi)
-        first, last = cells[:, :dimension], cells[:, dimension:]
-        within = (first >= 0) & ((last < grid.shape[boxes.side]) | grid.domain.periodic)
-        inside = within.all(axis=1) & (boxes.state != UNKNOWN)
-        lost[mine[(boxes.state != NEVER) & ~inside]] = True
-        chosen = (boxes.state != NEVER) & inside
-        target[branch, mine[chosen]], to[branch, mine] = cells[chosen], boxes.side
+    images = targets_of(lower, upper, grid)
+    target, lost = np.where(images.beyond[..., None], IMPOSSIBLE, images.cells), images.lost
     if final is not None:
         target[:, final >= 0], lost[final >= 0] = IMPOSSIBLE, False
-    component, rank = _labels(_ranges_of(grid, target, to, lost), lost, ends, final)
+    component, rank = _labels(ranges_of(grid, target, images.to, lost), lost, ends, final)
     edges = {
         f"edges.{s}.{axis}": e[:-1] if grid.domain.periodic[axis] else e  # the last is the first again
         for s, axes in enumerate(grid.edges)
@@ -106,7 +141,7 @@ def _target_cells(grid: Grid, side: int, lo: Array, hi: Array) -> Ints:
 
     Along axes that close they are counted on beyond the seam.
     """
-    slack = OF_WIDTH * (hi - lo) + OF_SIZE * np.maximum(np.abs(lo), np.abs(hi))
+    slack = OF_WIDTH * (hi - lo) + OF_SIZE * np.maximum(np.abs(lo), np.abs(hi)) + np.finfo(np.float64).tiny
     axes, bottom, top = grid.edges[side], grid.domain.lo[side], grid.domain.hi[side]
     # An image proved to stay within a face of the domain does so for the checker too: it reaches such an end exactly.
     low_ends = np.where(lo >= bottom, np.maximum(lo - slack, bottom), lo - slack)
@@ -119,7 +154,7 @@ def _target_cells(grid: Grid, side: int, lo: Array, hi: Array) -> Ints:
     return np.stack([*first, *last], axis=1)
 
 
-def _ranges_of(grid: Grid, target: Numbers, to: Numbers, lost: NDArray[np.bool_]) -> Ranges:
+def ranges_of(grid: Grid, target: Numbers, to: Numbers, lost: NDArray[np.bool_]) -> Ranges:
     """Make the graph of the targets; `to` has the side that each branch leads to."""
     cell, branch = np.nonzero(target[:, :, 0].T != IMPOSSIBLE)
     boxes, sides = target[branch, cell], to[branch, cell]
@@ -172,7 +207,14 @@ def widened(lo: Array, hi: Array) -> tuple[Array, Array]:
 
 
 def cycle_in_file(
-    lo: Array, hi: Array, side: Ints, branches: Ints, chosen: Array | None, radius: float | None = None
+    lo: Array,
+    hi: Array,
+    side: Ints,
+    branches: Ints,
+    chosen: Array | None,
+    *,
+    radius: float | None = None,
+    unstable: bool = False,
 ) -> dict[str, Any]:
     """Write a periodic orbit.
 
@@ -186,8 +228,10 @@ def cycle_in_file(
         Frames in which it is contracted, if it attracts.
     radius : float, optional
         Of the balls in these frames that are contracted, if cells lie there.
+    unstable : bool
+        Whether the checker shall prove that it is.
     """
-    return {
+    listed = {
         "boxes": hexed(np.stack(widened(lo, hi), axis=-1)),
         "side": side.tolist(),
         "branch": branches.tolist(),
@@ -195,6 +239,7 @@ def cycle_in_file(
         "frames": None if chosen is None else hexed(chosen),
         "radius": None if radius is None else radius.hex(),
     }
+    return listed | ({"unstable": True} if unstable else {})
 
 
 def frames_to_try(slopes: Array) -> list[Array]:

@@ -8,6 +8,7 @@ orbit outside, but for the stays where orbits pass, which are bounded.
 *Basin*: orbits from the cells all of whose paths end in attracting cells enter these, and stay.
 *Ends in*: the cells of some boxes from which no path leaves these boxes are mapped into each other; from the cells with
 the starts every path leads there.
+*Escapes*: every path from the cells that are counted leads out of the domain (`leaving_of_map`).
 *Expanding*, in one dimension: |dx'/dx| > 1 on every attracting cell, on every branch that is possible there; refuted
 where it is below 1 on all of them.
 *Cycles*: `limitsets.proofs.prover.orbits_of_map`; *all cycles*: `limitsets.proofs.prover.every_orbit`.
@@ -42,7 +43,7 @@ from limitsets.proofs.prover.cycles_of_map import (
 from limitsets.proofs.prover.goal_of_map import missing, read_goal
 from limitsets.proofs.prover.proof import Claim
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
-from limitsets.systems.cells import Grid
+from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import transitions
 from limitsets.systems.graph.components import ranks
 from limitsets.systems.maps import coerce, kernels, kind_of
@@ -102,6 +103,14 @@ def _attracts_all(proof: ProofOfMap) -> Claim:
     # a rank falls with every step, but for those within a recurrent component, through which orbits pass
     most = int(ranks(graph.ranges, parts, settled).max()) + int((stays[stays > 0] - 1).sum())
     return Claim("attracts-all", "proved", "", {"max_rank": most})
+
+
+def _escapes(proof: ProofOfMap) -> Claim:
+    out = CellSet(proof.graph.grid, proof.exits >= 0)
+    if not len(out):
+        return Claim("escapes", "undecided", "no cell is found all of whose starts leave the domain", {})
+    share = out.measure() / float(proof.graph.grid.measure.sum())
+    return Claim("escapes", "proved", "", {"steps": int(proof.exits.max()) + 1, "share": share})
 
 
 def _expanding(proof: ProofOfMap) -> Claim:
@@ -169,6 +178,7 @@ def _with_final(proof: ProofOfMap, claim: str) -> Claim:
 PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "attracts-all": _attracts_all,
     "ends-in": _ends_in,
+    "escapes": _escapes,
     "expanding": _expanding,
     "invariant": _invariant,
     "basin": lambda proof: replace(_invariant(proof), claim="basin"),
@@ -203,7 +213,7 @@ def _wanted(claims: Sequence[str] | None, ends: Any, starts: Any, period: int | 
         raise AnswerError("the claims", ", ".join(wanted), allowed, way)
     beside = {"invariant", "trapping", "expanding"} & set(wanted)
     if "converges" in wanted and beside:
-        allowed = "cycles, basin, attracts-all and ends-in beside converges"
+        allowed = "cycles, basin, attracts-all, ends-in and escapes beside converges"
         raise AnswerError(
             "the claims", ", ".join(wanted), allowed, f"prove {min(beside)} in a call of its own"
         )
@@ -269,6 +279,8 @@ def certify_map(
         raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
     if {"cycles", "converges", "all-cycles"} & set(wanted):
         grid.domain.require_ends("the grid of claims about orbits (cycles, all-cycles, converges)")
+    if "escapes" in wanted:
+        grid.domain.require_ends("the grid of the claim escapes")
     goal = None if ends is None else read_goal(ends, starts, grid.domain)
     guard()
     _require_provable(map)
@@ -291,7 +303,7 @@ def certify_map(
         proof, known["converges"] = converging_claim(proof)
     for word in wanted:
         if word not in known:
-            final = proof.final is not None and word != "ends-in"
+            final = proof.final is not None and word in ("basin", "attracts-all")
             known[word] = _with_final(proof, word) if final else PROVERS[word](proof)
     proof = replace(proof, claims=tuple(known[word] for word in wanted))
     if "ends-in" in known and known["ends-in"].verdict != "proved" and not grid.domain.closes:

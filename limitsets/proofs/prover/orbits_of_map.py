@@ -56,7 +56,8 @@ class CycleOfMap:
     slope_lo, slope_hi : ndarray, shape (d, d)
         Enclosure of the derivative of F^p.
     attracts : bool or None
-        Whether every eigenvalue of it is below 1 in modulus; None where that is open.
+        Whether every eigenvalue of it is below 1 in modulus; False where one is above 1, the orbit being unstable; None
+        where that is open.
     ball : Ball or None
         Balls around its points that the map contracts, if "converges" was asked for.
     """
@@ -74,6 +75,11 @@ class CycleOfMap:
     def period(self) -> int:
         """p, the smallest one."""
         return int(self.side.size)
+
+    @property
+    def kind(self) -> str:
+        """Whether it is attracting or unstable; empty where that is open."""
+        return {True: "attracting", False: "unstable", None: ""}[self.attracts]
 
 
 class Steps(NamedTuple):
@@ -205,19 +211,52 @@ def _ends(a: Matrix) -> tuple[Array, Array]:
     return lo, hi
 
 
+def _determinant(a: Matrix) -> Intervals:
+    """Enclose a determinant, by its first row."""
+    minors = ([[*row[:j], *row[j + 1 :]] for row in a[1:]] for j in range(len(a)))
+    terms = [
+        v * _determinant(minor) * (-1.0) ** j if minor else v
+        for j, (v, minor) in enumerate(zip(a[0], minors, strict=True))
+    ]
+    return reduce(add, terms)
+
+
+def _unstable(slope: Matrix) -> bool:
+    """Whether each of some matrices M has an eigenvalue beyond the unit circle, by its size or as a real one.
+
+    |det M| > 1; or det(1 - M) < 0, and so a real one above 1: det(s - M) > 0 for large s; or det(1 + M) < 0 and so a
+    real one below -1.
+    """
+    rows, size = range(len(slope)), _determinant(slope).absolute()
+    above, below = (
+        _determinant([[slope[i][j] * sign + float(i == j) for j in rows] for i in rows])
+        for sign in (-1.0, 1.0)
+    )
+    return bool(size.lo[0] > 1.0 or above.hi[0] < 0.0 or below.hi[0] < 0.0)
+
+
 def _attracts(slope: Matrix) -> bool | None:
     """Whether every eigenvalue lies in the unit disc: of a 2 x 2 matrix by |det| < 1 and |trace| < 1 + det (Jury)."""
-    if len(slope) == 1:
-        size = slope[0][0].absolute()
-        return True if size.hi[0] < 1.0 else (False if size.lo[0] > 1.0 else None)
+    if _unstable(slope):
+        return False
     if len(slope) > 2:
         return None  # open: the checker knows such orbits, and asks for nothing
-    (a, b), (c, d) = slope
-    det, trace = a * d - b * c, (a + d).absolute()
-    room = det + 1.0 - trace
-    if det.absolute().hi[0] < 1.0 and room.lo[0] > 0.0:
-        return True
-    return False if det.absolute().lo[0] > 1.0 or room.hi[0] < 0.0 else None
+    if len(slope) == 1:
+        return True if slope[0][0].absolute().hi[0] < 1.0 else None
+    det, trace = _determinant(slope), (slope[0][0] + slope[1][1]).absolute()
+    return True if det.absolute().hi[0] < 1.0 and (det + 1.0 - trace).lo[0] > 0.0 else None
+
+
+def _product(slopes: Intervals) -> Matrix:
+    """Multiply the derivatives (p, d, d) of the steps of an orbit."""
+    return reduce(lambda product, each: _times(each, product), map(_matrix, slopes.lo, slopes.hi))
+
+
+@np.errstate(all="ignore")
+def is_unstable_in_file(corners: Corners, cycle: CycleOfMap) -> bool:
+    """Whether an orbit is unstable by slopes on boxes beyond those of its certificate, for which the checker asks."""
+    slopes = slopes_on(corners, *widened(*widened(cycle.lo, cycle.hi)), cycle)
+    return slopes is not None and _unstable(_product(slopes))
 
 
 @np.errstate(all="ignore")  # a singular matrix or an overflow gives inf and nan, which prove nothing
@@ -272,5 +311,5 @@ def _proved(corners: Corners, at: Intervals, cycle: Cycle, lies: Lies) -> CycleO
         return "its boxes do not lie in the cells that it is looked for in"
     if not _confirmed(corners, *widened(at.lo, at.hi), cycle):
         return "its boxes are too wide for a certificate"
-    slope = reduce(lambda product, each: _times(each, product), map(_matrix, step[1].lo[0], step[1].hi[0]))
+    slope = _product(Intervals(step[1].lo[0], step[1].hi[0]))
     return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from limitsets.base import (
 from limitsets.base.arrays import Array, Arrays
 from limitsets.proofs.prover.certificate import Saved, require_proved
 from limitsets.proofs.prover.certificate_of_map import (
+    Numbers,
     Part,
     cells_of,
     cycle_in_file,
@@ -29,7 +31,8 @@ from limitsets.proofs.prover.certificate_of_map import (
 )
 from limitsets.proofs.prover.converging import attracting_frames
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, within_ends
-from limitsets.proofs.prover.orbits_of_map import CycleOfMap, slopes_of, slopes_on
+from limitsets.proofs.prover.leaving_of_map import with_exits
+from limitsets.proofs.prover.orbits_of_map import CycleOfMap, is_unstable_in_file, slopes_of, slopes_on
 from limitsets.proofs.prover.proof import Claim, left_of
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph
@@ -101,6 +104,11 @@ class ProofOfMap(Saved):
         ends = None if self.goal is None else within_ends(self.goal, grid)
         return cells_of(self.map, self.upper, grid, ends, self.final)
 
+    @functools.cached_property
+    def exits(self) -> Numbers:
+        """One less than the steps within which all starts of a cell leave the domain, -1: not proved; (n_cells,)."""
+        return np.asarray(with_exits(self.arrays, self.map, self.upper, self.graph.grid)["exit"])
+
     def _write(self, path: str | Path, **how: Any) -> None:
         """Write the claims that are proved, of the formulas that `limitsets.formulas` shows."""
         part = self.part()
@@ -130,8 +138,10 @@ class ProofOfMap(Saved):
             claims["converges"] = {"components": [*range(len(drawn))], "cycles": drawn}
         if claims and self.cycles:
             claims["cycles"] = cycles
-        of_cells = set(claims) - {"cycles", "all-cycles"}
-        return Part((self.map, self.upper), claims, self.arrays if of_cells else {})
+        arrays = self.arrays if set(claims) - {"cycles", "all-cycles"} else {}
+        if "escapes" in claims:
+            arrays = with_exits(arrays, self.map, self.upper, self.graph.grid)
+        return Part((self.map, self.upper), claims, arrays)
 
     def functions(self, claim: str) -> str:
         """Name the functions of the map that a claim is proved of: `image` may be another, but for a sample."""
@@ -166,14 +176,36 @@ class ProofOfMap(Saved):
         ]
         caption = f"Proofs of {type(self.map).__name__}, of {self.functions('invariant')}"
         claims = Table(("claim", "verdict", "of", "missing"), rows, caption)
+        tables = [claims]
+        if self.cycles:
+            tables.append(_cycle_table(self.cycles))
+        for each in self.claims:
+            if each.claim == "escapes" and each.verdict == "proved":
+                within = f"every start leaves the domain within {each.section['steps']} steps"
+                share = f"{math.floor(1000 * each.section['share']) / 10} % of it"
+                out = CellSet(self.graph.grid, self.exits >= 0)
+                tables.append(_region(out, "Leaving cells", f"{within}; {share}"))
         if not len(self.cells):
-            return (claims,)
+            return tuple(tables)
         kind = "no image leads out" if self.final is None else "no image leads out, or orbits tend to a cycle"
         kept = _region(self.cells, "Attracting cells", kind)
-        return claims, kept, _region(self.enters, "Basin", "every point of its cells enters them")
+        return *tables, kept, _region(self.enters, "Basin", "every point of its cells enters them")
 
     def __str__(self) -> str:
         return "\n\n".join(table.text() for table in self.tables())
+
+
+def _cycle_table(cycles: tuple[CycleOfMap, ...]) -> Table:
+    """Say of which period orbits are, through which box their first points lie, and whether they attract."""
+    names = ["x"] if cycles[0].lo.shape[1] == 1 else [f"x[{axis}]" for axis in range(cycles[0].lo.shape[1])]
+    rows = [
+        (cycle.period, int(cycle.side[0]), *zip(cycle.lo[0], cycle.hi[0], strict=True), cycle.kind)
+        for cycle in cycles
+    ]
+    spans = [Column(name, show=".6g", ends=True) for name in names]
+    return Table(
+        ("period", "side", *spans, "kind"), rows, "Periodic orbits", "proved: each by one of its points"
+    )
 
 
 def _region(cells: CellSet, caption: str, proved: str) -> Table:
@@ -208,6 +240,8 @@ def _cycle_section(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
     # branches that are names alone are one in the file
     branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
     boxes = cycle.lo, cycle.hi, cycle.side, branches
+    corners = proof.map, proof.upper
     if cycle.ball is not None:
-        return cycle_in_file(*boxes, cycle.ball.frames, cycle.ball.radius)
-    return cycle_in_file(*boxes, frames_of((proof.map, proof.upper), cycle) if cycle.attracts else None)
+        return cycle_in_file(*boxes, cycle.ball.frames, radius=cycle.ball.radius)
+    unstable = cycle.attracts is False and is_unstable_in_file(corners, cycle)
+    return cycle_in_file(*boxes, frames_of(corners, cycle) if cycle.attracts else None, unstable=unstable)

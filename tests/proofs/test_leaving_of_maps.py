@@ -1,0 +1,114 @@
+"""Starts that leave the domain: what theory says of the logistic map beyond 4, and orbits that are followed."""
+
+import math
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.base.errors import AnswerError, GridError
+
+
+def logistic(x, r):
+    return r * x * (1.0 - x)
+
+
+def doubled(x):
+    return 2.0 * x
+
+
+def halved(x):
+    return 0.5 * x
+
+
+def zero(x):
+    return 0.0 * x
+
+
+def odd(x, a):
+    return a * x - x**3
+
+
+def henon(x, y, a, b=0.3):
+    return 1.0 - a * x**2 + y, b * x
+
+
+def escaping(proof, tmp_path):
+    """Cells that leave, within how many steps all of them, and what the checker says."""
+    assert proof.proved
+    report = ls.recheck(proof.save(tmp_path / "escapes.proof.zip"))
+    assert report.verdict == "proved"
+    (said,) = (line for line in report.statement if line.startswith("escapes"))
+    (claim,) = (claim for claim in proof.claims if claim.claim == "escapes")
+    assert claim.section["steps"] == proof.exits.max() + 1
+    return proof.exits, claim.section["steps"], said
+
+
+def test_the_gap_of_the_logistic_map_leaves_at_once(tmp_path):
+    """4.5 x (1 - x) > 1 on (1/3, 2/3), and its two preimages leave in two steps."""
+    proof = ls.certify(ls.map(logistic, r=4.5), ls.grid([(0.0, 1.0)], cells=1000), ["escapes"])
+    exits, steps, said = escaping(proof, tmp_path)
+    edges = np.arange(1001) / 1000
+    assert np.array_equal(exits == 0, (edges[:-1] > 1 / 3) & (edges[1:] < 2 / 3))
+    low, high = (0.5 - math.sqrt(0.25 - y / 4.5) for y in (1 / 3, 2 / 3))
+    second = edges[:-1][(exits == 1) & (edges[:-1] < 0.5)]
+    assert low < second.min() < low + 0.002
+    assert high - 0.003 < second.max() < high - 0.001
+    share = float((exits >= 0).mean())
+    assert said.endswith(f"leaves it within {steps} steps")
+    assert f"{100 * share:.1f} % of it; {(exits >= 0).sum()} of 1000 cells" in str(proof)
+    # almost every start leaves: finer cells show more of them
+    finer = ls.certify(ls.map(logistic, r=4.5), ls.grid([(0.0, 1.0)], cells=20_000), ["escapes"])
+    assert finer.claims[0].section["share"] > share + 0.1
+
+
+def test_every_start_leaves_where_the_fixed_point_lies_outside(tmp_path):
+    proof = ls.certify(ls.map(doubled), ls.grid([(1.0, 3.0)], cells=100), ["escapes"])
+    exits, steps, said = escaping(proof, tmp_path)
+    assert (steps, exits.min()) == (2, 0)  # 1 -> 2 -> 4
+    assert "cover all of [1.0, 3.0]" in said
+
+
+def test_starts_of_henons_map_outside_its_basin(tmp_path):
+    """Of every cell that leaves all orbits do, for both ends of the range and a value between."""
+    lower = ls.map(henon, a=1.4)
+    grid = ls.grid([(-3, 3), (-3, 3)], cells=200)
+    proof = ls.certify(lower, grid, ["escapes"], upper=lower.with_values(a=1.41))
+    exits, _, _ = escaping(proof, tmp_path)
+    assert exits[grid.index(np.array([[0.6, 0.2]]), 0)] == -1  # next to the fixed point
+    numbers = np.flatnonzero(exits >= 0)
+    lo, hi = grid.boxes(numbers, 0)
+    for a, at in ((1.4, 0.0), (1.405, 0.4), (1.41, 1.0)):
+        x, y = (lo + at * (hi - lo)).T
+        inside = np.ones(x.size, dtype=bool)
+        for k in range(exits.max() + 1):
+            x, y = 1.0 - a * x**2 + y, 0.3 * x
+            inside &= (np.abs(x) <= 3) & (np.abs(y) <= 3)
+            assert not inside[exits[numbers] <= k].any()
+            x, y = np.where(inside, x, 0.0), np.where(inside, y, 0.0)
+
+
+def test_leaving_stands_beside_claims_of_those_that_stay(tmp_path):
+    """1.5 x - x^3 tends to +- sqrt(1/2) from within +- sqrt(2.5), and leaves from beyond."""
+    claims = ["converges", "basin", "escapes"]
+    proof = ls.certify(ls.map(odd, a=1.5), ls.grid([(-2.1, 2.1)], cells=2000), claims)
+    exits, _, _ = escaping(proof, tmp_path)
+    middles = proof.graph.grid.centres(0)
+    assert (exits[np.abs(middles) > math.sqrt(2.5) + 0.01] >= 0).all()
+    assert (exits[np.abs(middles) < math.sqrt(2.5)] == -1).all()
+    assert not (proof.enters.mask & (exits >= 0)).any()
+
+
+def test_where_no_start_leaves():
+    proof = ls.certify(ls.map(halved), ls.grid([(-1.0, 1.0)], cells=16), ["escapes"])
+    assert [claim.verdict for claim in proof.claims] == ["undecided"]
+    with pytest.raises(AnswerError, match="without a proved claim"):
+        proof.save("escapes.proof.zip")
+    with pytest.raises(GridError, match="the claim escapes"):
+        ls.certify(ls.map(doubled), ls.grid([(0.0, 1.0)], cells=16, periodic=True), ["escapes"])
+
+
+@pytest.mark.parametrize("box", [(-1.0, 1.0), (0.0, 1.0), (-1.0, 0.0)])
+def test_an_image_that_is_a_border_of_cells_lies_in_one_of_them(box, tmp_path):
+    proof = ls.certify(ls.map(zero), ls.grid([box], cells=4), ["invariant", "attracts-all"])
+    assert ls.recheck(proof.save(tmp_path / "zero.proof.zip")).verdict == "proved"
