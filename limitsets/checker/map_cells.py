@@ -24,10 +24,10 @@ MOST_CELLS_OF_MAP = 2**31
 class MapCells:
     """The arrays of one box of parameters; cells of all sides one after another, the last axis fastest.
 
-    `exits`: whether there are cells from which orbits leave the domain.
+    `exits`: whether there are cells from which orbits leave the domain; `weights`: whether cells have a weight.
     """
 
-    def __init__(self, arrays: Arrays, prefix: str, shape: Shape, *, exits: bool):
+    def __init__(self, arrays: Arrays, prefix: str, shape: Shape, *, exits: bool, weights: bool):
         sides, d = range(shape.sides), shape.dimension
         self.periods = [[period_of(text) for text in axes] for axes in shape.periods]
         self.closed = [np.array([period is not None for period in axes]) for axes in self.periods]
@@ -41,8 +41,10 @@ class MapCells:
         self.rank, self.component = (arrays.read(prefix + name, "<i4") for name in ("rank", "component"))
         # without a claim of it no array of the file is read, and no cell has an exit
         self.exit = arrays.read(f"{prefix}exit", "<i4") if exits else np.minimum(self.rank, -1)
+        self.weight = arrays.read(f"{prefix}weight", "<f8") if weights else np.zeros(len(self.rank))
+        self.thin = (self.rank < 0) & weights  # the cells that starts thin out of
         labels = (self.rank, self.component, self.exit)
-        alike = all(len(one) == sum(sizes) for one in (*self.target, *labels))
+        alike = all(len(one) == sum(sizes) for one in (*self.target, *labels, self.weight))
         require(alike, "the arrays do not have one row for each cell")
         require(all(bool((one >= -1).all()) for one in labels), "a rank, a component or an exit is below -1")
         self.counts = np.array(counts, dtype=np.int64)
@@ -51,8 +53,8 @@ class MapCells:
         self.require_targets()
 
     def require_targets(self) -> None:
-        """Require that targets are cells; from cells with an exit they may lie beyond the grid too, as -1 and n."""
-        beyond = ((self.exit >= 0) & (self.rank < 0)).astype(np.int64)
+        """Require that targets are cells; with an exit or a weight they may lie beyond the grid too, as -1 and n."""
+        beyond = (((self.exit >= 0) & (self.rank < 0)) | self.thin).astype(np.int64)
         for b, target in enumerate(self.target):
             for s, to in enumerate(self.to[b]):
                 cells = slice(int(self.start[s]), int(self.start[s + 1]))
@@ -68,6 +70,19 @@ class MapCells:
                 fits = np.where(self.closed[to], round_it, fits)
                 sound = bool((fits.all(axis=1) | (target[cells] == -2).all(axis=1)).all())
                 require(sound, f"side {s}, branch {b}: target cells are out of range")
+
+    def checked(self, final: Array) -> Array:
+        """Mark the cells whose images are checked."""
+        return ((self.rank >= 0) & ~final) | (self.exit >= 0) | self.thin
+
+    def thin_may_leave(self) -> bool:
+        """Whether targets of cells that starts thin out of lie beyond the grid, on a line."""
+        own = [slice(*ends) for ends in itertools.pairwise(self.start.tolist())]
+        return any(
+            bool(((rows == -1) | (rows == self.counts[to[s], 0])).any())
+            for target, to in zip(self.target, self.to, strict=True)
+            for s, rows in enumerate(target[cells][self.thin[cells]] for cells in own)
+        )
 
     def side_of(self, cells: Array) -> Array:
         """Return the side of each of some cells."""

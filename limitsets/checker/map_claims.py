@@ -15,6 +15,7 @@ from .map_cells import MapCells, check_map_task, map_tasks, prepare_map
 from .map_cycles import Cycle
 from .map_file import OF_ORBITS, Goal, MapFile, Part, Regions
 from .map_orbits import check_every
+from .map_weights import check_weights
 from .map_words import Outcome, box_in_words, outcome_of
 
 
@@ -35,6 +36,9 @@ def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[dict
         failed |= {"refuted": why} if why else {}
     if part.cells is not None and not (bad and part.drawn):
         failed |= check_cells(part, number, file, cycles, crew)
+        thins = "almost-every" in part.claims and "almost-every" not in failed
+        why = check_weights(the_map, part.cells) if thins else ""
+        failed |= {"almost-every": why} if why else {}
     return failed, cycles
 
 
@@ -104,7 +108,7 @@ def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], cre
         assert file.goal is not None
         bad = check_ends_in(c, attracting, hulls, file.goal)
         failed |= {"ends-in": bad} if bad else {}
-    chosen = np.flatnonzero(((c.rank >= 0) & ~final) | (c.exit >= 0))
+    chosen = np.flatnonzero(c.checked(final))
     strict = attracting & ("trapping" in claims)
     failure = crew.run(list(map_tasks(c, number, chosen, strict, np.where(attracting, part.least, 0.0))))
     if failure is None:
@@ -164,7 +168,7 @@ def check_ends_in(c: MapCells, attracting: Array, hulls: Regions, goal: Goal) ->
 def check_map_file(file: MapFile, workers: int, progress: Any) -> tuple[list[Outcome], int]:
     """Check a file; what became of each box of parameters, and the number of pieces of cells."""
     with_cells = [(part.cells, final_cells(part)) for part in file.parts if part.cells is not None]
-    work = sum(int((((c.rank >= 0) & ~final) | (c.exit >= 0)).sum()) for c, final in with_cells)
+    work = sum(int(c.checked(final).sum()) for c, final in with_cells)
     advance = None if progress is None else (lambda done: progress(min(done, work), work))
     setup = file.shape, [part.parameters for part in file.parts]
     crew = Crew(setup, workers, advance, prepare=prepare_map, check=check_map_task)

@@ -26,6 +26,7 @@ CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "ends-in": "",
     "expanding": "least",
     "escapes": "",
+    "almost-every": "",
     "refuted": "",
 }
 OF_ORBITS = (
@@ -135,6 +136,8 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     require(
         cells_alone, f"{where}: this checker knows no claim about orbits, or exits, beside axes with a period"
     )
+    on_a_line = shape.dimension == 1 and not shape.closes
+    require(on_a_line or "almost-every" not in known, f"{where}: almost-every is of one axis, which ends")
     require(goal is not None or not {"ends-in", "refuted"} & set(known), f"{where}: there is no goal")
     if "refuted" in known:
         require(set(claims) == {"refuted", "cycles"}, f"{where}: a refutation has to stand with cycles alone")
@@ -144,8 +147,9 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     cycles = read_cycles(known["cycles"]["cycles"], shape, where) if "cycles" in known else []
     drawn = read_drawn(known["converges"], cycles, where) if "converges" in known else []
     every = read_every(known["all-cycles"], shape, where) if "all-cycles" in known else None
-    about_cells, exits = set(known) - {"cycles", "all-cycles", "refuted"}, "escapes" in known
-    cells = MapCells(arrays, box["prefix"], shape, exits=exits) if about_cells else None
+    about_cells = set(known) - {"cycles", "all-cycles", "refuted"}
+    labels = {"exits": "escapes" in known, "weights": "almost-every" in known}
+    cells = MapCells(arrays, box["prefix"], shape, **labels) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
     numbers = read_numbers(known, shape, where)
     return Part(parameters, known, unknown, cycles, every=every, drawn=drawn, **numbers, cells=cells)

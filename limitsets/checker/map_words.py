@@ -95,11 +95,14 @@ class Proved:
         more = [f"{len(own) - MOST_NAMED} more"] if len(own) > MOST_NAMED else []
         return "; ".join([*(component_in_words(self.cells, k) for k in own[:MOST_NAMED]), *more])
 
+    def sets(self) -> list[str]:
+        """Say where orbits come."""
+        sets = ["into the attracting cells and stays"] if self.attracting() else []
+        return sets + (["into cells that tend to a cycle"] if self.part.drawn else [])
+
     def comes(self, most: int) -> str:
         """Say where orbits come, and when."""
-        sets = ["the attracting cells and stays"] if self.attracting() else []
-        sets += ["cells that tend to a cycle"] if self.part.drawn else []
-        return f"comes within {most} step{'' if most == 1 else 's'} into {', or into '.join(sets)}"
+        return f"comes within {most} step{'' if most == 1 else 's'} {', or '.join(self.sets())}"
 
     def cycle_list(self) -> str:
         """List the orbits."""
@@ -146,6 +149,13 @@ class Proved:
         steps = int(self.cells.exit.max()) + 1
         return f"every start in cells that cover {share} leaves it within {steps} step{'' if steps == 1 else 's'}"
 
+    def almost(self) -> str:
+        """Say where almost every start comes."""
+        leaves = ["leaves it"] if self.cells.thin_may_leave() else []
+        ways = ", or ".join([*(f"comes {where}" for where in self.sets()), *leaves])
+        domain = domain_in_words(self.cells, self.shape)
+        return f"almost every start in {domain} (all but a set of length 0) {ways}"
+
 
 SENTENCES: dict[str, Callable[[Proved], str]] = {
     "cycles": Proved.cycle_list,
@@ -160,6 +170,7 @@ SENTENCES: dict[str, Callable[[Proved], str]] = {
     "ends-in": Proved.of_goal,
     "expanding": Proved.growth,
     "escapes": Proved.leaving,
+    "almost-every": Proved.almost,
     "refuted": lambda proved: (
         f"an open set of starts, around a point of a cycle, violates: {proved.of_goal()}"
     ),
@@ -180,10 +191,15 @@ def component_in_words(c: MapCells, component: int) -> str:
     return f"component {component} ({len(cells)} cells in {where}{elsewhere})"
 
 
+def domain_in_words(c: MapCells, shape: Shape) -> str:
+    """Write the domain, by its box where it has one side."""
+    first = [(float(e[0]), float(e[-1])) for e in c.edges[0]]
+    return box_in_words(first) if shape.sides == 1 else "the domain"
+
+
 def share_in_words(c: MapCells, shape: Shape, chosen: Array) -> str:
     """Write the share of the domain that lies in the chosen cells, rounded down."""
-    first = [(float(e[0]), float(e[-1])) for e in c.edges[0]]
-    domain = box_in_words(first) if shape.sides == 1 else "the domain"
+    domain = domain_in_words(c, shape)
     if chosen.all():
         return f"all of {domain}"
     held = whole = 0.0

@@ -253,6 +253,25 @@ def test_a_fixed_point_is_unstable_where_an_eigenvalue_lies_beyond_the_unit_circ
     assert said.endswith(", unstable" if unstable else "that it is unstable is not proved")
 
 
+def test_the_steps_of_an_unstable_cycle_are_multiplied_in_their_order(tmp_path):
+    """Of (x, y) -> (y, 0) -> (0, x) -> (0, 2 y): in this order y doubles, in the opposite one all comes to 0."""
+
+    def turned(x, p, side, _):
+        return [(x[1], 0.0 * x[0]), (0.0 * x[0], x[0] + 0.0), (0.0 * x[0], 2.0 * x[1])][side]
+
+    for unstable, verdict in (((0, 1, 2), "proved"), ((2, 1, 0), "failed")):
+        steps = Example(
+            2,
+            "",
+            lambda x, p, side, b, order=unstable: turned(x, p, order[side], b),
+            sides=3,
+            to=lambda side, _: (side + 1) % 3,
+        )
+        listed = cycle(np.zeros((3, 2)), sides=[0, 1, 2]) | {"unstable": True}
+        report = MapCertificate(steps, [({}, {"cycles": {"cycles": [listed]}}, None)]).recheck(tmp_path)
+        assert report.verdict == verdict, report.reason
+
+
 def test_attracts_all_with_the_ball_of_a_cycle(tmp_path):
     """x' = x/2: every start tends to 0; the number of attractors is exact."""
     half = Example(1, "", lambda x, *_: 0.5 * x[0])

@@ -1,4 +1,8 @@
-"""Starts that leave the domain: what theory says of the logistic map beyond 4, and orbits that are followed."""
+"""Starts that leave the domain, and almost every start: what theory says of maps, and orbits that are followed.
+
+In the window of period 3 the logistic map has an attracting 3-cycle, to which almost every start tends, and beside it
+a Cantor set of starts that do not; for r = 4 almost every orbit is dense.
+"""
 
 import math
 
@@ -27,6 +31,22 @@ def zero(x):
 
 def odd(x, a):
     return a * x - x**3
+
+
+def swapped(x):
+    return 1.0 - x
+
+
+def left_third(x):
+    return 3.0 * x
+
+
+def right_third(x):
+    return 3.0 - 3.0 * x
+
+
+def beyond_half(x):
+    return x - 0.5
 
 
 def henon(x, y, a, b=0.3):
@@ -104,7 +124,7 @@ def test_where_no_start_leaves():
     assert [claim.verdict for claim in proof.claims] == ["undecided"]
     with pytest.raises(AnswerError, match="without a proved claim"):
         proof.save("escapes.proof.zip")
-    with pytest.raises(GridError, match="the claim escapes"):
+    with pytest.raises(GridError, match="the claims escapes"):
         ls.certify(ls.map(doubled), ls.grid([(0.0, 1.0)], cells=16, periodic=True), ["escapes"])
 
 
@@ -112,3 +132,81 @@ def test_where_no_start_leaves():
 def test_an_image_that_is_a_border_of_cells_lies_in_one_of_them(box, tmp_path):
     proof = ls.certify(ls.map(zero), ls.grid([box], cells=4), ["invariant", "attracts-all"])
     assert ls.recheck(proof.save(tmp_path / "zero.proof.zip")).verdict == "proved"
+
+
+# ------------------------------------------------------------------------------ almost every start
+
+
+def tents():
+    return ls.map(pieces=(left_third, right_third), margin=beyond_half)
+
+
+COMES, LEAVES, TENDS = (
+    "comes into the attracting cells and stays",
+    "leaves it",
+    "comes into cells that tend to a cycle",
+)
+THINNING = {
+    "period 3": (lambda: ls.map(logistic, r=3.832), (0.0, 1.0), 1024, "trapping", COMES),
+    "period 3, tends": (lambda: ls.map(logistic, r=3.832), (0.0, 1.0), 4096, "converges", TENDS),
+    "beyond 4": (lambda: ls.map(logistic, r=4.5), (0.0, 1.0), 500, "escapes", LEAVES),
+    "middle thirds": (tents, (0.0, 1.0), 999, "", LEAVES),
+    "all but 0": (lambda: ls.map(doubled), (-1.0, 1.0), 10, "", LEAVES),
+    "two cycles": (
+        lambda: ls.map(odd, a=1.8),
+        (-2.5, 2.5),
+        1000,
+        "converges escapes",
+        f"{TENDS}, or {LEAVES}",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", THINNING)
+def test_almost_every_start_comes_to_cells_with_a_rank_or_leaves(name, tmp_path):
+    make, box, cells, others, words = THINNING[name]
+    lower, grid = make(), ls.grid([box], cells=cells)
+    proof = ls.certify(lower, grid, ["almost-every", *others.split()])
+    assert proof.proved
+    report = ls.recheck(proof.save(tmp_path / "almost.proof.zip"))
+    (said,) = (line for line in report.statement if line.startswith("almost-every"))
+    assert (
+        said
+        == f"almost-every: almost every start in [{box[0]}, {box[1]}] (all but a set of length 0) {words}"
+    )
+    # random starts are none of the exceptions
+    x = np.random.default_rng(0).uniform(*box, 2000)
+    inside, arrived = np.ones(x.size, dtype=bool), np.zeros(x.size, dtype=bool)
+    for _ in range(3000):
+        inside &= (box[0] <= x) & (x <= box[1])
+        arrived |= inside & (
+            proof.arrays["rank"][np.where(inside, grid.index(np.clip(x, *box)[:, None], 0), 0)] >= 0
+        )
+        x, _, _, _ = ls.maps.advance(lower, np.where(inside, x, 0.5), np.zeros(x.size, int), 1)
+    assert (arrived | ~inside).all()
+
+
+def test_almost_every_start_for_a_range_of_parameters(tmp_path):
+    lower = ls.map(logistic, r=3.832)
+    upper = lower.with_values(r=3.8325)
+    proof = ls.certify(
+        lower, ls.grid([(0.0, 1.0)], cells=2048), ["almost-every", "attracts-all"], upper=upper
+    )
+    # the repelling fixed points stay
+    assert [claim.verdict for claim in proof.claims] == ["proved", "undecided"]
+    report = ls.recheck(proof.save(tmp_path / "range.proof.zip"))
+    assert report.map["boxes"][0]["holds_for"].endswith("changed at every step too: almost-every")
+
+
+@pytest.mark.parametrize(
+    ("make", "box", "reason"),
+    [
+        (lambda: ls.map(swapped), [(0.0, 1.0)], "are not seen to thin out"),
+        (lambda: ls.map(logistic, r=4.0), [(0.0, 1.0)], "the slope may be 0 on [0.48"),
+        (lambda: ls.map(henon, a=1.4), [(-1.5, 1.5), (-0.5, 0.5)], "in one dimension only"),
+    ],
+)
+def test_what_does_not_thin_out_is_undecided(make, box, reason):
+    proof = ls.certify(make(), ls.grid(box, cells=64), ["almost-every"])
+    assert [claim.verdict for claim in proof.claims] == ["undecided"]
+    assert reason in proof.claims[0].reason

@@ -68,7 +68,7 @@ def certify(
         A built-in name, a TOML file, or a map FILE.py:NAME; the Python file is run.
     claim : C,C
         What to prove: attracts-all, invariant, trapping, cycles, expanding; of a scene also end-points, goal; of a map
-        also basin, escapes and, with --ends, ends-in; repeatable.
+        also basin, escapes, almost-every and, with --ends, ends-in; repeatable.
     tolerance : Q=DEV
         Of a scene: a quantity that is fixed but unknown, like throw.speed='0.7 %'; repeatable.
     noise : Q=DEV

@@ -9,6 +9,7 @@ orbit outside, but for the stays where orbits pass, which are bounded.
 *Ends in*: the cells of some boxes from which no path leaves these boxes are mapped into each other; from the cells with
 the starts every path leads there.
 *Escapes*: every path from the cells that are counted leads out of the domain (`leaving_of_map`).
+*Almost every*, in one dimension: the starts that stay in cells without a rank thin out (there too).
 *Expanding*, in one dimension: |dx'/dx| > 1 on every attracting cell, on every branch that is possible there; refuted
 where it is below 1 on all of them.
 *Cycles*: `limitsets.proofs.prover.orbits_of_map`; *all cycles*: `limitsets.proofs.prover.every_orbit`.
@@ -41,6 +42,7 @@ from limitsets.proofs.prover.cycles_of_map import (
     refuted_by_cycle,
 )
 from limitsets.proofs.prover.goal_of_map import missing, read_goal
+from limitsets.proofs.prover.leaving_of_map import with_weights
 from limitsets.proofs.prover.proof import Claim
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.systems.cells import CellSet, Grid
@@ -113,6 +115,15 @@ def _escapes(proof: ProofOfMap) -> Claim:
     return Claim("escapes", "proved", "", {"steps": int(proof.exits.max()) + 1, "share": share})
 
 
+def _almost_every(proof: ProofOfMap) -> Claim:
+    if proof.graph.grid.dimension != 1:
+        reason = "that starts thin out is proved in one dimension only"
+        return Claim("almost-every", "undecided", reason, {}, final=True)
+    weighted = with_weights(proof.arrays, proof.map, proof.upper, proof.graph.grid)
+    reason = weighted if isinstance(weighted, str) else ""
+    return Claim("almost-every", "undecided" if reason else "proved", reason, {})
+
+
 def _expanding(proof: ProofOfMap) -> Claim:
     grid = proof.graph.grid
     if grid.dimension != 1:
@@ -176,6 +187,7 @@ def _with_final(proof: ProofOfMap, claim: str) -> Claim:
 
 
 PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
+    "almost-every": _almost_every,
     "attracts-all": _attracts_all,
     "ends-in": _ends_in,
     "escapes": _escapes,
@@ -213,7 +225,7 @@ def _wanted(claims: Sequence[str] | None, ends: Any, starts: Any, period: int | 
         raise AnswerError("the claims", ", ".join(wanted), allowed, way)
     beside = {"invariant", "trapping", "expanding"} & set(wanted)
     if "converges" in wanted and beside:
-        allowed = "cycles, basin, attracts-all, ends-in and escapes beside converges"
+        allowed = "cycles, basin, attracts-all, ends-in, escapes and almost-every beside converges"
         raise AnswerError(
             "the claims", ", ".join(wanted), allowed, f"prove {min(beside)} in a call of its own"
         )
@@ -279,8 +291,8 @@ def certify_map(
         raise AnswerError("the grid", None, "the cells to prove the claims on", f"pass {way}")
     if {"cycles", "converges", "all-cycles"} & set(wanted):
         grid.domain.require_ends("the grid of claims about orbits (cycles, all-cycles, converges)")
-    if "escapes" in wanted:
-        grid.domain.require_ends("the grid of the claim escapes")
+    if {"escapes", "almost-every"} & set(wanted):
+        grid.domain.require_ends("the grid of the claims escapes and almost-every")
     goal = None if ends is None else read_goal(ends, starts, grid.domain)
     guard()
     _require_provable(map)

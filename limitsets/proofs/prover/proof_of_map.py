@@ -31,7 +31,7 @@ from limitsets.proofs.prover.certificate_of_map import (
 )
 from limitsets.proofs.prover.converging import attracting_frames
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, within_ends
-from limitsets.proofs.prover.leaving_of_map import with_exits
+from limitsets.proofs.prover.leaving_of_map import with_exits, with_weights
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, is_unstable_in_file, slopes_of, slopes_on
 from limitsets.proofs.prover.proof import Claim, left_of
 from limitsets.systems.cells import CellSet
@@ -141,6 +141,10 @@ class ProofOfMap(Saved):
         arrays = self.arrays if set(claims) - {"cycles", "all-cycles"} else {}
         if "escapes" in claims:
             arrays = with_exits(arrays, self.map, self.upper, self.graph.grid)
+        if "almost-every" in claims:
+            weighted = with_weights(arrays, self.map, self.upper, self.graph.grid)
+            assert not isinstance(weighted, str)  # it was proved so
+            arrays = weighted
         return Part((self.map, self.upper), claims, arrays)
 
     def functions(self, claim: str) -> str:
