@@ -88,6 +88,35 @@ def test_what_is_proved_is_saved_and_rechecked(name, tmp_path):
         assert listed[0].get("unstable", False) is (name == "gap")
 
 
+def henon(x, y):
+    return 1.0 - 1.4 * x**2 + y, 0.3 * x
+
+
+@pytest.mark.parametrize(
+    ("make", "box", "kinds"),
+    [
+        # the 2-cycle has lost its stability at 1 + sqrt(6) = 3.449, the 4-cycle that has come from it not yet
+        (
+            lambda: ls.map(logistic, r=3.5),
+            [(0.1, 0.9)],
+            [(1, "unstable"), (2, "unstable"), (4, "attracting")],
+        ),
+        # saddles
+        (
+            lambda: ls.map(henon),
+            [(-1.5, 1.5), (-0.5, 0.5)],
+            [(1, "unstable"), (1, "unstable"), (2, "unstable"), (4, "unstable")],
+        ),
+    ],
+)
+def test_the_kind_of_every_orbit_is_said_in_print_and_in_the_file(make, box, kinds, tmp_path):
+    proof = ls.certify(make(), ls.grid(box, cells=64), ["all-cycles"], period=4)
+    (orbits,) = (table for table in proof.tables() if table.caption == "Periodic orbits")
+    assert [(row[0], row[-1]) for row in orbits.rows] == kinds
+    said = ls.recheck(proof.save(tmp_path / "orbits.proof.zip")).statement[0]
+    assert [each.split()[-1] for each in said.split(";")] == [kind for _, kind in kinds]
+
+
 def test_a_range_of_parameters_stands_in_the_file_as_it_was_written(tmp_path):
     _, file, _ = certified("range", tmp_path)
     assert header_of(file)["boxes"][0]["parameters"] == {"r": ["2.3", "2.35"]}

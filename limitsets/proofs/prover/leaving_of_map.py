@@ -30,8 +30,8 @@ from limitsets.systems.cells import Grid
 from limitsets.systems.graph.components import ranks, reach, strong_components
 from limitsets.systems.maps.derived import branch_boxes
 
-# Factors by which weights are to fall with every step, at most so many terms, and a term that will not come down.
-THETAS, TERMS, TOO_LARGE = (0.5, 0.8, 0.95, 0.99, 0.999), 5_000, 1e100
+# What a step brings is at most this share of the weights; at most so many terms, and a size from which none comes down.
+THETA, TERMS, TOO_LARGE = 0.999, 5_000, 1e100
 
 
 def exits_of(images: Targets, grid: Grid) -> Numbers:
@@ -104,10 +104,9 @@ def _links(
             lo, hi = grid.boxes(flat[:1], side)
             where = f"[{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
             return f"the slope may be 0 on {where}, from where orbits may come to cells without a rank"
-        new = np.ones(cells.size, dtype=bool)
-        kept = used[1:][(np.diff(cells[used]) == 1) & (np.diff(np.sign(slope[used])) == 0)]
-        new[kept] = False
-        run = runs + np.cumsum(new)
+        sign = np.zeros(cells.size)
+        sign[used] = np.sign(slope[used])
+        run = runs + np.cumsum((np.diff(cells, prepend=-2) != 1) | (np.diff(sign, prepend=2.0) != 0))
         parts.append((run[owner], cells[owner], target, np.abs(slope[owner])))
         runs += cells.size
     run, cell, target, slopes = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -128,14 +127,13 @@ def _step(run: Ints, cell: Ints, target: Ints, slope: Array) -> Callable[[Array]
 
 
 def _weight(step: Callable[[Array], Array], first: Array) -> Array | None:
-    """Add up weights until the next term is no larger than the first, for the smallest factor for which that ends."""
-    for theta in THETAS:
-        weight = term = first
-        for _ in range(TERMS):
-            term = step(term) / theta
-            if (term <= first).all():
-                return weight
-            if term.max() > TOO_LARGE:
-                break
-            weight = weight + term
+    """Add up terms until the next is no larger than the first, which is 1 on some cells; None where none comes."""
+    weight = term = first
+    for _ in range(TERMS):
+        term = step(term) / THETA
+        if (term <= first).all():
+            return weight
+        if term.max() > TOO_LARGE:
+            break
+        weight = weight + term
     return None

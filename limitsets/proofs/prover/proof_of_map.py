@@ -40,7 +40,7 @@ from limitsets.systems.maps import kind_of
 from limitsets.systems.sets.basin import passing
 
 # Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
-OF_SLOPES = ("all-cycles", "converges", "cycles", "expanding")
+OF_SLOPES = ("all-cycles", "almost-every", "converges", "cycles", "expanding")
 
 
 @dataclass(frozen=True, eq=False)
