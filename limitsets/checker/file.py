@@ -23,6 +23,7 @@ import numpy as np
 from flint import arb
 
 from .balls import Arb, Array, exact, span
+from .labels import Labelled, Way, range_max
 
 # ----------------------------------------------------------------
 # Texts, quantities with units, and JSON: how the checker reads and writes them.
@@ -348,7 +349,7 @@ def section_alone(
 
 
 @dataclass
-class Cells:
+class Cells(Labelled):
     """The arrays of one box; the cells of all sides stand one after another."""
 
     edges: list[Array]
@@ -379,6 +380,16 @@ class Cells:
         side = int(self.side[cell])
         k = cell - int(self.start[side])
         return f"side {side}, cell {cell}, x in [{float(self.edges[side][k])!r}, {float(self.edges[side][k + 1])!r}]"
+
+    def ways(self) -> list[Way]:
+        """Return a jog and a flip."""
+
+        def extremes(targets: Array, label: Array, cells: Array) -> tuple[Array, Array]:
+            first, last = targets[cells].T
+            return -range_max(-label, first, last), range_max(label, first, last)
+
+        both = (("a jog", self.jog), ("a flip", self.flip))
+        return [Way(name, to[:, 0] >= 0, functools.partial(extremes, to)) for name, to in both]
 
 
 OTHERS = "there are other arrays too"

@@ -760,4 +760,4 @@ def test_range_max_is_the_maximum():
     first = rng.integers(0, 700, 3000)
     last = np.minimum(699, first + (rng.exponential(60, 3000)).astype(int))
     want = [values[a : b + 1].max() for a, b in zip(first, last, strict=True)]
-    assert (checker.cells.range_max(values, first, last) == want).all()
+    assert (checker.labels.range_max(values, first, last) == want).all()
