@@ -387,7 +387,7 @@ def test_what_is_weaker_is_still_true(tmp_path, known):
         ((*FEEDBACK, "sensor"), {"beyond": "20 in", "side": 2}, "two questions"),
         ((*FEEDBACK, "sensor"), {"error": "1 in"}, "asks nothing"),
         ((*FEEDBACK, "sensor", "error"), "-0.1 in", "negative"),
-        (("map", "flight"), "small-angle", "different models"),
+        (("scene", "flight"), "small-angle", "different models"),
     ],
 )
 def test_what_cannot_be_read(tmp_path, known, where, value, reason):
