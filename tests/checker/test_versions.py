@@ -35,7 +35,10 @@ ODD = {  # what is changed, and what the reason names
     "a key more": (put("state", "x [in]"), "unknown key state"),
     "no noise": (leave_out("noise"), "noise missing"),
     "a map beside the scene": (put("map", {"flight": "exact", "flip": "signed"}), "goal, plane missing"),
-    "a map in place of the scene": (lambda f: f.header.update(map=f.header.pop("scene")), "goal, plane missing"),
+    "a map in place of the scene": (
+        lambda f: f.header.update(map=f.header.pop("scene")),
+        "goal, plane missing",
+    ),
     "neither a map nor a scene": (leave_out("scene"), "scene missing"),
     "a key more in the scene": (put("scene", "name", "throw"), "scene: unknown key name"),
     "a key less in the scene": (leave_out("scene", "flip"), "scene: flip missing"),
@@ -97,7 +100,10 @@ def test_version_2_is_read_as_version_3(good, tmp_path):
 
 
 OLD = {  # of version 2: what is changed, and what the reason names
-    "a scene beside the map": (put("scene", {"flight": "small-angle", "flip": "energy"}), "unknown key scene"),
+    "a scene beside the map": (
+        put("scene", {"flight": "small-angle", "flip": "energy"}),
+        "unknown key scene",
+    ),
     "a key more in the map": (put("map", "note", ""), "map: unknown key note"),
     "a key less in the map": (leave_out("map", "flip"), "map: flip missing"),
     "another map": (put("map", "name", "logistic"), "not throw, version 1"),

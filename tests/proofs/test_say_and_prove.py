@@ -201,7 +201,9 @@ WAYS = {
     "version 2": put("version", 2),
     "version 4": put("version", 4),
     "another model in the header": put("scene", "flip", "energy"),
-    "a map beside the scene": put("map", {"name": "throw", "version": 1, "flight": "exact", "flip": "signed"}),
+    "a map beside the scene": put(
+        "map", {"name": "throw", "version": 1, "flight": "exact", "flip": "signed"}
+    ),
     "format in capitals": put("format", "LIMITSETS-PROOF"),
     "a claim in capitals": put("claims", 4, "claim", "Goal"),
     "a claim with a blank": put("claims", 4, "claim", "goal "),
