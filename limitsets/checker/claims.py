@@ -12,7 +12,7 @@ import numpy as np
 from .cells import Crew, check_components, check_ranks, check_structure, tasks_of
 from .end_points import check_ends, ends_statement, read_ends
 from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
-from .file import Cells, hex_float, plain, require, rounded, table
+from .file import Cells, hex_float, plain, read_sections, require, rounded, table
 from .goals import GOALS, check_goal, is_laid, read_goal_claim, statement_of_goal
 from .near_hinge import check_below_cells, fixed_points_in_words, read_near_hinge
 from .refutations import (
@@ -28,13 +28,11 @@ from .scene import Scene, check_by_halves
 Failed = tuple[list[str], str]  # the claims that fail, and the reason
 
 
-def read_claims(
-    sections: dict[str, Any], n_sides: int
-) -> tuple[dict[str, dict[str, Any]], list[tuple[str, str, str]]]:
-    """Read the sections of the claims that can be checked, by name, and name the claims that cannot."""
+def read_claims(value: object, n_sides: int) -> tuple[dict[str, dict[str, Any]], list[tuple[str, str, str]]]:
+    """Read the claims that can be checked, name -> section, and those that cannot."""
     known: dict[str, dict[str, Any]] = {}
     unknown = []
-    for name, section in sections.items():
+    for name, section in read_sections(value).items():
         if name not in CLAIMS:
             unknown.append((plain(name), "not rechecked", "this checker does not know the claim"))
         elif section is None:

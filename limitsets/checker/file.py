@@ -338,8 +338,8 @@ def read_boxes(value: object, keys: str, most: int) -> list[dict[str, Any]]:
     return boxes
 
 
-def read_sections(value: object, where: str, least: int) -> dict[str, Any]:
-    """Read a list of claims, each made once: the section of each by its name."""
+def read_sections(value: object, where: str = "claims", least: int = 1) -> dict[str, Any]:
+    """Read a list of claims, so many at least and each made once: the section of each by its name."""
     sections: dict[str, Any] = {}
     for claim in rows(value, where, least, 100):
         name = table(claim, f"{where}: a claim", "claim section")["claim"]
@@ -352,8 +352,9 @@ def section_alone(
     header: dict[str, Any], word: str, of: str, keys: str, nothing: str, *, noisy: bool = False
 ) -> dict[str, Any]:
     """Return the section of a claim that stands alone in a file, which says so for a file with more in it."""
-    require(len(header["claims"]) == 1, f"the claims of {of} are more than one")
-    section = table(header["claims"][word], f"section of {word}", keys)
+    sections = read_sections(header["claims"])
+    require(len(sections) == 1, f"the claims of {of} are more than one")
+    section = table(sections[word], f"section of {word}", keys)
     quiet = header["tolerance"] is None and (noisy or header["noise"] is None)
     require(header["boxes"] == [] and quiet, nothing)
     return section

@@ -256,8 +256,8 @@ def check_certificate(path: str | os.PathLike[str], workers: int, progress: Prog
         recheck_map(read_map_file(header, entries), workers, progress, report)
         return
     table(header, "header.json", f"scene {OF_SCENES}", "producer")
-    header = header | {"claims": read_sections(header["claims"], "claims", 1)}
-    alone = next((word for word in ALONE if word in header["claims"]), None)
+    claimed = read_sections(header["claims"])
+    alone = next((word for word in ALONE if word in claimed), None)
     if alone is not None:
         read, check, noise_of = ALONE[alone]
         content = read(header, entries)
