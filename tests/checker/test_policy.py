@@ -366,7 +366,11 @@ def test_what_is_weaker_is_still_true(tmp_path, known):
     ("where", "value", "reason"),
     [
         (("claims", 0, "verdict"), "proved", "unknown key verdict"),
-        (("claims",), [{"claim": "policy"}, {"claim": "invariant", "section": {}}], "claims of a policy"),
+        (
+            ("claims",),
+            [{"claim": word, "section": {}} for word in ("policy", "invariant")],
+            "claims of a policy",
+        ),
         (("boxes",), [{}], "no boxes"),
         (("tolerance",), {"throw.speed": "1 %"}, "no tolerance"),
         ((*AT, "mode"), "hold", "neither stop nor catch"),
