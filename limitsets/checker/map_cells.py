@@ -4,6 +4,7 @@ docs/certificates.md, "Certificates of any map": the arrays of a box, and the tw
 """
 
 import functools
+import itertools
 import math
 import operator
 from collections.abc import Iterator
