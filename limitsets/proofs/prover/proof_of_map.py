@@ -30,6 +30,7 @@ from limitsets.proofs.prover.certificate_of_map import (
 from limitsets.proofs.prover.converging import attracting_frames
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, within_ends
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, slopes_of, slopes_on
+from limitsets.proofs.prover.programs import begins_of
 from limitsets.proofs.prover.proof import Claim, left_of
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph
@@ -121,7 +122,9 @@ class ProofOfMap(Saved):
 
     def part(self) -> Part:
         """Give what a certificate holds of this box of parameters; a refuted goal stands by itself."""
-        cycles = {"cycles": [_cycle_section(self, cycle) for cycle in self.cycles]}
+        cycles: dict[str, Any] = {"cycles": [_cycle_section(self, cycle) for cycle in self.cycles]}
+        if self.graph.grid.domain.closes:
+            cycles["begins"] = begins_of(self.graph.grid.domain)
         if any(each.claim == "ends-in" and each.verdict == "refuted" for each in self.claims):
             return Part((self.map, self.upper), {"cycles": cycles, "refuted": {}}, {})
         claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
@@ -208,6 +211,8 @@ def _cycle_section(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
     # branches that are names alone are one in the file
     branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
     boxes = cycle.lo, cycle.hi, cycle.side, branches
+    turns = {} if cycle.turns is None else {"turns": cycle.turns.tolist()}
     if cycle.ball is not None:
-        return cycle_in_file(*boxes, cycle.ball.frames, cycle.ball.radius)
-    return cycle_in_file(*boxes, frames_of((proof.map, proof.upper), cycle) if cycle.attracts else None)
+        return cycle_in_file(*boxes, cycle.ball.frames, cycle.ball.radius) | turns
+    frames = frames_of((proof.map, proof.upper), cycle) if cycle.attracts else None
+    return cycle_in_file(*boxes, frames) | turns
