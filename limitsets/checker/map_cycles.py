@@ -114,7 +114,7 @@ def slopes_along(the_map: Map, listed: Listed, boxes: Boxes) -> tuple[list[list[
 
 
 class Cycle:
-    """A periodic orbit of a file, for all parameters of a box; `prove` shows that exactly one lies in its boxes."""
+    """A periodic orbit of a file, for all parameters of a box; `prove` shows that one such orbit lies in its boxes."""
 
     def __init__(self, the_map: Map, listed: Listed, begins: Begins):
         self.map, self.listed, self.begins, self.period = the_map, listed, begins, len(listed.boxes)

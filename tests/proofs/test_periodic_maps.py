@@ -173,6 +173,17 @@ def test_a_goal_is_refuted_by_an_orbit_that_goes_round(tmp_path: Path) -> None:
     assert ls.recheck(proved.save(tmp_path / "tongue.proof.zip", recheck=False)).verdict == "proved"
 
 
+def test_margin_of_a_goal_on_a_circle(tmp_path: Path) -> None:
+    """The fixed point, where k sin(2 pi x) = -2 pi omega, comes to the end 0.6 of the goal at k sin(0.2 pi) / 2 pi."""
+    params = ls.map(circle, omega=0.05, k=0.9)
+    (margin,) = ls.margin(params, line(0.0, 256), "omega", ends=[[(0.5, 0.6)]], starts=[[(0.0, 0.9)]])
+    limit = 0.9 * math.sin(0.2 * math.pi) / math.tau - 0.05
+    assert 0.8 * limit < margin.proved < limit < margin.refuted < 1.01 * limit
+    report = ls.recheck(margin.save(tmp_path / "margin.proof.zip", recheck=False))
+    assert report.verdict == "proved", report
+    assert report.claims[-1][1:] == ("refuted", "")
+
+
 def test_that_orbits_are_all_is_refused() -> None:
     with pytest.raises(GridError, match="all turns of each step"):
         ls.certify(ls.map(doubling), line(0.0, 8), ["all-cycles"], period=2)
