@@ -277,3 +277,36 @@ def test_boxes_of_parameters_begin_alike(tmp_path):
     assert made.recheck(tmp_path).verdict == "proved"
     made.claims(1)["cycles"]["begins"] = [hexed([-0.3125, -0.25])]
     assert made.recheck(tmp_path).verdict == "bad file"
+
+
+# ---------------------------------------------------------------- sides
+
+
+def on_two_sides(periods, points, turns):
+    """Side 0 is sent to side 1 by x / 2 + 9 / 4, and back by x / 2 + 3."""
+    example = Example(
+        1,
+        "",
+        lambda x, p, side, _: 0.5 * x[0] + (3.0 if side else 2.25),
+        sides=2,
+        to=lambda side, _: 1 - side,
+    )
+    listed = cycle([[x] for x in points], sides=[0, 1]) | {"turns": [[k] for k in turns]}
+    begins = [[None if period is None else hexed(-0.25)] for period in periods]
+    made = MapCertificate(example, [({}, {"cycles": {"cycles": [listed], "begins": begins}}, None)])
+    made.header["map"]["periodic"] = [[period] for period in periods]
+    return made
+
+
+@pytest.mark.parametrize(
+    ("periods", "points", "turns", "verdict"),
+    [
+        (("1", "2"), (1 / 6, 1 / 3), (1, 3), "proved"),  # y = x / 2 + 1 / 4, x = y / 2
+        (("2", "1"), (1 / 6, 1 / 3), (1, 3), "failed"),
+        (("1", "2"), (1 / 6, 1 / 3), (3, 1), "failed"),
+        (("1", None), (1 / 6, 7 / 3), (0, 4), "proved"),  # y = x / 2 + 9 / 4, x = y / 2 - 1
+        (("1", None), (1 / 6, 7 / 3), (4, 0), "bad file"),
+    ],
+)
+def test_turns_are_of_the_side_that_a_step_leads_to(periods, points, turns, verdict, tmp_path):
+    assert on_two_sides(periods, points, turns).recheck(tmp_path).verdict == verdict
