@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from limitsets.errors import AnswerError, GridError
 
 import limitsets as ls
 from limitsets.proofs.prover import cycles_of_map
+from limitsets.systems.cells import Domain
 from tests.graph.test_periodic_axes import TORUS, cat, circle, doubling, line, standard, turn
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
@@ -171,6 +172,29 @@ def test_a_goal_is_refuted_by_an_orbit_that_goes_round(tmp_path: Path) -> None:
     )
     assert proved.proved, proved.claims
     assert ls.recheck(proved.save(tmp_path / "tongue.proof.zip", recheck=False)).verdict == "proved"
+
+
+class Handover(NamedTuple):
+    rate: float
+
+
+def handed_over(p, x, side):
+    """Take circles of length 1 and 2 to each other."""
+    return p.rate * x + (2.25 if side == 0 else 3.0), 1 - side, 0
+
+
+ls.register(Handover, image=handed_over)
+
+
+def test_circles_of_two_lengths(tmp_path: Path) -> None:
+    """Modulo 2 y = x / 2 + 1 / 4, modulo 1 x = y / 2: the orbit is 1/6, 1/3."""
+    grid = ls.grid(Domain([[-0.25], [-0.25]], [[0.75], [1.75]], periodic=(True,)), cells=64)
+    proof = ls.certify(Handover(0.5), grid, ["converges", "basin"])
+    assert proof.proved, proof.claims
+    (cycle,) = proof.cycles
+    assert cycle.lo[:, 0] == pytest.approx([1 / 6, 1 / 3])
+    assert cycle.turns.ravel().tolist() == [1, 3]
+    assert ls.recheck(proof.save(tmp_path / "two.proof.zip", recheck=False)).verdict == "proved"
 
 
 def test_margin_of_a_goal_on_a_circle(tmp_path: Path) -> None:
