@@ -17,38 +17,32 @@ A function that checks a statement returns "" where it proves the statement, and
 The files follow docs/certificates.md, and each imports only from those before it:
 
     balls        the arithmetic of every proof
-    texts        texts, quantities and JSON
-    file         the zip, the header and the arrays                               "The file"
+    labels       components and ranks, by whole numbers                           5
+    file         the zip, the header and the arrays; texts, quantities and JSON   "The file"
     part         side by side, what the part is like
     scene        the part on the arm, kappa, noise and tolerance                  "What is claimed"
     model        the formulas of a throw
     cells        structure and ranks; decision, landing and images of every cell  1 to 5
     near_hinge   starts before the first cell                                     6, "The surface above the joint"
-    thinning     backward reachability and thinning                               7, 8
-    starts       the starts for which a goal holds                                "For which starts"
+    starts       the starts for which a goal holds                                7, 8, "For which starts"
     two_throws   two throws with the same parameters                              9
     goals        the goals                                                        "Goals"
     end_points   end points of the limit set                                      10 to 12
-    orbits       periodic orbits                                                  13
-    refutations  orbits that refute a goal                                        "Refutations"
-    arm_end      what can be reached before the end of the arm                    17
-    feeding      what comes to rest beyond it                                     "Feeding"
+    refutations  periodic orbits, and orbits that refute a goal                   13, "Refutations"
+    feeding      what can be reached before the end of the arm, and beyond it     17, "Feeding"
     region       one cell of a plane of parameters                                "Regions"
     plane        a plane of parameters in cells, and its regions
-    policy       a policy for a sensor of one bit                                 "Policies"
-    beliefs      its table                                                        "Tables of a policy"
+    policy       a policy for a sensor of one bit, and its table                  "Policies"
     claims       the claims of a file, and what each needs
-    speeds       throws whose speed deviates                                      18, 19
     averages     means over a throw's deviations, in floats                       20, 21
-    chain        one step of a bound                                              22
     landings     the throws of one side of a noisy chain, and their branches      18, 19
     links        what a step needs of every cell, and the chain of it             20, 21
-    chances      a claim of probabilities                                         "Probabilities"
-    brackets     its brackets                                                     22
+    brackets     a claim of probabilities, and its brackets                       22, "Probabilities"
     program      formulas as operations: read, evaluated, printed                 "Certificates of any map"
     any_map      the map of a file, and one cell of it
     map_cells    the cells, their labels
     map_cycles   periodic orbits, and balls around them
+    map_orbits   lists of all orbits
     map_plane    regions of parameters, and shares of them
     map_file     the file of a map
     map_words    what is proved, in sentences

@@ -17,11 +17,11 @@ from .averages import INFLATE, OUTERMOST, Mesh, Rows, Spread, mean_rows
 from .balls import Array, exact
 from .file import (
     LENGTHS,
+    Arrays,
     hex_float,
     number_and_unit,
     plain,
     quantity,
-    read_array,
     read_side,
     require,
     rounded,
@@ -110,22 +110,14 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
 
 
 def read_brackets(
-    said: Any, entries: dict[str, memoryview], names: list[str], scene: Scene
+    said: object, entries: dict[str, memoryview], names: list[str], scene: Scene
 ) -> tuple[list[Array], dict[str, Array]]:
     """Read the arrays: the edges of the cells of each side, and the brackets of each name."""
-    n_sides = len(scene.sides)
-    wanted = {**{f"edges.{i}": 1 for i in range(n_sides)}, **{f"within.{k}": 2 for k in range(len(names))}}
-    there = isinstance(said, dict) and set(said) == set(wanted)
-    require(
-        there and {f"{name}.npy" for name in wanted} == set(entries), "the arrays are others than expected"
-    )
-    read = {
-        name: read_array(entries[f"{name}.npy"], name, "<f8", columns, said[name])
-        for name, columns in wanted.items()
-    }
-    edges = [read[f"edges.{i}"] for i in range(n_sides)]
+    arrays = Arrays(said, entries)
+    edges = [arrays.read(f"edges.{i}", "<f8") for i in range(len(scene.sides))]
     require_edges(edges, scene)
-    within = {name: read[f"within.{k}"] for k, name in enumerate(names)}
+    within = {name: arrays.read(f"within.{k}", "<f8", 2) for k, name in enumerate(names)}
+    arrays.require_no_others()
     lengths = {len(each) for each in within.values()}
     require(len(lengths) == 1 and 1 <= lengths.pop() <= MOST_BRACKETS + 1, "the brackets are not alike many")
     return edges, within

@@ -40,18 +40,6 @@ SMALL = 20_000  # up to so many cells no other process is started
 Targets = tuple[Pair, Pair]  # the ends of the target cells of a jog and of a flip
 
 
-def range_max(values: Array, first: Array, last: Array) -> Array:
-    """Return max(values[first..last]) of each range, from maxima over windows of length 2^k, one k at a time."""
-    level = np.frexp((last - first + 1).astype(np.float64))[1] - 1  # floor(log2), exact for integers
-    out = np.zeros(len(first), dtype=np.int64)
-    window = values.astype(np.int64)
-    for k in range(int(level.max(initial=0)) + 1):
-        q = np.flatnonzero(level == k)
-        out[q] = np.maximum(window[first[q]], window[last[q] - (1 << k) + 1])
-        window = np.maximum(window[: -(1 << k)], window[1 << k :])
-    return out
-
-
 def marked(ranges: Array, n: int) -> Array:
     """Mark the cells of some ranges, each given by its first and its last one."""
     begin, past = (np.bincount(at, minlength=n + 1) for at in (ranges[:, 0], ranges[:, 1] + 1))
@@ -104,20 +92,9 @@ def first_bad(c: Cells, checks: list[tuple[Array, str]]) -> str:
 
 
 def check_components(c: Cells) -> str:
-    """Check that component cells map into cells of their own component; "" or the reason."""
-    if not (c.component >= 0).any():
-        return "there are no attracting cells"
-    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
-        q = np.flatnonzero((array[:, 0] >= 0) & (c.component >= 0))
-        first, last = array[q, 0], array[q, 1]
-        own = c.component[q]
-        good = np.ones(len(c.component), dtype=bool)
-        highest, lowest = range_max(c.component, first, last), -range_max(-c.component, first, last)
-        good[q] = (highest == own) & (lowest == own)
-        bad = first_bad(c, [(good, f"a {what} may leave its component")])
-        if bad:
-            return bad
-    return ""
+    """Check that component cells, of which there are some, map into their own component; "" or the reason."""
+    attracting = c.component >= 0
+    return c.check_components(attracting) if attracting.any() else "there are no attracting cells"
 
 
 def check_ranks(c: Cells, scene: Scene, max_rank: int) -> str:
@@ -126,15 +103,12 @@ def check_ranks(c: Cells, scene: Scene, max_rank: int) -> str:
         if Fraction(float(edges[-1])) < scene.arm[1]:
             return f"side {i}: the cells end before arm.length"
     inside = c.component >= 0
-    checks = [(~inside | (c.rank == 0), "a cell of a component has a rank above 0")]
-    checks.append((c.rank >= 0, "nothing is claimed of starts in it: its rank is -1"))
-    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
-        q = np.flatnonzero((array[:, 0] >= 0) & ~inside)
-        good = np.ones(len(inside), dtype=bool)
-        good[q] = range_max(c.rank, array[q, 0], array[q, 1]) < c.rank[q]
-        checks.append((good, f"the rank does not fall along a {what}"))
-    checks.append((c.rank <= max_rank, f"its rank is above max_rank = {max_rank}"))
-    return first_bad(c, checks)
+    checks = [
+        (~inside | (c.rank == 0), "a cell of a component has a rank above 0"),
+        (c.rank >= 0, "nothing is claimed of starts in it: its rank is -1"),
+        (c.rank <= max_rank, f"its rank is above max_rank = {max_rank}"),
+    ]
+    return first_bad(c, checks) or c.check_falling("rank", c.rank, ~inside)
 
 
 def extents(c: Cells, some: Array, *, inward: bool = False) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from .cells import Crew, check_components, check_ranks, check_structure, tasks_of
 from .end_points import check_ends, ends_statement, read_ends
 from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
-from .file import Cells, hex_float, plain, require, rounded, rows, table
+from .file import Cells, hex_float, plain, read_sections, require, rounded, table
 from .goals import GOALS, check_goal, is_laid, read_goal_claim, statement_of_goal
 from .near_hinge import check_below_cells, fixed_points_in_words, read_near_hinge
 from .refutations import (
@@ -32,17 +32,14 @@ def read_claims(value: object, n_sides: int) -> tuple[dict[str, dict[str, Any]],
     """Read the claims that can be checked, name -> section, and those that cannot."""
     known: dict[str, dict[str, Any]] = {}
     unknown = []
-    for claim in rows(value, "claims", 1, 100):
-        table(claim, "a claim", "claim", "section")
-        name, section = claim["claim"], claim.get("section")
-        if not isinstance(name, str) or name not in CLAIMS:
+    for name, section in read_sections(value).items():
+        if name not in CLAIMS:
             unknown.append((plain(name), "not rechecked", "this checker does not know the claim"))
         elif section is None:
             unknown.append((name, "not rechecked", "the claim has no section"))
         elif name == "goal" and isinstance(section, dict) and section.get("kind") not in list(GOALS):
             unknown.append((name, "not rechecked", "this checker does not know the kind of goal"))
         else:
-            require(name not in known, f"claim {name} is made twice")
             kind = CLAIMS[name]
             if name != "goal":  # whose keys depend on its kind, see GOALS
                 section = table(section, f"section of {name}", kind.keys, kind.more)

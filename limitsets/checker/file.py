@@ -23,6 +23,7 @@ import numpy as np
 from flint import arb
 
 from .balls import Arb, Array, exact, span
+from .labels import Labelled, Way, range_max
 
 # ----------------------------------------------------------------
 # Texts, quantities with units, and JSON: how the checker reads and writes them.
@@ -329,26 +330,39 @@ def open_certificate(path: str | os.PathLike[str]) -> tuple[dict[str, Any], dict
     return header, stored_entries(entries["arrays.npz"], 60_000, "arrays.npz")
 
 
-def claims_a(word: str, header: dict[str, Any]) -> bool:
-    """Whether a file makes a claim."""
-    claims = header.get("claims")
-    return isinstance(claims, list) and any(isinstance(c, dict) and c.get("claim") == word for c in claims)
+def read_boxes(value: object, keys: str, most: int) -> list[dict[str, Any]]:
+    """Read boxes of parameters with some keys and a prefix each, with which the names of its arrays begin."""
+    boxes = [table(box, "a box", f"prefix {keys}") for box in rows(value, "boxes", 1, most)]
+    prefixes = [box["prefix"] for box in boxes]
+    named = all(isinstance(p, str) and re.fullmatch(r"[0-9]{1,6}\.", p) for p in prefixes)
+    require(named and len(set(prefixes)) == len(boxes), "the prefixes of the boxes are not as they should be")
+    return boxes
+
+
+def read_sections(value: object, where: str = "claims", least: int = 1) -> dict[str, Any]:
+    """Read a list of claims, so many at least and each made once: the section of each by its name."""
+    sections: dict[str, Any] = {}
+    for claim in rows(value, where, least, 100):
+        name = table(claim, f"{where}: a claim", "claim section")["claim"]
+        require(isinstance(name, str) and name not in sections, f"{where}: a claim is no text, or made twice")
+        sections[name] = claim["section"]
+    return sections
 
 
 def section_alone(
     header: dict[str, Any], word: str, of: str, keys: str, nothing: str, *, noisy: bool = False
 ) -> dict[str, Any]:
     """Return the section of a claim that stands alone in a file, which says so for a file with more in it."""
-    (claim,) = rows(header["claims"], f"claims of {of}", 1, 1)
-    table(claim, "a claim", "claim section")
-    section = table(claim["section"], f"section of {word}", keys)
+    sections = read_sections(header["claims"])
+    require(len(sections) == 1, f"the claims of {of} are more than one")
+    section = table(sections[word], f"section of {word}", keys)
     quiet = header["tolerance"] is None and (noisy or header["noise"] is None)
     require(header["boxes"] == [] and quiet, nothing)
     return section
 
 
 @dataclass
-class Cells:
+class Cells(Labelled):
     """The arrays of one box; the cells of all sides stand one after another."""
 
     edges: list[Array]
@@ -380,8 +394,15 @@ class Cells:
         k = cell - int(self.start[side])
         return f"side {side}, cell {cell}, x in [{float(self.edges[side][k])!r}, {float(self.edges[side][k + 1])!r}]"
 
+    def ways(self) -> list[Way]:
+        """Return a jog and a flip."""
 
-OTHERS = "there are other arrays too"
+        def extremes(targets: Array, label: Array, cells: Array) -> tuple[Array, Array]:
+            first, last = targets[cells].T
+            return -range_max(-label, first, last), range_max(label, first, last)
+
+        both = (("a jog", self.jog), ("a flip", self.flip))
+        return [Way(name, to[:, 0] >= 0, functools.partial(extremes, to)) for name, to in both]
 
 
 class Arrays:
@@ -398,10 +419,11 @@ class Arrays:
         self.names.add(name)
         return read_array(self.entries[f"{name}.npy"], name, dtype, columns, self.said.get(name))
 
-    def require_no_others(self, described: str, held: str) -> None:
-        """Require that header and file have the arrays that were read and no others; else say which has."""
-        require(set(self.said) == self.names, described)
-        require(set(self.entries) == {f"{name}.npy" for name in self.names}, held)
+    def require_no_others(self) -> None:
+        """Require that header and file have the arrays that were read, and no others."""
+        require(set(self.said) == self.names, "the header describes arrays that no claim needs")
+        held = set(self.entries) == {f"{name}.npy" for name in self.names}
+        require(held, "arrays.npz holds entries that no claim needs")
 
 
 def read_cells(arrays: Arrays, prefix: str, sides: int) -> Cells:

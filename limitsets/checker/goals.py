@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from .cells import first_bad, leading_into, range_max, targets_of
+from .cells import first_bad, leading_into, targets_of
 from .file import LENGTHS, Cells, quantity, require, rows, table
+from .labels import range_max
 from .near_hinge import check_everywhere, check_thinning, near_landing, not_arriving
 from .scene import Scene
 from .starts import (

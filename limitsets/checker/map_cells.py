@@ -3,7 +3,7 @@
 docs/certificates.md, "Certificates of any map": the arrays of a box, and the two rules that labels follow.
 """
 
-import itertools
+import functools
 import math
 import operator
 from collections.abc import Iterator
@@ -17,11 +17,12 @@ from .any_map import Bound, CellClaim, Map, Shape, check_map_cell, floats_around
 from .balls import PRECISION, ZERO, Arb, Array, Pair
 from .cells import CHUNK, Failure
 from .file import Arrays, require
+from .labels import Labelled, Way, box_max
 
 MOST_CELLS_OF_MAP = 2**31
 
 
-class MapCells:
+class MapCells(Labelled):
     """The arrays of one box of parameters; cells of all sides one after another, the last axis fastest.
 
     `exits`: whether there are cells from which orbits leave the domain.
@@ -112,7 +113,12 @@ class MapCells:
         """Whether a box lies in the domain."""
         return all(e[0] <= lo and hi <= e[-1] for e, (lo, hi) in zip(self.edges[side], box, strict=True))
 
-    def extremes(self, labels: Array, branch: int, cells: Array) -> tuple[Array, Array]:
+    def ways(self) -> list[Way]:
+        """Return the branches."""
+        branches = enumerate(self.target)
+        return [Way(f"branch {b}", to[:, 0] != -2, functools.partial(self.extremes, b)) for b, to in branches]
+
+    def extremes(self, branch: int, labels: Array, cells: Array) -> tuple[Array, Array]:
         """Return the least and the largest label among the target cells of each of some cells.
 
         The branch is possible from these cells.  Where all targets lie beyond the grid the two are 0 and -1, which hold
@@ -127,9 +133,8 @@ class MapCells:
                 table = np.concatenate([table, table], axis=axis)  # cells are counted on beyond the seam
             first, last = np.maximum(first, 0), np.minimum(last, np.array(table.shape) - 1)
             met = (first <= last).all(axis=1)
-            whole = table.astype(np.int64)
-            least[own[met]] = -box_max(-whole, first[met], last[met])
-            most[own[met]] = box_max(whole, first[met], last[met])
+            least[own[met]] = -box_max(-table, first[met], last[met])
+            most[own[met]] = box_max(table, first[met], last[met])
         return least, most
 
     def check_labels(self, final: Array) -> str:
@@ -137,62 +142,18 @@ class MapCells:
 
         Every target of an attracting cell is of its component; of every other cell with a rank it has a smaller one.
         """
-        attracting = self.component >= 0
+        attracting, checked = self.component >= 0, (self.rank >= 0) & ~final
         high = np.flatnonzero(attracting & (self.rank != 0))
         if len(high):
             return f"{self.name(int(high[0]))}: it has a component, and a rank that is not 0"
-        checked = (self.rank >= 0) & ~final
-        for branch, target in enumerate(self.target):
-            use = checked & (target[:, 0] >= 0)
-            cells = np.flatnonzero(use & attracting)
-            own = self.component[cells]
-            lowest, highest = self.extremes(self.component, branch, cells)
-            bad = cells[(highest != own) | (lowest != own)]
-            if len(bad):
-                return f"{self.name(int(bad[0]))}: branch {branch} may lead out of its component"
-            cells = np.flatnonzero(use & ~attracting)
-            lowest, highest = self.extremes(self.rank, branch, cells)
-            bad = cells[(lowest < 0) | (highest >= self.rank[cells])]
-            if len(bad):
-                return f"{self.name(int(bad[0]))}: the rank does not fall along branch {branch}"
-        return ""
+        return self.check_components(checked & attracting) or self.check_falling(
+            "rank", self.rank, checked & ~attracting
+        )
 
     def check_exits(self) -> str:
         """Check that the exit falls along every target inside the domain; "" or the reason."""
-        if not (self.exit >= 0).any():
-            return "no cell has an exit"
-        for branch, target in enumerate(self.target):
-            cells = np.flatnonzero((self.exit >= 0) & (target[:, 0] > -2))
-            lowest, highest = self.extremes(self.exit, branch, cells)
-            bad = cells[(lowest < 0) | (highest >= self.exit[cells])]
-            if len(bad):
-                return f"{self.name(int(bad[0]))}: the exit does not fall along branch {branch}"
-        return ""
-
-
-def box_max(table: Array, first: Array, last: Array) -> Array:
-    """Return the largest entry of each box of a table, from maxima over windows of length 2^k along each axis.
-
-    The boxes are `first` to `last` (n, axes), both included.
-    """
-    level = np.frexp((last - first + 1).astype(np.float64))[1] - 1  # floor(log2), exact for integers
-    out = np.zeros(len(first), dtype=np.int64)
-
-    def fill(window: Array, boxes: Array, axis: int) -> None:
-        """Fill in some boxes; `window` has the maxima over windows as long as theirs along the axes before this one."""
-        if axis == table.ndim:
-            ends = zip(first[boxes].T, (last[boxes] - (1 << level[boxes]) + 1).T, strict=True)
-            out[boxes] = np.max([window[corner] for corner in itertools.product(*ends)], axis=0)
-            return
-        for k in range(int(level[boxes, axis].max(initial=-1)) + 1):
-            now = boxes[level[boxes, axis] == k]
-            if len(now):
-                fill(window, now, axis + 1)
-            along = np.moveaxis(window, axis, 0)
-            window = np.moveaxis(np.maximum(along[: -(1 << k)], along[1 << k :]), 0, axis)
-
-    fill(table, np.arange(len(first)), 0)
-    return out
+        has_exit = self.exit >= 0
+        return self.check_falling("exit", self.exit, has_exit) if has_exit.any() else "no cell has an exit"
 
 
 # ----------------------------------------------------------------

@@ -3,12 +3,11 @@
 docs/certificates.md, "Certificates of any map".
 """
 
-import re
 from typing import Any, NamedTuple
 
 from .any_map import Shape, read_map, read_parameters
 from .balls import Pair
-from .file import Arrays, hex_float, read_side, require, rows, table
+from .file import Arrays, hex_float, read_boxes, read_sections, read_side, require, rows, table
 from .map_cells import MapCells
 from .map_cycles import Begins, Listed, read_begins, read_box, read_cycles
 from .map_orbits import Every, read_every
@@ -81,13 +80,8 @@ def read_map_file(header: dict[str, Any], entries: dict[str, memoryview]) -> Map
     shape = read_map(header["map"])
     axes = [] if header["plane"] is None else read_axes(header["plane"], shape.names)
     goal = None if header["goal"] is None else read_map_goal(header["goal"], shape)
-    boxes = rows(header["boxes"], "boxes", 1, MOST_PARAMETER_BOXES)
-    keys = "parameters prefix claims at" if axes else "parameters prefix claims"
-    prefixes = [table(box, "a box", keys)["prefix"] for box in boxes]
-    plain_ones = all(isinstance(prefix, str) and re.fullmatch(r"[0-9]{1,6}\.", prefix) for prefix in prefixes)
-    require(
-        plain_ones and len(set(prefixes)) == len(boxes), "the prefixes of the boxes are not as they should be"
-    )
+    keys = "parameters claims at" if axes else "parameters claims"
+    boxes = read_boxes(header["boxes"], keys, MOST_PARAMETER_BOXES)
     arrays = Arrays(header["arrays"], entries)
     parts = [read_map_part(box, shape, goal, arrays, f"box {k}") for k, box in enumerate(boxes)]
     given = [part.parameters for part in parts]
@@ -98,9 +92,7 @@ def read_map_file(header: dict[str, Any], entries: dict[str, memoryview]) -> Map
     begun += [part.begins for part in parts if part.cycles]
     require(all(one == begun[0] for one in begun), "the domains of the boxes begin elsewhere")
     if not any(part.unknown for part in parts):  # which may need arrays
-        arrays.require_no_others(
-            "the header describes arrays that no claim needs", "it holds arrays that no claim needs"
-        )
+        arrays.require_no_others()
     return MapFile(shape, goal, parts, axes=axes, places=places, firsts=begun[0] if begun else None)
 
 
@@ -121,11 +113,7 @@ def read_map_goal(raw: object, shape: Shape) -> Goal:
 def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: Arrays, where: str) -> Part:
     """Read a box of parameters."""
     parameters = read_parameters(box["parameters"], shape.names, f"{where}: parameters")
-    claims: dict[str, Any] = {}
-    for claim in rows(box["claims"], f"{where}: claims", 0, 100):
-        name = table(claim, f"{where}: a claim", "claim section")["claim"]
-        require(isinstance(name, str) and name not in claims, f"{where}: a claim is no text, or made twice")
-        claims[name] = claim["section"]
+    claims = read_sections(box["claims"], f"{where}: claims", 0)
     known = {name: section for name, section in claims.items() if name in CLAIMS_OF_MAP}
     for name, section in known.items():
         more = " begins" if name == "cycles" and shape.closes else ""

@@ -16,7 +16,7 @@ import numpy as np
 
 from .balls import Array
 from .cells import SMALL, workers_ignore_interrupts
-from .file import KINDS, OTHERS, Arrays, Quantity, plain, quantity, require, rows, section_alone, table
+from .file import KINDS, Arrays, Quantity, plain, quantity, require, rows, section_alone, table
 from .region import (
     GOAL_PROVED,
     GOAL_REFUTED,
@@ -103,7 +103,7 @@ def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
     blocks, chain = array("blocks", "<i4", 3 + 3 * n_sides), array("chain", "<i4", 3)
     ends = array("chain.ends", "<f8", 2)
     require(len(ends) == len(chain), "the arrays of the orbits do not fit")
-    arrays.require_no_others(OTHERS, OTHERS)
+    arrays.require_no_others()
     return Plane(
         raw,
         axes,

@@ -15,7 +15,6 @@ from .balls import Array
 from .cells import Crew, first_bad, marked, targets_of, tasks_of
 from .file import (
     LENGTHS,
-    OTHERS,
     Arrays,
     Cells,
     Quantity,
@@ -193,7 +192,7 @@ def read_arrays(
     belief = array("belief", "<i4", 3)
     require(0 < len(throw) <= MOST_STATES, "there are no states, or too many")
     require(len(throw) == len(left) == len(after), "the table does not have one row for each state")
-    arrays.require_no_others(OTHERS, OTHERS)
+    arrays.require_no_others()
     return cells, (throw, left, after.reshape(len(throw), answers), belief)
 
 

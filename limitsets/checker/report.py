@@ -5,7 +5,6 @@ docs/certificates.md, "Checking one": the words of a verdict, and what is printe
 
 import math
 import os
-import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -25,14 +24,14 @@ from .file import (
     Arrays,
     BadFileError,
     Cells,
-    claims_a,
     model_in_words,
     open_certificate,
     plain,
     quantity,
+    read_boxes,
     read_cells,
+    read_sections,
     require,
-    rows,
     table,
 )
 from .goals import content_of_goal, goal_of_scene
@@ -156,7 +155,6 @@ class Report:
 class Certificate:
     """The content of a file: read, and not yet believed."""
 
-    model: tuple[str, str]  # flight and flip
     raw: list[dict[str, Any]]  # the scene of each box, as written
     parameters: list[object]  # of each box, as the producer computed them
     noise: object
@@ -167,43 +165,46 @@ class Certificate:
     unknown: list[tuple[str, str, str]]  # and those that cannot
 
 
-def require_scenes(header: dict[str, Any]) -> None:
-    """Require that a file is a certificate of scenes; raises BadFileError."""
-    needed = "format version map noise boxes claims arrays tolerance"
-    table(header, "header.json", needed, "state producer")
-    version = header["version"]
-    right = header["format"] == "limitsets-proof" and type(version) is int and version in (1, 2)
+OF_SCENES = "format version noise tolerance boxes claims arrays"  # keys of a header, in each version
+
+
+def in_version_3(header: dict[str, Any]) -> dict[str, Any]:
+    """Return the header of a file as version 3 has it, where it is of version 2 too; raises BadFileError."""
+    version = header.get("version")
+    right = header.get("format") == "limitsets-proof" and is_whole(version, 1, 3)
     require(right, "the format is not limitsets-proof, version 2 or 3")
-    require(version == 2, "version 1 of the format is not read any more: prove the scene again")
-    the_map = table(header["map"], "map", "name version flight flip", "formulas")
-    first = type(the_map["version"]) is int and the_map["version"] == 1
-    require(the_map["name"] == "throw" and first, "the map is not throw, version 1")
+    require(version != 1, "version 1 of the format is not read any more: prove the scene again")
+    if version == 3:
+        return header
+    table(header, "header.json", f"map {OF_SCENES}", "state producer")
+    model = dict(table(header["map"], "map", "name version flight flip", "formulas"))
+    model.pop("formulas", None)  # like `state` for people
+    first = is_whole(model.pop("version"), 1, 1) and model.pop("name") == "throw"
+    require(first, "the map is not throw, version 1")
+    return {word: header[word] for word in OF_SCENES.split()} | {"version": 3, "scene": model}
+
+
+def require_model(header: dict[str, Any], scenes: list[dict[str, Any]]) -> None:
+    """Require that the header names the model of all scenes."""
+    model = table(header["scene"], "scene", "flight flip")
+    require(all(scene["model"] == model for scene in scenes), "the header and a scene name different models")
 
 
 def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> Certificate:
     """Read the content of a file; raises BadFileError."""
-    model = (header["map"]["flight"], header["map"]["flip"])
-    boxes = rows(header["boxes"], "boxes", 1, 5_000)
-    prefixes = [table(b, "a box", "scene parameters prefix")["prefix"] for b in boxes]
-    named = all(isinstance(p, str) and re.fullmatch(r"[0-9]{1,6}\.", p) for p in prefixes)
-    require(named and len(set(prefixes)) == len(boxes), "the prefixes of the boxes are not as they should be")
+    boxes = read_boxes(header["boxes"], "scene parameters", 5_000)
     raw = [b["scene"] for b in boxes]
     scenes = [read_scene(scene, header["noise"]) for scene in raw]
-    same = all(model == (scene["model"]["flight"], scene["model"]["flip"]) for scene in raw)
-    require(same, "map and scene name different models")
+    require_model(header, raw)
     arrays = Arrays(header["arrays"], entries)
     n_sides = len(scenes[0].sides)
     require(all(len(s.sides) == n_sides for s in scenes), "the boxes do not have the same number of sides")
-    cells = [read_cells(arrays, prefix, n_sides) for prefix in prefixes]
-    arrays.require_no_others(
-        "the header describes arrays that do not belong there",
-        "arrays.npz holds entries that do not belong there",
-    )
+    cells = [read_cells(arrays, box["prefix"], n_sides) for box in boxes]
+    arrays.require_no_others()
     claims, unknown = read_claims(header["claims"], n_sides)
     parameters = [b["parameters"] for b in boxes]
     noise, tolerance = header["noise"], header["tolerance"]
     return Certificate(
-        model,
         raw,
         parameters,
         noise=noise,
@@ -249,16 +250,19 @@ def recheck(
 
 def check_certificate(path: str | os.PathLike[str], workers: int, progress: Progress, report: Report) -> None:
     """Fill in the report; raises BadFileError."""
-    header, entries = open_certificate(path)
-    if header.get("format") == "limitsets-proof" and is_whole(header.get("version"), 3, 3):
+    as_written, entries = open_certificate(path)
+    header = in_version_3(as_written)
+    if "map" in header:
         recheck_map(read_map_file(header, entries), workers, progress, report)
         return
-    require_scenes(header)
-    alone = next((word for word in ALONE if claims_a(word, header)), None)
+    table(header, "header.json", f"scene {OF_SCENES}", "producer")
+    claimed = read_sections(header["claims"])
+    alone = next((word for word in ALONE if word in claimed), None)
     if alone is not None:
         read, check, noise_of = ALONE[alone]
         content = read(header, entries)
-        describe_alone(report, header, alone, content.raw, noise_of(content))
+        require_model(header, [content.raw])
+        describe_alone(report, alone, content.raw, noise_of(content))
         bad = check(content, workers, progress, report)
         report.verdict = "failed" if bad else "proved"
         report.claims = [(alone, report.verdict, bad)]
@@ -307,13 +311,9 @@ def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report)
     report.reason = next((f"{name}: {why}" for name, _, why in report.claims if why), "")
 
 
-def describe_alone(
-    report: Report, header: dict[str, Any], alone: str, raw: dict[str, Any], noise: object
-) -> None:
+def describe_alone(report: Report, alone: str, raw: dict[str, Any], noise: object) -> None:
     """Say what a file with one claim relies on, and of which scene it is."""
-    model = raw["model"]["flight"], raw["model"]["flip"]
-    require(model == (header["map"]["flight"], header["map"]["flip"]), "map and scene name different models")
-    tell_model(report, model, raw, noise)
+    tell_model(report, raw, noise)
     for name, value in quantities(raw):
         if alone != "policy" or not name.startswith("throw."):  # its throws are those to choose from
             report.parameters[plain(name)] = value_in_words(value, name)
@@ -368,7 +368,7 @@ ALONE: dict[str, tuple[Callable[..., Any], Callable[..., str], Callable[[Any], o
 
 def describe(report: Report, file: Certificate) -> str:
     """Say what the certificate relies on, and for which scenes; return "" or the gap in its tolerance."""
-    tell_model(report, file.model, file.raw[0], file.noise)
+    tell_model(report, file.raw[0], file.noise)
     for name, value in quantities(file.raw[0]):
         report.parameters[plain(name)] = value_in_words(value, name)
     ranges, gap = check_tolerance(file.raw, file.tolerance)
@@ -381,11 +381,11 @@ def describe(report: Report, file: Certificate) -> str:
     return gap
 
 
-def tell_model(report: Report, model: tuple[str, str], scene: dict[str, Any], noise: object) -> None:
+def tell_model(report: Report, scene: dict[str, Any], noise: object) -> None:
     """Say on what formulas and on what arithmetic the report relies, and which facts of the scene it leaves out."""
     on = [name for name, how in scene.get("effects", {}).items() if how]
     report.model = {"simulated": on, "left_out": left_out(scene, noise), "assumptions_broken": None}
-    flight, flip = model
+    flight, flip = scene["model"]["flight"], scene["model"]["flip"]
     kind = "exact" if flight == "exact" else "small"
     report.relied_on.append(f"the formulas of the map throw, version 1, flight {flight}, flip {flip}")
     for key in ("always", flight, kind, f"{kind} {flip}"):

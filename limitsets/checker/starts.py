@@ -23,8 +23,9 @@ from .balls import (
     float_below,
     sine_cosine,
 )
-from .cells import first_bad, leading_into, range_max, targets_of
+from .cells import first_bad, leading_into, targets_of
 from .file import Cells, Quantity, by_side, hex_float, require, rows, table
+from .labels import range_max
 from .model import at_angle, landing_at, over_angles, ratios, rise_of_jog, root_above
 from .near_hinge import (
     check_below_cells,

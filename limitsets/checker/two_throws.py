@@ -29,8 +29,8 @@ from .balls import (
     float_below,
     span,
 )
-from .cells import range_max
 from .file import LENGTHS, Cells, quantity
+from .labels import range_max
 from .model import barrier
 from .part import ends_of, read_lengths, read_part
 from .scene import Scene

@@ -15,6 +15,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.feeder.scene.arrays import throw_stack
+from limitsets.parameters.regions import certified_map
 from limitsets.systems.graph.components import strong_components
 from limitsets.systems.graph.ranges import Ranges
 from limitsets.systems.maps import INWARD, images
@@ -227,3 +228,77 @@ def test_the_picture_follows_the_slider(case):
     print(f"{case}: {found:.1f} frames a second (load of the machine {load:.1f}, {os.cpu_count()} cores)")
     if load < 1.5 * (os.cpu_count() or 1):  # a browser, a server and nobody else
         assert found >= 20.0
+
+
+# ----------------------------------------------------------------
+# A plane of parameters of record: Chialvo's neuron in the window of arXiv 2209.03443, section 4.5 (there 200 x 50
+# points and 256 x 256 cells), its Morse graph at points of 64 x 64 against CMGDB, and the regions that are proved.
+
+PHASE, PLANE, HALVINGS = ((-0.1, 7.5), (-1.3, 2.7)), (("b", 0.0, 0.5), ("k", 0.017, 0.027)), 14
+
+
+def chialvo(x, y, a, b, c, k):
+    return x * x * math.exp(y - x) + k, a * y - b * x + c
+
+
+def neuron(b, k):
+    return ls.map(chialvo, a=0.89, b=b, c=0.28, k=k)
+
+
+def sizes_by_cmgdb(b, k):
+    """Sizes of the recurrent components at one point."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import CMGDB
+
+    def images_of(points):
+        x, y = points[:, 0], points[:, 1]
+        return np.column_stack([x * x * np.exp(y - x) + k, 0.89 * y - b * x + 0.28])
+
+    def scalar(rectangle):
+        raise AssertionError("the batch map was to be called")
+
+    lo, hi = zip(*PHASE, strict=True)
+    model = CMGDB.Model(HALVINGS, HALVINGS, HALVINGS, 10_000, list(lo), list(hi), scalar)
+    model.set_batch_map(lambda boxes: CMGDB.BoxMapBatch(images_of, boxes, padding=True))
+    morse, _ = CMGDB.ComputeMorseGraph(model)
+    return sorted(len(morse.morse_set(v)) for v in morse.vertices())
+
+
+def sizes_by_us(b, k):
+    graph = ls.transitions(neuron(b, k), ls.grid(PHASE, cells=2 ** (HALVINGS // 2)), "corners-padded")
+    return sorted(len(cells) for cells in graph.recurrent_components())
+
+
+@pytest.mark.skipif(find_spec("CMGDB") is None, reason="CMGDB is not installed: make bench does it")
+def test_a_plane_of_record(benchmark, table):
+    along = [np.linspace(lo, hi, 64) for _, lo, hi in PLANE]
+    points = [(float(b), float(k)) for b in along[0][::8] for k in along[1][::8]]
+
+    rivals = {CMGDB: lambda: [sizes_by_cmgdb(*each) for each in points]}
+    turns = take_turns(benchmark, lambda: [sizes_by_us(*each) for each in points], rivals, 5)
+    assert turns.answer == turns.answers[CMGDB]
+    what = "Chialvo's neuron: the Morse graph at a point, 128 x 128 cells"
+    table.append(versus(what, turns, CMGDB, unit="ms", per=len(points)))
+
+    begin = perf_counter()
+    axes = [f"{name}={lo}:{hi}:64" for name, lo, hi in PLANE]
+    options = {"cells": 128, "method": "corners-padded"}
+    whole = ls.atlas(neuron(0.0, 0.017), *axes, domain=PHASE, options=options, workers=1)
+    table.append(
+        limit("Chialvo's neuron: an atlas of 64 x 64 points, one process", perf_counter() - begin, "s", None)
+    )
+    assert (
+        whole.dataset["recurrent"].values[::8, ::8].T.ravel() == [len(each) for each in turns.answer]
+    ).all()
+    begin = perf_counter()
+    window = {"upper": neuron(0.5, 0.027), "first": 8, "depth": 12}
+    proved = certified_map(neuron(0.0, 0.017), ls.grid(PHASE, cells=128), ["trapping"], **window)
+    share = float(proved.shares()["proved"])
+    table += [
+        limit(
+            "Chialvo's neuron: regions of a raster of 64 x 64, one process", perf_counter() - begin, "s", None
+        ),
+        limit("Chialvo's neuron: share of the plane with a proved attractor", share, "", None),
+    ]
+    assert share > 0.95

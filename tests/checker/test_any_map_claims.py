@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from limitsets.checker import cells, recheck, show
-from limitsets.checker.map_cells import box_max
+from limitsets.checker.labels import box_max
 from tests.checker import map_examples as known
 from tests.checker.maps_in_files import (
     Example,

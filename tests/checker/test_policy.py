@@ -366,7 +366,11 @@ def test_what_is_weaker_is_still_true(tmp_path, known):
     ("where", "value", "reason"),
     [
         (("claims", 0, "verdict"), "proved", "unknown key verdict"),
-        (("claims",), [{"claim": "policy"}, {"claim": "invariant", "section": {}}], "claims of a policy"),
+        (
+            ("claims",),
+            [{"claim": word, "section": {}} for word in ("policy", "invariant")],
+            "claims of a policy",
+        ),
         (("boxes",), [{}], "no boxes"),
         (("tolerance",), {"throw.speed": "1 %"}, "no tolerance"),
         ((*AT, "mode"), "hold", "neither stop nor catch"),
@@ -387,7 +391,7 @@ def test_what_is_weaker_is_still_true(tmp_path, known):
         ((*FEEDBACK, "sensor"), {"beyond": "20 in", "side": 2}, "two questions"),
         ((*FEEDBACK, "sensor"), {"error": "1 in"}, "asks nothing"),
         ((*FEEDBACK, "sensor", "error"), "-0.1 in", "negative"),
-        (("map", "flight"), "small-angle", "different models"),
+        (("scene", "flight"), "small-angle", "different models"),
     ],
 )
 def test_what_cannot_be_read(tmp_path, known, where, value, reason):

@@ -160,9 +160,17 @@ class Forged:
 
 def alone(raw: dict, claim: str, section: dict, **more: object) -> dict:
     """The header of a claim that needs no boxes."""
-    of_map = {"name": "throw", "version": 1, **raw["model"]}
-    header = {"format": "limitsets-proof", "version": 2, "map": of_map, "noise": None, "tolerance": None}
+    of_scenes = {"format": "limitsets-proof", "version": 3, "scene": dict(raw["model"])}
+    header = of_scenes | {"noise": None, "tolerance": None}
     return header | {"boxes": [], "claims": [{"claim": claim, "section": section}]} | more
+
+
+def of_version_2(f: Forged) -> Forged:
+    """The same certificate as version 2 has it: the model in `map`, beside two texts for people."""
+    old = f.copy()
+    of_map = {"name": "throw", "version": 1, **old.header.pop("scene"), "formulas": ["jog: R' = R - h phi"]}
+    old.header |= {"version": 2, "map": of_map, "state": "x [in]: centre of mass along the arm"}
+    return old
 
 
 def opened(path: Path) -> Forged:
@@ -364,9 +372,8 @@ def forge(
     spread |= {"landing.x": f"{landing!r} in"} if landing else {}
     header = {
         "format": "limitsets-proof",
-        "version": 2,
-        "map": {"name": "throw", "version": 1, **data["model"], "formulas": []},
-        "state": "x of the centre of mass at rest, and the side it rests on",
+        "version": 3,
+        "scene": dict(data["model"]),
         "noise": spread or None,
         "tolerance": None,
         "boxes": [{"scene": data, "prefix": "0.", "parameters": parameters}],

@@ -302,7 +302,7 @@ ODD = {
     "name no places": put(*AT, "absorbing", "exits", [[2, "10 in", "11 in"]]),
     "names are not": put(*AT, "names", ["right", "elsewhere", "any"]),
     "a place is not one of the arm": put(*AT, "starts", 2, 1, "1 in"),
-    "the arrays are others": lambda f: f.arrays.pop("edges.2"),
+    "array edges.2 is missing": lambda f: f.arrays.pop("edges.2"),
     "do not span the arm": lambda f: f.arrays.update({"edges.0": f.arrays["edges.0"][10:].copy()}),
     "do not ascend": lambda f: f.arrays.update({"edges.0": f.arrays["edges.0"][::-1].copy()}),
     "strata is not": put(*AT, "strata", 65),
@@ -311,7 +311,7 @@ ODD = {
     "bounds of the mean": put(*AT, "mean", [(3.0).hex(), (2.0).hex()]),
     "has no boxes": lambda forged: forged.header.update(noise={"landing.x": "0.2 in"}),
     "claims of probabilities": lambda f: f.header["claims"].append({"claim": "invariant", "section": {}}),
-    "different models": lambda forged: forged.header["map"].update(flip="energy"),
+    "different models": lambda forged: forged.header["scene"].update(flip="energy"),
     "not the one the header describes": None,
 }
 

@@ -290,7 +290,7 @@ class Spoiler:
 
     def other_flight(self):
         flight = "small-angle" if self.m.exact else "exact"
-        self.scene["model"]["flight"] = self.f.header["map"]["flight"] = flight
+        self.scene["model"]["flight"] = self.f.header["scene"]["flight"] = flight
 
     def noise_added(self):
         self.wide_parameters()
@@ -505,7 +505,7 @@ def whole(header: bytes, arrays: dict[str, bytes]) -> bytes:
 
 NO_NOISE = (("throw.speed", 100), ("throw.speed", -1), ("arm.length", 1))
 SPOILED = {  # texts of a header, and what is written for each
-    '"version": 1': ['"version": ' + "1" * 3_000_000, '"version": 1e999999999'],
+    '"version": 3': ['"version": ' + "1" * 3_000_000, '"version": 1e999999999'],
     "28 in": [f"{n} in" for n in ("1e99999", "1" * 5000, "28,0", "nan", "-28", "2**9")],
     '"28 in"': ['"28"', '"28 parsec"', '"28 deg"'],
     "5.75 in": ["57.5 in", "0 in"],
@@ -516,7 +516,7 @@ SPOILED = {  # texts of a header, and what is written for each
     '"flip": "signed"': ['"flip": "__import__"'],
     '"flight": "exact"': ['"flight": ["exact"]'],
     '"prefix": "0."': ['"prefix": "../"', '"prefix": {}'],
-    '"name": "throw"': ['"name": "logistic"'],
+    '"scene": {"flight"': ['"scene": {"name": "logistic", "flight"'],
     '"format": "limitsets-proof"': ['"format": []'],
     '"noise": null': ['"noise": 3', *(f'"noise": {{"{name}": "{share} %"}}' for name, share in NO_NOISE)],
     '"tolerance": null': ['"tolerance": {"throw.speed": 1}', '"tolerance": {"a.b": "1 %"}'],
@@ -526,7 +526,7 @@ SPOILED = {  # texts of a header, and what is written for each
     "p+0": ["p+9999"],
     '"invariant", "section": {}': [f'"invariant", "section": {other}' for other in ('{"x": 1}', "1")],
     '"claim": "invariant"': ['"claim": "trapping"'],
-    '"state"': ['"effects": {}, "state"'],
+    '"producer"': ['"effects": {}, "producer"'],
     '"throw": {': [f'{more}, "throw": {{' for more in ('"effects": {"landing": true}', '"effects": [1]')],
     '"kappa": "25': ['"speed": "1 rad/s", "kappa": "25'],
 }
@@ -760,4 +760,4 @@ def test_range_max_is_the_maximum():
     first = rng.integers(0, 700, 3000)
     last = np.minimum(699, first + (rng.exponential(60, 3000)).astype(int))
     want = [values[a : b + 1].max() for a, b in zip(first, last, strict=True)]
-    assert (checker.cells.range_max(values, first, last) == want).all()
+    assert (checker.labels.range_max(values, first, last) == want).all()

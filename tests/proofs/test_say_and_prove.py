@@ -196,10 +196,14 @@ WAYS = {
     "another model": put(*SCENE, "model", "flip", "energy"),
     # versions and kinds of JSON
     "version true": put("version", True),
-    "version 2.0": put("version", 2.0),
-    "version as text": put("version", "2"),
-    "version 3": put("version", 3),
-    "version of the map true": put("map", "version", True),
+    "version 3.0": put("version", 3.0),
+    "version as text": put("version", "3"),
+    "version 2": put("version", 2),
+    "version 4": put("version", 4),
+    "another model in the header": put("scene", "flip", "energy"),
+    "a map beside the scene": put(
+        "map", {"name": "throw", "version": 1, "flight": "exact", "flip": "signed"}
+    ),
     "format in capitals": put("format", "LIMITSETS-PROOF"),
     "a claim in capitals": put("claims", 4, "claim", "Goal"),
     "a claim with a blank": put("claims", 4, "claim", "goal "),
@@ -290,7 +294,7 @@ def dropped(found, component, starts, tmp_path, **more):
     section = {"kind": "reaches", "x": "69.0806 mm", "side": 1, "every_orbit": True}
     claims = [{"claim": "goal", "section": section | {"throws": throws, "starts": starts} | more}]
     path = tmp_path / "x.proof.zip"
-    write(path, [doctored], claims, noise=None, tolerance=None, unit="mm", recheck=False)
+    write(path, [doctored], claims, noise=None, tolerance=None, recheck=False)
     return checker.recheck(path, workers=1), left.size
 
 
@@ -328,15 +332,15 @@ RAW = {  # as bytes of the header: what JSON itself lets through
     "minus nothing": ('"side": 2, "starts"', '"side": -0, "starts"'),
     "a side with a point": ('"side": 2, "starts"', '"side": 2.0, "starts"'),
     "a side with an exponent": ('"side": 2, "starts"', '"side": 2e0, "starts"'),
-    "a number too large": ('"version": 2', '"version": 1e400'),
-    "a version with digits before": ('"version": 2', '"version": 0002'),
-    "no number": ('"version": 2', '"version": NaN'),
+    "a number too large": ('"version": 3', '"version": 1e400'),
+    "a version with digits before": ('"version": 3', '"version": 0002'),
+    "no number": ('"version": 3', '"version": NaN'),
     "a mark at the beginning": ("{", "\ufeff{"),
     "a half of a sign": ('"20 in", "side": 2, "starts"', '"20 \\ud800in", "side": 2, "starts"'),
     "a blank in hexadecimal": ('"q": "0x1.', '"q": " 0x1.'),
     "a large hexadecimal": ('"q": "0x1.', '"q": "0x123.'),
     "capitals in hexadecimal": ('"q": "0x1.', '"q": "0X1.'),
-    "a comment": ('"version": 2', '/* 3 */ "version": 2'),
+    "a comment": ('"version": 3', '/* 4 */ "version": 3'),
     "text behind": ("}", "} true"),
 }
 

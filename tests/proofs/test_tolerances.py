@@ -167,6 +167,7 @@ def test_a_scene_in_the_units_of_other_workshops_is_rechecked(tmp_path, toleranc
     assert (report.verdict, report.reason) == ("proved", "")
     with zipfile.ZipFile(path) as file:
         header = json.loads(file.read("header.json"))
+    assert (header["version"], header["scene"]) == (3, {"flight": "exact", "flip": "signed"})
     assert json.dumps(header, ensure_ascii=False).isascii()
     # 26.7 rpm is 160.2 deg/s, and a plate of 1.5 g/cm^3, 2 mm thick, has 3 kg/m^2
     same = ls.load(LEAD_QUAD | {"throw": {"speed": "160.2 deg/s"}})

@@ -316,7 +316,6 @@ def write_proof(
         [{"claim": "feeds", "section": section, "verdict": verdict_of(proof, laid=bool(end.laid))}],
         noise=box.noise or None,
         tolerance=None,
-        unit=end.scene.unit,
         recheck=recheck,
         workers=workers,
     )

@@ -170,7 +170,7 @@ def write(
         | _of_chains(records)
     )
     held = {name: np.ascontiguousarray(value) for name, value in held.items()}
-    pack(path, model, claims, held, unit=scene.unit, recheck=recheck, workers=workers)
+    pack(path, model, claims, held, recheck=recheck, workers=workers)
     return Path(path)
 
 

@@ -265,7 +265,7 @@ def write(
         # the outermost nodes lie far beyond everything
         arrays[f"edges.{side}"] = _cut(nodes.place[nodes.of_side(side)][1:-1], finer)
     claims = [{"claim": "probabilities", "section": section}]
-    pack(path, section["scene"]["model"], claims, arrays, unit=scene.unit, recheck=recheck)
+    pack(path, section["scene"]["model"], claims, arrays, recheck=recheck)
     return Path(path)
 
 

@@ -63,9 +63,7 @@ def write(
     }
     claims = [{"claim": "policy", "section": section}]
     held = _of_policy(policy) | _of_throws(board, policy)
-    pack(
-        path, model, claims, held, unit=board.scene.unit, noise=board.noise, recheck=recheck, workers=workers
-    )
+    pack(path, model, claims, held, noise=board.noise, recheck=recheck, workers=workers)
     return Path(path)
 
 

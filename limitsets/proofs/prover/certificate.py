@@ -1,6 +1,6 @@
 """Writing a certificate: all data that a recheck needs, none that it has to trust; and the recheck from Python.
 
-One zip, stored: `header.json` (claims, the map's formulas for people, the scene as written, hashes) and `arrays.npz`
+One zip, stored: `header.json` (claims, the scene as written, hashes) and `arrays.npz`
 (per box of parameters: cell borders, target cells per branch, branch, rank, component, brackets of the impact angle).
 The format is described in docs/certificates.md.
 """
@@ -186,23 +186,11 @@ class Saved(Tabled):
         raise NotImplementedError  # each answer has its own
 
 
-FORMAT, VERSION = "limitsets-proof", 2
-
 # Brackets of the impact are widened by this share of the angle, so that another arithmetic can confirm them.
 SLACK = 2.0**-34
 
 FLIGHTS = {Exact: "exact", SmallAngle: "small-angle", SmallAngle2: "small-angle-2"}
 FLIPS = {Signed: "signed", Energy: "energy"}
-FORMULAS = [
-    "f(phi) = R phi - a sin phi + d (1 - cos phi) - kappa/2 phi^2, impact at its smallest positive root",
-    "X = a cos phi - d sin phi, H = a sin phi + d cos phi, M = rho^2 + a^2 + d^2",
-    "omega = (rho^2 + X (R - kappa phi) + H (h + d)) / M, K = M omega^2 / 2, V = kappa (sqrt(a^2 + d^2) - H)",
-    "signed: flip iff sgn(omega) K - sgn(X) V > 0; energy: flip iff K - sgn(X) V > 0",
-    "jog: R' = R - h phi + a (1 - cos phi) - d (phi - sin phi); flip: R' less a + L_next - a_next, next side",
-    "small-angle: phi = 2 (R - a)/kappa; small-angle-2: phi = 2 (R - a)/(kappa - d); both:",
-    "omega = (rho^2 - a R + 2 a^2 + d^2 + d h)/M, V = kappa (sqrt(a^2 + d^2) - d) - 2 a (R - a), sgn(X) = 1",
-    "jog: R' = R - h phi",
-]
 
 
 def brackets(cover: Cover) -> Array:
@@ -281,7 +269,6 @@ def write(
     *,
     noise: Mapping[str, str] | None,
     tolerance: Mapping[str, str] | None,
-    unit: str,
     recheck: bool = True,
     workers: int | None = 1,
 ) -> float | None:
@@ -297,8 +284,6 @@ def write(
         ``{"claim": ..., "section": {...}}`` each, and the ``verdict`` where it is not "proved".
     noise, tolerance : mapping or None
         Deviations of the parameters for which the claims are proved.
-    unit : str
-        Unit of length.
     recheck : bool
         Whether to check it first.
     workers : int, optional
@@ -330,7 +315,6 @@ def write(
         _model(proofs[0].cover),
         claims,
         arrays,
-        unit=unit,
         boxes=boxes,
         noise=noise,
         tolerance=tolerance,
@@ -353,7 +337,6 @@ def pack(
     claims: Sequence[Mapping[str, Any]],
     arrays: Mapping[str, NDArray[Any]],
     *,
-    unit: str,
     boxes: Sequence[Mapping[str, Any]] = (),
     noise: Mapping[str, str] | None = None,
     tolerance: Mapping[str, str] | None = None,
@@ -367,13 +350,11 @@ def pack(
     path : str or Path
         The file.
     model : mapping of str to str
-        Of the map `flight` and `flip`.
+        Of all scenes `flight` and `flip`.
     claims : sequence of mapping
         ``{"claim": ..., "section": {...}}`` each, and the ``verdict`` where it is not "proved".
     arrays : mapping of str to ndarray
         By name.
-    unit : str
-        Unit of length.
     boxes : sequence of mapping
         Scene, parameters and prefix of each box of parameters.
     noise, tolerance : mapping or None
@@ -394,14 +375,11 @@ def pack(
         The checker does not confirm it: it is kept as NAME.denied.zip.
     """
     header = {
-        "format": FORMAT,
-        "version": VERSION,
-        "map": {"name": "throw", "version": 1, **model, "formulas": FORMULAS},
+        "scene": dict(model),
         "noise": spelled_plainly(noise) if noise else None,
         "tolerance": spelled_plainly(tolerance) if tolerance else None,
         "boxes": spelled_plainly(list(boxes)),
         "claims": spelled_plainly([{"claim": each["claim"], "section": each["section"]} for each in claims]),
-        "state": f"x [{unit}]: centre of mass along the arm; side: the one the part rests on, in flip order",
     }
     verdicts = {each["claim"]: each.get("verdict", "proved") for each in claims}
     return written(path, header, arrays, verdicts, recheck=recheck, workers=workers)
@@ -424,7 +402,7 @@ def written(
     recheck: bool,
     workers: int | None,
 ) -> float | None:
-    """Write a header, with what describes the arrays, and the arrays; the last two arguments as in `pack`.
+    """Write header and arrays, with the format and what describes the arrays; the last two arguments as in `pack`.
 
     `verdicts` says what has to become of each claim.
     """
@@ -436,7 +414,8 @@ def written(
         }
         for name, value in arrays.items()
     }
-    whole = {**header, "producer": _producer(), "arrays": described}
+    form = {"format": "limitsets-proof", "version": 3}
+    whole = {**form, **header, "producer": _producer(), "arrays": described}
     packed = io.BytesIO()
     np.savez(packed, **arrays)  # type: ignore[arg-type]  # arrays by name
     target, seconds, denied = Path(path), None, None

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Arrays, Ints
-from limitsets.proofs.prover.certificate import FORMAT, written
+from limitsets.proofs.prover.certificate import written
 from limitsets.proofs.prover.programs import periods_of, recorded_map, require_same
 from limitsets.proofs.prover.recording import decimal, names_of
 from limitsets.systems.cells import Domain, Grid
@@ -26,8 +26,6 @@ from limitsets.systems.graph.ranges import Ranges, build
 from limitsets.systems.graph.target import TargetBoxes, cut_at_seams, met_round
 from limitsets.systems.maps import kind_of
 from limitsets.systems.maps.derived import NEVER, UNKNOWN, branch_boxes
-
-VERSION = 3
 
 # Boxes are wider by these shares of their width and of their size.  Balls of 100 bits are narrower than our boxes but
 # for the radius, which has 30 bits: 2^-28 of the width is four times its rounding.
@@ -336,8 +334,6 @@ def write_map(
         where = f"box {k}: " if len(parts) > 1 else ""
         verdicts |= {where + word: "refuted" if word == "refuted" else "proved" for word in part.claims}
     header = {
-        "format": FORMAT,
-        "version": VERSION,
         "map": table,
         "boxes": boxes,
         "goal": goal,

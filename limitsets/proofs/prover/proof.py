@@ -126,7 +126,6 @@ def write_refutation(
         [{"claim": "refuted", "section": section, "verdict": "refuted"}],
         noise=box.noise or None,
         tolerance=None,
-        unit=scene.unit,
         recheck=recheck,
     )
 
@@ -429,7 +428,6 @@ class Proof(Saved):
             good,
             noise=self.noise,
             tolerance=self.tolerance,
-            unit=self.scene.unit,
             **how,
         )
 

@@ -1,0 +1,86 @@
+"""The labels of cells, of a scene or of a map: components and ranks, and the rules that they follow, by whole numbers.
+
+docs/certificates.md, "What it rests on", number 5, and "Certificates of any map", the two rules of labels.
+"""
+
+import itertools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from .balls import Array
+
+
+def box_max(table: Array, first: Array, last: Array) -> Array:
+    """Return the largest entry of each box of a table, from maxima over windows of length 2^k along each axis.
+
+    The boxes are `first` to `last` (n, axes), both included.
+    """
+    level = np.frexp((last - first + 1).astype(np.float64))[1] - 1  # floor(log2), exact for integers
+    out = np.zeros(len(first), dtype=np.int64)
+
+    def fill(window: Array, boxes: Array, axis: int) -> None:
+        """Fill in some boxes; `window` has the maxima over windows as long as theirs along the axes before this one."""
+        if axis == table.ndim:
+            ends = zip(first[boxes].T, (last[boxes] - (1 << level[boxes]) + 1).T, strict=True)
+            out[boxes] = np.max([window[corner] for corner in itertools.product(*ends)], axis=0)
+            return
+        for k in range(int(level[boxes, axis].max(initial=-1)) + 1):
+            now = boxes[level[boxes, axis] == k]
+            if len(now):
+                fill(window, now, axis + 1)
+            along = np.moveaxis(window, axis, 0)
+            window = np.moveaxis(np.maximum(along[: -(1 << k)], along[1 << k :]), 0, axis)
+
+    fill(table.astype(np.int64), np.arange(len(first)), 0)
+    return out
+
+
+def range_max(values: Array, first: Array, last: Array) -> Array:
+    """Return max(values[first..last]) of each range."""
+    return box_max(values, first[:, None], last[:, None])
+
+
+class Way(NamedTuple):
+    """A way from cells to others: a jog or a flip, or a branch of a map."""
+
+    name: str
+    possible: Array  # from which cells it is
+    extremes: Callable[[Array, Array], tuple[Array, Array]]
+    """From labels and some cells to the least and the largest label among the target cells of each of these."""
+
+
+class Labelled:
+    """Cells with labels: a component, -1 for none, and a rank, -1 where nothing is claimed."""
+
+    component: Array
+    rank: Array
+
+    def name(self, cell: int) -> str:
+        """Name a cell, for people."""
+        raise NotImplementedError
+
+    def ways(self) -> list[Way]:
+        """Return the ways to target cells."""
+        raise NotImplementedError
+
+    def check_components(self, cells: Array) -> str:
+        """Check that some cells of components map into cells of their own component; "" or the reason."""
+        for way in self.ways():
+            chosen = np.flatnonzero(cells & way.possible)
+            least, most = way.extremes(self.component, chosen)
+            bad = chosen[(least != self.component[chosen]) | (most != self.component[chosen])]
+            if len(bad):
+                return f"{self.name(int(bad[0]))}: {way.name} may lead out of its component"
+        return ""
+
+    def check_falling(self, what: str, label: Array, cells: Array) -> str:
+        """Check that a label falls along every way from some cells, to targets that have one; "" or the reason."""
+        for way in self.ways():
+            chosen = np.flatnonzero(cells & way.possible)
+            least, most = way.extremes(label, chosen)
+            bad = chosen[(least < 0) | (most >= label[chosen])]
+            if len(bad):
+                return f"{self.name(int(bad[0]))}: the {what} does not fall along {way.name}"
+        return ""
