@@ -67,6 +67,8 @@ def test_goal_on_a_circle(tmp_path: Path) -> None:
     assert [claim.verdict for claim in open_.claims] == ["undecided"]
     with pytest.raises(AnswerError, match="seam"):
         ls.certify(params, grid, ends=[[(0.5, 0.6)]], starts=[[(0.96875, 1.0)]])
+    with pytest.raises(AnswerError, match="two where the seam is passed"):
+        ls.certify(params, grid, ends=[[(0.5, 1.1)]])
 
 
 # ---------------------------------------------------------------- orbits
@@ -195,6 +197,18 @@ def test_circles_of_two_lengths(tmp_path: Path) -> None:
     assert cycle.lo[:, 0] == pytest.approx([1 / 6, 1 / 3])
     assert cycle.turns.ravel().tolist() == [1, 3]
     assert ls.recheck(proof.save(tmp_path / "two.proof.zip", recheck=False)).verdict == "proved"
+
+
+def test_a_pendulum_that_goes_round_at_each_step(tmp_path: Path) -> None:
+    """It runs on by 2 pi where pi = push - 0.3 sin q; there the determinant is 1/2 and the trace 1.5 - 0.3 cos q."""
+    grid = ls.grid([(-1.0, math.tau - 1.0), (5.8, 6.8)], cells=(64, 64), periodic=(True, False))
+    proof = ls.certify(ls.map(pendulum, push=3.1), grid, ["converges"])
+    assert proof.proved, proof.claims
+    (cycle,) = proof.cycles
+    assert cycle.turns.tolist() == [[1, 0]]
+    assert cycle.lo[0] == pytest.approx([-math.asin((math.pi - 3.1) / 0.3), math.tau])
+    report = ls.recheck(proof.save(tmp_path / "pendulum.proof.zip", recheck=False))
+    assert report.verdict == "proved", report
 
 
 def test_margin_of_a_goal_on_a_circle(tmp_path: Path) -> None:
