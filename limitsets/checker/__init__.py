@@ -46,6 +46,7 @@ The files follow docs/certificates.md, and each imports only from those before i
     map_plane    regions of parameters, and shares of them
     map_file     the file of a map
     map_words    what is proved, in sentences
+    map_weights  almost every start
     map_claims   the claims
     report       a file from first to last, and the report about it
     main         the command line

@@ -83,7 +83,7 @@ def period_of(text: str | None) -> Arb | None:
     return None if text is None else 2 * arb.pi() if text == "tau" else number(text, "a period")
 
 
-def map_in_words(shape: Shape, firsts: list[list[float]] | None = None) -> Iterator[str]:
+def map_in_words(shape: Shape, firsts: list[list[float | None]] | None = None) -> Iterator[str]:
     """Write the formulas that are checked; `firsts`: by side and axis where the domain begins, for axes that close."""
     for (side, branch), formulas in shape.images.items():
         to = shape.to[side, branch]
@@ -124,6 +124,7 @@ class Map:
 
     def __init__(self, shape: Shape, parameters: dict[str, tuple[str, str]]):
         self.shape, self.dimension = shape, shape.dimension
+        self.periods = [[period_of(text) for text in axes] for axes in shape.periods]  # by side and axis
         values = {n: number(lo, n).union(number(hi, n)) for n, (lo, hi) in parameters.items()}
         wide = [name for name, (lo, hi) in parameters.items() if lo != hi]
         self.ranges = [floats_around(values[name]) for name in wide]

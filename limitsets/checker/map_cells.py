@@ -112,9 +112,10 @@ class MapCells(Labelled):
         side, box = self.box(cell)
         return f"side {side}, cell {cell}, x in {' x '.join(f'[{lo!r}, {hi!r}]' for lo, hi in box)}"
 
-    def first_edges(self) -> list[list[float]]:
-        """Return by side and axis where the cells begin."""
-        return [[float(e[0]) for e in axes] for axes in self.edges]
+    def first_edges(self) -> list[list[float | None]]:
+        """Return by side and axis where the cells begin, None along axes that end."""
+        sides = zip(self.edges, self.closed, strict=True)
+        return [[float(e[0]) if closed else None for e, closed in zip(*axes, strict=True)] for axes in sides]
 
     def meets_seam(self, side: int, box: list[Pair]) -> bool:
         """Whether a box may hold a state beyond the seam of an axis, whose cell is another, and not all of the axis."""
@@ -285,7 +286,7 @@ def turned(
     near = the_map.image[key].at([ball.mid() for ball in the_map.piece(box).balls])
     shifted, d = [], shape.dimension
     for (axis, above, low), (_, below, high) in zip(bounds[:d], bounds[d:], strict=True):
-        period = period_of(shape.periods[shape.to[key]][axis])
+        period = the_map.periods[shape.to[key]][axis]
         if period is not None and low.is_finite():
             turns = ((near[axis] - low) / period).mid().floor() if near[axis].is_finite() else ZERO
             high = high + period if high <= low else high

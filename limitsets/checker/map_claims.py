@@ -22,7 +22,7 @@ from .map_words import Outcome, box_in_words, outcome_of
 def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[dict[str, str], list[Cycle]]:
     """Check all claims of a box of parameters: those that fail with the reasons; and its cycles."""
     the_map = Map(file.shape, part.parameters)
-    cycles = [Cycle(the_map, listed) for listed in part.cycles]
+    cycles = [Cycle(the_map, listed, part.begins) for listed in part.cycles]
     bad = check_cycles(cycles)
     # without the cycles it is not known which cells are final, hence nothing about the others
     resting = part.claims if part.drawn else set(OF_ORBITS) & set(part.claims)

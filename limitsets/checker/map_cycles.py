@@ -17,9 +17,10 @@ from .file import hex_float, read_side, require, rounded, rows, table
 from .map_cells import MapCells
 from .program import is_whole
 
-MOST_CYCLES, MOST_POINTS = 1_000, 200
+MOST_CYCLES, MOST_POINTS, MOST_TURNS = 1_000, 200, 2**53
 WORST_MATRIX = 1e12  # condition of Newton's matrix, above which it is taken for singular
 Boxes = list[list[Pair]]
+Begins = list[list[float | None]]  # by side and axis where the domain begins, None along axes that end
 Matrix = Any  # flint.arb_mat has no stubs
 
 
@@ -29,6 +30,9 @@ class Listed(NamedTuple):
     boxes: Boxes
     side: list[int]
     branch: list[int]
+    turns: list[
+        list[int]
+    ]  # by point and axis the periods that are taken off the image, 0 along axes that end
     attracts: bool
     frames: list[list[list[float]]]  # by point a matrix, [] where none is needed
     radius: float | None  # of the balls in these frames that the map contracts
@@ -45,7 +49,8 @@ def read_box(raw: object, dimension: int, where: str) -> list[Pair]:
 
 def read_cycle(raw: object, shape: Shape, where: str) -> Listed:
     """Read one orbit."""
-    known, d = table(raw, where, "boxes side branch attracts frames radius", "unstable"), shape.dimension
+    keys = f"boxes side branch attracts frames radius{' turns' if shape.closes else ''}"
+    known, d = table(raw, where, keys, "unstable"), shape.dimension
     boxes = [read_box(box, d, where) for box in rows(known["boxes"], where, 1, MOST_POINTS)]
     p = len(boxes)
     sides = [read_side(side, shape.sides) for side in rows(known["side"], where, p, p)]
@@ -53,6 +58,11 @@ def read_cycle(raw: object, shape: Shape, where: str) -> Listed:
     require(
         all(is_whole(b, 0, shape.branches - 1) for b in branches), f"{where}: a branch is not one of the map"
     )
+    turns = rows(known["turns"], where, p, p) if shape.closes else [[0] * d] * p
+    for side, along in zip([*sides[1:], sides[0]], turns, strict=True):
+        most = [0 if period is None else MOST_TURNS for period in shape.periods[side]]
+        fits = all(is_whole(k, -m, m) for k, m in zip(rows(along, where, d, d), most, strict=True))
+        require(fits, f"{where}: turns are not whole numbers, 0 along axes that end")
     require(isinstance(known["attracts"], bool), f"{where}: attracts is neither true nor false")
     unstable = known.get("unstable", False)
     require(isinstance(unstable, bool), f"{where}: unstable is neither true nor false")
@@ -65,8 +75,26 @@ def read_cycle(raw: object, shape: Shape, where: str) -> Listed:
         for frame in (rows(known["frames"], where, p, p) if needed else [])
     ]
     return Listed(
-        boxes, sides, branches, attracts=known["attracts"], frames=frames, radius=radius, unstable=unstable
+        boxes,
+        sides,
+        branches,
+        turns,
+        attracts=known["attracts"],
+        frames=frames,
+        radius=radius,
+        unstable=unstable,
     )
+
+
+def read_begins(raw: object, shape: Shape, where: str) -> Begins:
+    """Read where the domain begins along the axes that close."""
+    d, begins = shape.dimension, []
+    for along, periods in zip(rows(raw, where, shape.sides, shape.sides), shape.periods, strict=True):
+        axes = list(zip(rows(along, where, d, d), periods, strict=True))
+        fits = all((begin is None) is (period is None) for begin, period in axes)
+        require(fits, f"{where}: begins has no numbers along the axes that close alone")
+        begins.append([None if begin is None else hex_float(begin, where) for begin, _ in axes])
+    return begins
 
 
 def read_cycles(raw: object, shape: Shape, where: str) -> list[Listed]:
@@ -98,10 +126,10 @@ def slopes_along(the_map: Map, listed: Listed, boxes: Boxes) -> tuple[list[list[
 
 
 class Cycle:
-    """A periodic orbit of a file, for all parameters of a box; `prove` shows that exactly one lies in its boxes."""
+    """A periodic orbit of a file, for all parameters of a box; `prove` shows that one such orbit lies in its boxes."""
 
-    def __init__(self, the_map: Map, listed: Listed):
-        self.map, self.listed, self.period = the_map, listed, len(listed.boxes)
+    def __init__(self, the_map: Map, listed: Listed, begins: Begins):
+        self.map, self.listed, self.begins, self.period = the_map, listed, begins, len(listed.boxes)
         self.points: list[list[Arb]] = []  # where the points of the orbit lie
         self.frames = [matrix([[arb(v) for v in row] for row in frame]) for frame in listed.frames]
         self.inverses: list[Matrix] = []
@@ -113,6 +141,8 @@ class Cycle:
         bad = bad or self.krawczyk(slopes)
         if bad:
             return bad
+        if not all(map(self.is_off_the_seams, self.listed.side, self.points)):
+            return "that its points lie in the domain, off the seam, is not proved"
         first = self.points[0]
         for k in range(1, self.period):
             again = self.period % k == 0 and self.listed.side[k] == self.listed.side[0]
@@ -130,13 +160,29 @@ class Cycle:
     def krawczyk(self, slopes: list[list[list[Arb]]]) -> str:
         """Prove that K(X), of all points together, lies in the interior of X, and store it; "" or the reason."""
         d, boxes = self.map.dimension, self.listed.boxes
-        entries = newton_image(self.map, (self.listed.side, self.listed.branch), boxes, slopes)
+        after = [*self.listed.side[1:], self.listed.side[0]]
+        turned = [
+            k * period if period is not None else ZERO
+            for side, turns in zip(after, self.listed.turns, strict=True)
+            for k, period in zip(turns, self.map.periods[side], strict=True)
+        ]
+        entries = newton_image(self.map, (self.listed.side, self.listed.branch), boxes, slopes, turned)
         if not entries:
             return "Newton's matrix is singular, or nearly so"
         if not all(v > lo and v < hi for v, (lo, hi) in zip(entries, itertools.chain(*boxes), strict=True)):
             return "that K(X) lies in the interior of X is not proved"
         self.points = [entries[k * d : k * d + d] for k in range(self.period)]
         return ""
+
+    def is_off_the_seams(self, side: int, box: list[Arb]) -> bool:
+        """Whether it is proved that the states of a box lie between both ends of each axis that closes.
+
+        Then they are what the formulas are evaluated at, no two of them are one state, and states near them are theirs.
+        """
+        axes = zip(box, self.begins[side], self.map.periods[side], strict=True)
+        return all(
+            period is None or (v > arb(begin) and v < arb(begin) + period) for v, begin, period in axes
+        )
 
     def stretches(self, slopes: list[list[list[Arb]]]) -> list[Arb]:
         """Bound |S_k+1^-1 DF_k S_k|_2, whose square is at most the largest row of the product with its transpose."""
@@ -168,8 +214,10 @@ class Cycle:
         r, self.hulls = arb(self.listed.radius), []
         for side, point, frame in zip(self.listed.side, self.points, self.frames, strict=True):
             reach = [r * sum((v * v for v in row), ZERO).sqrt() for row in frame.tolist()]
-            hull = [floats_around((v - far).union(v + far)) for v, far in zip(point, reach, strict=True)]
-            self.hulls.append((side, hull))
+            ball = [(v - far).union(v + far) for v, far in zip(point, reach, strict=True)]
+            if not self.is_off_the_seams(side, ball):
+                return "that its balls lie in the domain, off the seam, is not proved"
+            self.hulls.append((side, [floats_around(v) for v in ball]))
         slopes, bad = slopes_along(self.map, self.listed, [hull for _, hull in self.hulls])
         contracts = not bad and all(stretch < 1 for stretch in self.stretches(slopes))
         return "" if contracts else f"that its balls are contracted is not proved{f': {bad}' if bad else ''}"
@@ -200,11 +248,16 @@ class Cycle:
 
 
 def newton_image(
-    the_map: Map, word: tuple[list[int], list[int]], boxes: Boxes, slopes: list[list[list[Arb]]]
+    the_map: Map,
+    word: tuple[list[int], list[int]],
+    boxes: Boxes,
+    slopes: list[list[list[Arb]]],
+    turned: list[Arb] | None = None,
 ) -> list[Arb]:
     """Return K(X) of all points of an orbit together, along the sides and branches of a word; [] if none is found.
 
-    With F_k = f(x_k) - x_k+1: K(X) = m - C F(m) + (1 - C DF(X)) (X - m) for the middle m and any matrix C.
+    With F_k = f(x_k) - x_k+1: K(X) = m - C F(m) + (1 - C DF(X)) (X - m) for the middle m and any matrix C.  `turned`:
+    what is taken off all images, whole periods of axes that close.
     """
     p, d = len(boxes), the_map.dimension
     newton, residual = derivative_of_gaps(slopes), []
@@ -218,6 +271,8 @@ def newton_image(
         images = the_map.image[side, branch].at(middle[k * d : k * d + d] + piece.balls[d:])
         after = (k + 1) % p * d
         residual += [[image - m] for image, m in zip(images, middle[after : after + d], strict=True)]
+    if turned is not None:
+        residual = [[gap - turn] for (gap,), turn in zip(residual, turned, strict=True)]
     c, one = matrix(np.linalg.inv(near).tolist()), matrix(np.eye(p * d).tolist())
     moved = (
         matrix([[v] for v in middle])

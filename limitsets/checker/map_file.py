@@ -9,7 +9,7 @@ from .any_map import Shape, read_map, read_parameters
 from .balls import Pair
 from .file import Arrays, hex_float, read_boxes, read_sections, read_side, require, rows, table
 from .map_cells import MapCells
-from .map_cycles import Listed, read_box, read_cycles
+from .map_cycles import Begins, Listed, read_begins, read_box, read_cycles
 from .map_orbits import Every, read_every
 from .map_plane import ParameterAxis, RegionPlace, read_axes, read_region_boxes
 from .program import is_whole
@@ -52,6 +52,7 @@ class Part(NamedTuple):
     claims: dict[str, Any]  # those that are known, with their sections
     unknown: list[str]
     cycles: list[Listed]
+    begins: Begins  # where the domain begins, as the cycles have it
     every: Every | None  # what `all-cycles` says
     drawn: list[tuple[int, int]]  # by `converges`: component and cycle
     max_rank: int
@@ -67,7 +68,7 @@ class MapFile(NamedTuple):
     parts: list[Part]
     axes: list[ParameterAxis]  # of a region, none where the boxes are no region
     places: list[RegionPlace]  # of the boxes in it
-    firsts: list[list[float]] | None  # by side and axis where the cells begin, None without cells
+    firsts: Begins | None  # where the domain begins, None where nothing tells
 
 
 # ----------------------------------------------------------------
@@ -89,9 +90,8 @@ def read_map_file(header: dict[str, Any], entries: dict[str, memoryview]) -> Map
     require(any(part.claims or part.unknown for part in parts), "nothing is claimed")
     # the value at which the formulas are evaluated is a part of the map
     begun = [part.cells.first_edges() for part in parts if part.cells is not None]
-    require(
-        not shape.closes or all(one == begun[0] for one in begun), "the cells of the boxes begin elsewhere"
-    )
+    begun += [part.begins for part in parts if part.cycles]
+    require(all(one == begun[0] for one in begun), "the domains of the boxes begin elsewhere")
     if not any(part.unknown for part in parts):  # which may need arrays
         arrays.require_no_others()
     return MapFile(shape, goal, parts, axes=axes, places=places, firsts=begun[0] if begun else None)
@@ -117,12 +117,11 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     claims = read_sections(box["claims"], f"{where}: claims", 0)
     known = {name: section for name, section in claims.items() if name in CLAIMS_OF_MAP}
     for name, section in known.items():
-        table(section, f"{where}: section of {name}", CLAIMS_OF_MAP[name])
-    cells_alone = not shape.closes or not {"cycles", "all-cycles", "converges", "escapes", "refuted"} & set(
-        known
-    )
+        more = " begins" if name == "cycles" and shape.closes else ""
+        table(section, f"{where}: section of {name}", CLAIMS_OF_MAP[name] + more)
+    rechecked = not shape.closes or not {"all-cycles", "escapes"} & set(known)
     require(
-        cells_alone, f"{where}: this checker knows no claim about orbits, or exits, beside axes with a period"
+        rechecked, f"{where}: this checker knows neither all-cycles nor escapes beside axes with a period"
     )
     on_a_line = shape.dimension == 1 and not shape.closes
     require(on_a_line or "almost-every" not in known, f"{where}: almost-every is of one axis, which ends")
@@ -133,6 +132,9 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
             goal is not None and goal.starts is not None, f"{where}: a refuted goal has to name its starts"
         )
     cycles = read_cycles(known["cycles"]["cycles"], shape, where) if "cycles" in known else []
+    begins: Begins = [[None] * shape.dimension] * shape.sides
+    if cycles and shape.closes:
+        begins = read_begins(known["cycles"]["begins"], shape, where)
     drawn = read_drawn(known["converges"], cycles, where) if "converges" in known else []
     every = read_every(known["all-cycles"], shape, where) if "all-cycles" in known else None
     about_cells = set(known) - {"cycles", "all-cycles", "refuted"}
@@ -140,7 +142,7 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     cells = MapCells(arrays, box["prefix"], shape, **labels) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
     numbers = read_numbers(known, shape, where)
-    return Part(parameters, known, unknown, cycles, every=every, drawn=drawn, **numbers, cells=cells)
+    return Part(parameters, known, unknown, cycles, begins, every=every, drawn=drawn, **numbers, cells=cells)
 
 
 def read_numbers(known: dict[str, Any], shape: Shape, where: str) -> dict[str, Any]:

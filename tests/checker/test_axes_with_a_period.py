@@ -241,7 +241,10 @@ ODD = {
     "no period where edges have none": period(None),
     "periods of another axis": lambda made: made.header["map"].update(periodic=[["1", "1"]]),
     "boxes that begin elsewhere": lambda made: second_box(made, 1 / 1024),
-    "cycles": lambda made: made.claim("cycles", cycles=[cycle([0.5])]),
+    "cycles without their turns": lambda made: made.claim("cycles", cycles=[cycle([0.5])]),
+    "cycles of a domain that begins elsewhere": lambda made: made.claim(
+        "cycles", cycles=[cycle([0.5]) | {"turns": [[0]]}], begins=[hexed([0.25])]
+    ),
     "escapes": lambda made: made.claim("escapes"),
     "all cycles": lambda made: made.claim(
         "all-cycles", period=1, domain=[{"side": 0, "box": hexed([(0.0, 1.0)])}]
@@ -255,6 +258,14 @@ def test_odd_files_are_refused(name, tmp_path):
     ODD[name](made)
     report = made.recheck(tmp_path)
     assert report.verdict == "bad file", (name, report)
+
+
+def test_cycles_of_a_map_whose_axes_end_have_no_turns(tmp_path):
+    made = MapCertificate(Example(1, "", lambda x, *_: 0.5 * x[0] + 0.25), [({}, {}, None)])
+    made.claim("cycles", cycles=[cycle([0.5])])
+    assert made.recheck(tmp_path).verdict == "proved"
+    made.claims()["cycles"]["cycles"][0]["turns"] = [[0]]
+    assert made.recheck(tmp_path).verdict == "bad file"
 
 
 def test_boxes_that_begin_alike_are_read(tmp_path):

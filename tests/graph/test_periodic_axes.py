@@ -359,8 +359,7 @@ REFUSING: dict[str, Callable[[], Any]] = {
     "limit_set": lambda: ls.limit_set(_graph()),
     "limit_set_of": lambda: limit_set_of(_graph().map, {0: [(0.1, 0.9)]}, line(0.0, 8).domain),
     "cycles_of": lambda: cycles_of(_graph().map, {0: [(0.1, 0.9)]}, line(0.0, 8).domain, 2),
-    "certify": lambda: ls.certify(_graph().map, line(0.0, 8), ["cycles"]),
-    "margin": lambda: ls.margin(_graph().map, line(0.0, 8), "k", ends=[[(0.4, 0.6)]]),
+    "certify": lambda: ls.certify(_graph().map, line(0.0, 8), ["all-cycles"], period=2),
     "atlas": lambda: ls.atlas(
         _graph().map, {"k": (0.1, 0.9)}, {"omega": (0.0, 0.1)}, domain=line(0.0, 8).domain
     ),

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 from limitsets.errors import AnswerError, GridError
 
 import limitsets as ls
-from tests.graph.test_periodic_axes import TORUS, cat, circle, doubling, line
+from limitsets.proofs.prover import cycles_of_map
+from limitsets.systems.cells import Domain
+from tests.graph.test_periodic_axes import TORUS, cat, circle, doubling, line, standard, turn
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
@@ -59,18 +62,169 @@ def test_goal_on_a_circle(tmp_path: Path) -> None:
     proof = ls.certify(params, grid, ends=[[(0.5, 0.6)]], starts=[[(0.96875, 0.9921875)], [(0.0, 0.9)]])
     assert proof.proved
     assert ls.recheck(proof.save(tmp_path / "goal.proof.zip", recheck=False)).verdict == "proved"
-    # the other fixed point lies at 0.943: starts about it are not proved, and no cycle is looked for
+    # the other fixed point lies at 0.943: starts about it are not proved, and no cycle that attracts leaves the ends
     open_ = ls.certify(params, grid, ends=[[(0.5, 0.6)]], starts=[[(0.9, 0.96)]])
     assert [claim.verdict for claim in open_.claims] == ["undecided"]
     with pytest.raises(AnswerError, match="seam"):
         ls.certify(params, grid, ends=[[(0.5, 0.6)]], starts=[[(0.96875, 1.0)]])
+    with pytest.raises(AnswerError, match="two where the seam is passed"):
+        ls.certify(params, grid, ends=[[(0.5, 1.1)]])
 
 
-@pytest.mark.parametrize("claim", ["cycles", "converges", "all-cycles"])
-def test_claims_about_orbits_are_refused(claim: str) -> None:
-    period = {"period": 2} if claim == "all-cycles" else {}
-    with pytest.raises(GridError, match="axes that end"):
-        ls.certify(ls.map(doubling), line(0.0, 8), [claim], **period)
+# ---------------------------------------------------------------- orbits
+
+
+ELSEWHERE = [(-0.3, 0.7), (-0.3, 0.7)]  # the seam is on no orbit of the tests
+
+ORBITS: dict[str, tuple[Any, Any, int, list[list[bool | None]]]] = {
+    # map, grid, largest period, and by period of each orbit whether it attracts, None where that is open
+    "doubling": (
+        ls.map(doubling),
+        line(-0.3, 64),
+        4,
+        [[False], [False], [False] * 2, [False] * 3],  # 2^p - 1 points with f^p(x) = x
+    ),
+    "cat map": (
+        ls.map(cat),
+        ls.grid(ELSEWHERE, cells=12, periodic=True),
+        3,
+        [[False], [False] * 2, [False] * 5],  # 1, 5, 16 points: |det(A^p - 1)|
+    ),
+    "standard map": (
+        ls.map(standard, k=0.5),
+        ls.grid(ELSEWHERE, cells=12, periodic=True),
+        1,
+        [[False, None]],  # traces 2 + k and 2 - k, determinant 1: hyperbolic, elliptic
+    ),
+    "rotation": (
+        ls.map(turn, by=0.5),
+        line(-0.3, 16),
+        2,
+        [[], []],
+    ),  # each point is of period 2: none is alone
+    # 0 and 1/2 attract: the slopes are 1.9 and 0.1; the other orbit of period 2 repels, outside the attracting cells
+    "tongue": (ls.map(circle, omega=0.5, k=0.9), line(-0.3, 64), 2, [[], [True]]),
+}
+
+
+@pytest.mark.parametrize("name", ORBITS)
+def test_orbits_are_proved_modulo_the_period(name: str, tmp_path: Path, monkeypatch: Any) -> None:
+    params, grid, most, wanted = ORBITS[name]
+    monkeypatch.setattr(cycles_of_map, "UP_TO", most)
+    proof = ls.certify(params, grid, ["cycles"])
+    got = [[cycle.attracts for cycle in proof.cycles if cycle.period == p] for p in range(1, most + 1)]
+    assert [sorted(each, key=str) for each in got] == [sorted(each, key=str) for each in wanted]
+    if not any(wanted):
+        assert not proof.proved
+        return
+    report = ls.recheck(proof.save(tmp_path / "orbits.proof.zip", recheck=False))
+    assert report.verdict == "proved", report
+
+
+def test_an_orbit_on_the_seam_is_not_proved(monkeypatch: Any) -> None:
+    monkeypatch.setattr(cycles_of_map, "UP_TO", 2)
+    proof = ls.certify(ls.map(doubling), line(0.0, 64), ["cycles"])
+    assert [cycle.period for cycle in proof.cycles] == [2]
+    (missing,) = proof.claims[0].section["missing"]
+    assert "period 1" in missing
+    assert "begin the domain elsewhere" in missing
+
+
+def test_starts_of_a_tongue_tend_to_its_orbit(tmp_path: Path) -> None:
+    """For all omega near 1/2 one orbit of period 2 attracts; beside the one that repels nothing is proved."""
+    lower, grid = ls.map(circle, omega=0.499, k=0.9), line(-0.3, 256)
+    proof = ls.certify(lower, grid, ["converges", "basin"], upper=lower.with_values(omega=0.501))
+    assert proof.proved, proof.claims
+    (cycle,) = proof.cycles
+    assert cycle.period == 2
+    assert sorted(cycle.turns.ravel().tolist()) == [0, 1]  # once round in two steps
+    rank = proof.arrays["rank"]
+    assert 0.9 < (rank >= 0).mean() < 1.0
+    report = ls.recheck(proof.save(tmp_path / "tongue.proof.zip"))
+    assert report.verdict == "proved", report
+    assert {claim for claim, *_ in report.claims} == {"converges", "basin", "cycles"}
+    random = np.random.default_rng(1)
+    numbers = random.choice(np.flatnonzero(rank >= 0), 200)
+    starts = random.uniform(*grid.boxes(numbers, 0))[:, 0]
+    for omega in (0.499, 0.5, 0.501):
+        after = ls.maps.advance(lower.with_values(omega=omega), starts, 0, 1000, domain=grid.domain)[0]
+        off = np.maximum(cycle.lo[:, 0] - after[:, None], after[:, None] - cycle.hi[:, 0]).min(axis=1)
+        assert off.max() < 1e-6
+
+
+def test_a_ball_ends_before_the_seam(tmp_path: Path) -> None:
+    """The map contracts beyond the seam too, which is 0.06 beside the fixed point."""
+    params = ls.map(circle, omega=0.0, k=-0.9)
+    free, near = (ls.certify(params, line(lo, 256), ["converges", "basin"]) for lo in (-0.3, -0.06))
+    assert free.proved
+    assert near.proved
+    assert near.cycles[0].ball.radius < 0.06 < free.cycles[0].ball.radius
+    assert ls.recheck(near.save(tmp_path / "near.proof.zip", recheck=False)).verdict == "proved"
+
+
+def test_a_goal_is_refuted_by_an_orbit_that_goes_round(tmp_path: Path) -> None:
+    params, grid = ls.map(circle, omega=0.5, k=0.9), line(-0.3, 128)
+    proof = ls.certify(params, grid, ends=[[(0.4, 0.6)]], starts=[[(-0.2, 0.6)]])
+    assert [claim.verdict for claim in proof.claims] == ["refuted"]
+    assert "period 2" in proof.claims[0].reason
+    report = ls.recheck(proof.save(tmp_path / "tongue.refuted.zip", recheck=False))
+    assert report.verdict == "refuted", report
+    proved = ls.certify(
+        params, grid, ["converges", "ends-in"], ends=[[(-0.1, 0.1)], [(0.4, 0.6)]], starts=[[(0.4, 0.6)]]
+    )
+    assert proved.proved, proved.claims
+    assert ls.recheck(proved.save(tmp_path / "tongue.proof.zip", recheck=False)).verdict == "proved"
+
+
+class Handover(NamedTuple):
+    rate: float
+
+
+def handed_over(p, x, side):
+    """Take circles of length 1 and 2 to each other."""
+    return p.rate * x + (2.25 if side == 0 else 3.0), 1 - side, 0
+
+
+ls.register(Handover, image=handed_over)
+
+
+def test_circles_of_two_lengths(tmp_path: Path) -> None:
+    """Modulo 2 y = x / 2 + 1 / 4, modulo 1 x = y / 2: the orbit is 1/6, 1/3."""
+    grid = ls.grid(Domain([[-0.25], [-0.25]], [[0.75], [1.75]], periodic=(True,)), cells=64)
+    proof = ls.certify(Handover(0.5), grid, ["converges", "basin"])
+    assert proof.proved, proof.claims
+    (cycle,) = proof.cycles
+    assert cycle.lo[:, 0] == pytest.approx([1 / 6, 1 / 3])
+    assert cycle.turns.ravel().tolist() == [1, 3]
+    assert ls.recheck(proof.save(tmp_path / "two.proof.zip", recheck=False)).verdict == "proved"
+
+
+def test_a_pendulum_that_goes_round_at_each_step(tmp_path: Path) -> None:
+    """It runs on by 2 pi where pi = push - 0.3 sin q; there the determinant is 1/2 and the trace 1.5 - 0.3 cos q."""
+    grid = ls.grid([(-1.0, math.tau - 1.0), (5.8, 6.8)], cells=(64, 64), periodic=(True, False))
+    proof = ls.certify(ls.map(pendulum, push=3.1), grid, ["converges"])
+    assert proof.proved, proof.claims
+    (cycle,) = proof.cycles
+    assert cycle.turns.tolist() == [[1, 0]]
+    assert cycle.lo[0] == pytest.approx([-math.asin((math.pi - 3.1) / 0.3), math.tau])
+    report = ls.recheck(proof.save(tmp_path / "pendulum.proof.zip", recheck=False))
+    assert report.verdict == "proved", report
+
+
+def test_margin_of_a_goal_on_a_circle(tmp_path: Path) -> None:
+    """The fixed point, where k sin(2 pi x) = -2 pi omega, comes to the end 0.6 of the goal at k sin(0.2 pi) / 2 pi."""
+    params = ls.map(circle, omega=0.05, k=0.9)
+    (margin,) = ls.margin(params, line(0.0, 256), "omega", ends=[[(0.5, 0.6)]], starts=[[(0.0, 0.9)]])
+    limit = 0.9 * math.sin(0.2 * math.pi) / math.tau - 0.05
+    assert 0.8 * limit < margin.proved < limit < margin.refuted < 1.01 * limit
+    report = ls.recheck(margin.save(tmp_path / "margin.proof.zip", recheck=False))
+    assert report.verdict == "proved", report
+    assert report.claims[-1][1:] == ("refuted", "")
+
+
+def test_that_orbits_are_all_is_refused() -> None:
+    with pytest.raises(GridError, match="all turns of each step"):
+        ls.certify(ls.map(doubling), line(0.0, 8), ["all-cycles"], period=2)
 
 
 def test_formulas_name_the_period() -> None:

@@ -253,7 +253,6 @@ def margins_of_map(
     if ends is None:
         allowed = "boxes in which orbits end"
         raise AnswerError("the argument ends of margin", None, allowed, "pass ends=[[(lo, hi)]]")
-    grid.domain.require_ends("the grid of margin")
     first = certify_map(map, grid, ["ends-in"], ends=ends, starts=starts)
     values = dict(names_of(first.map))
     for name in quantities:

@@ -18,7 +18,7 @@ import numpy as np
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.proofs.prover.certificate_of_map import frames_to_try
 from limitsets.proofs.prover.numbers import Intervals
-from limitsets.systems.cells import Grid
+from limitsets.systems.cells import Domain, Grid
 from limitsets.systems.maps import advance
 from limitsets.systems.sets import Cycle
 
@@ -55,7 +55,7 @@ class Ball(NamedTuple):
 # ---------------------------------------------------------------- cycles by long orbits
 
 
-def settled_orbits(params: Any, starts: Array, side: Ints) -> list[Cycle]:
+def settled_orbits(params: Any, starts: Array, side: Ints, domain: Domain) -> list[Cycle]:
     """Find the cycles that long orbits come to, in floats.
 
     Parameters
@@ -66,16 +66,18 @@ def settled_orbits(params: Any, starts: Array, side: Ints) -> list[Cycle]:
         Where the orbits begin.
     side : ndarray of int, shape (m,)
         On which sides.
+    domain : Domain
+        Whose axes may close.
     """
     at = starts if starts.shape[1] > 1 else starts[:, 0]
     for steps in STAGES:
-        at, side, _, made = advance(params, at, side, steps)
+        at, side, _, made = advance(params, at, side, steps, domain=domain)
         at, side = at[made == steps], side[made == steps]
         if not len(at):
             return []
         path, taken = [(at, side)], []
         for _ in range(LONGEST):
-            x, on, code, _ = advance(params, *path[-1], 1)
+            x, on, code, _ = advance(params, *path[-1], 1, domain=domain)
             path.append((x, on))
             taken.append(code)
         points = np.stack([each.reshape(len(each), -1) for each, _ in path], axis=1)
@@ -83,7 +85,7 @@ def settled_orbits(params: Any, starts: Array, side: Ints) -> list[Cycle]:
         scale = float(np.abs(points[np.isfinite(points)]).max(initial=1.0))
         stays = np.all(branches >= 0, axis=1, keepdims=True)
         with np.errstate(invalid="ignore"):  # of states that leave
-            off = np.abs(points[:, 1:] - points[:, :1]).max(axis=2)
+            off = np.abs(domain.shortest(points[:, 1:] - points[:, :1], sides[:, 1:])).max(axis=2)
         off[(sides[:, 1:] != sides[:, :1]) | ~stays] = np.inf
         if (off.min(axis=1) < SOON * scale).all():
             break

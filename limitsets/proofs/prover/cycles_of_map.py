@@ -17,14 +17,14 @@ from limitsets.proofs.prover.certificate_of_map import hexed, widened
 from limitsets.proofs.prover.converging import Ball, cells_within, contracted_ball, settled_orbits
 from limitsets.proofs.prover.every_orbit import every_orbit
 from limitsets.proofs.prover.numbers import Intervals
-from limitsets.proofs.prover.orbits_of_map import CycleOfMap, prove_orbit, slopes_of, slopes_on
+from limitsets.proofs.prover.orbits_of_map import CycleOfMap, Lies, prove_orbit, slopes_of, slopes_on
 from limitsets.proofs.prover.programs import names_alone
 from limitsets.proofs.prover.proof import Claim
 from limitsets.proofs.prover.proof_of_map import ProofOfMap, frames_of
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.maps import has_slope, kind_of
 from limitsets.systems.maps.contract import between
-from limitsets.systems.sets import Cycles, cycles, cycles_of
+from limitsets.systems.sets import Cycle, Cycles, cycles, cycles_of
 
 # Largest period of the search for cycles.
 UP_TO = 16
@@ -73,11 +73,26 @@ def every_cycle(
 def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
     """Find cycles in floats for the parameters in the middle, and say what was left out."""
     cells, middle = proof.cells, between(proof.map, proof.upper)
-    if cells.grid.dimension > 1:
+    if cells.grid.dimension > 1 or cells.grid.domain.closes:
         return cycles(replace(proof.graph, map=middle), UP_TO, cells), []
     candidates = cycles_of(middle, cells.extents(), cells.grid.domain, UP_TO, most_words=MOST_WORDS)
     beyond = f"longer cycles: there are more than {MOST_WORDS} itineraries of one length"
     return candidates, [] if candidates.complete else [beyond]
+
+
+def _prove(proof: ProofOfMap, cycle: Cycle, lies: Lies) -> CycleOfMap | str:
+    """Prove an orbit near one that floats give, off the seams of axes that close; or say what is missing."""
+    domain = proof.graph.grid.domain
+    answer = prove_orbit((proof.map, proof.upper), cycle, lies, domain.period)
+    if isinstance(answer, str) or not domain.closes:
+        return answer
+    lo, hi = widened(answer.lo, answer.hi)
+    beyond = (lo <= domain.lo[cycle.side]) | (hi >= domain.hi[cycle.side])
+    return (
+        "it meets the seam of an axis: begin the domain elsewhere"
+        if (beyond & domain.periodic).any()
+        else answer
+    )
 
 
 NO_CYCLES = "cycles need slopes, at most two dimensions, and `margin` where there are branches"
@@ -103,7 +118,7 @@ def cycles_claim(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, t
     for number, cycle in enumerate(candidates):
         if progress is not None:
             progress("cycles", number, len(candidates))
-        answer = prove_orbit((proof.map, proof.upper), cycle, functools.partial(_within, proof.cells))
+        answer = _prove(proof, cycle, functools.partial(_within, proof.cells))
         if isinstance(answer, CycleOfMap):
             proved.append(answer)
         else:
@@ -126,8 +141,8 @@ ORBITS = 256
 def _attracting(proof: ProofOfMap, starts: tuple[Array, Ints]) -> tuple[tuple[CycleOfMap, ...], list[str]]:
     """Prove the cycles to which orbits from some starts come, for the parameters in the middle; and what is missing."""
     proved, missing = [], []
-    for cycle in settled_orbits(between(proof.map, proof.upper), *starts):
-        answer = prove_orbit((proof.map, proof.upper), cycle, lambda *_: True)
+    for cycle in settled_orbits(between(proof.map, proof.upper), *starts, proof.graph.grid.domain):
+        answer = _prove(proof, cycle, lambda *_: True)
         if isinstance(answer, CycleOfMap) and answer.attracts:
             proved.append(answer)
         else:

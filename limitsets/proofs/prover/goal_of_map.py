@@ -80,7 +80,8 @@ def read_goal(ends: Any, starts: Any, domain: Domain) -> GoalOfMap:
     Raises
     ------
     AnswerError
-        For what is no list of boxes, a side that is not there, or starts outside the domain.
+        For what is no list of boxes, a side that is not there, starts outside the domain, or a box that passes the seam
+        of an axis that closes.
     """
     goal = GoalOfMap(
         _regions(ends, "ends", domain), None if starts is None else _regions(starts, "starts", domain)
@@ -95,6 +96,13 @@ def read_goal(ends: Any, starts: Any, domain: Domain) -> GoalOfMap:
         if (np.array(domain.periodic) & (lo > domain.lo[side]) & (hi == domain.hi[side])).any():
             allowed = "boxes that end before the seam of an axis that closes, or go round it"
             raise AnswerError("the starts", shown(tuple(hi.tolist())), allowed, "end them a little before")
+    for side, lo, hi in goal.ends:
+        # a cycle may refute the goal: its points have values in the domain
+        if (np.array(domain.periodic) & ((lo < domain.lo[side]) | (hi > domain.hi[side]))).any():
+            allowed = "boxes in the domain along axes that close, two where the seam is passed"
+            raise AnswerError(
+                "the ends", shown([*map(tuple, np.stack([lo, hi], 1).tolist())]), allowed, "cut them there"
+            )
     return goal
 
 

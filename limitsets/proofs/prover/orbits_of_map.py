@@ -12,7 +12,7 @@ The functions take many orbits of one period, shape (n, p, d), so that a search 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add, mul
 from typing import Any, NamedTuple, TypeAlias
@@ -60,6 +60,8 @@ class CycleOfMap:
         where that is open.
     ball : Ball or None
         Balls around its points that the map contracts, if "converges" was asked for.
+    turns : ndarray of int, shape (p, d), or None
+        Where axes close: the periods that are taken off the image of each point, so that it is the next one.
     """
 
     lo: Array
@@ -70,6 +72,7 @@ class CycleOfMap:
     slope_hi: Array
     attracts: bool | None
     ball: Ball | None = None
+    turns: Ints | None = None
 
     @property
     def period(self) -> int:
@@ -80,6 +83,28 @@ class CycleOfMap:
     def kind(self) -> str:
         """Whether it is attracting or unstable; empty where that is open."""
         return {True: "attracting", False: "unstable", None: ""}[self.attracts]
+
+
+class Turns(NamedTuple):
+    """How many periods are taken off the image of each point of an orbit, and the period there, shape (p, d)."""
+
+    number: Ints
+    period: Array
+
+    @classmethod
+    def of(cls, image: Intervals, ahead: Array, period: Array) -> Turns:
+        """Choose whole numbers by which images, shape (1, p, d), come near the points ahead, shape (p, d)."""
+        gap = 0.5 * (image.lo[0] + image.hi[0]) - ahead
+        return cls(np.round(gap / np.where(period > 0.0, period, np.inf)).astype(np.int64), period)
+
+    def gaps(self, image: Intervals, ahead: Array) -> Intervals:
+        """Return F, from images that are not turned and the points ahead."""
+        gap = image - exactly(ahead[None])
+        if not self.number.any():
+            return gap
+        # a period is written as a decimal, or as 2 pi, which lies beside its double
+        beside = Intervals(np.nextafter(self.period, -np.inf), np.nextafter(self.period, np.inf))
+        return gap - exactly(self.number[None].astype(np.float64)) * beside
 
 
 class Steps(NamedTuple):
@@ -260,20 +285,26 @@ def is_unstable_in_file(corners: Corners, cycle: CycleOfMap) -> bool:
 
 
 @np.errstate(all="ignore")  # a singular matrix or an overflow gives inf and nan, which prove nothing
-def prove_orbit(corners: Corners, cycle: Cycle, lies: Lies) -> CycleOfMap | str:
-    """Prove that there is one orbit near one that floats give, and that it lies where asked; or say what is missing."""
+def prove_orbit(corners: Corners, cycle: Cycle, lies: Lies, period: Array | None = None) -> CycleOfMap | str:
+    """Prove that there is one orbit near one that floats give, and that it lies where asked; or say what is missing.
+
+    `period`: of the axes that close, by side and axis, 0 of the others.
+    """
     middle = cycle.x.reshape(cycle.period, -1).astype(np.float64)
     step = _sure_steps(corners, middle, middle, cycle)
     if isinstance(step, str):
         return step
     c, least = inverse(step[1]), FIRST * np.maximum(np.abs(middle), 1.0)
-    off, lo, hi = step[0] - exactly(np.roll(middle, -1, axis=0)[None]), middle, middle
+    ahead = np.roll(middle, -1, axis=0)
+    along = np.zeros_like(middle) if period is None else period[np.roll(cycle.side, -1)]
+    turns = Turns.of(step[0], ahead, along)
+    off, lo, hi = turns.gaps(step[0], ahead), middle, middle
     for _ in range(TRIES):
         wide = Intervals(lo, hi) - exactly(middle)
         held = krawczyk(middle[None], c, off, step[1], Intervals(wide.lo[None], wide.hi[None]))
         at = Intervals(held.lo[0], held.hi[0])
         if ((lo < at.lo) & (at.hi < hi)).all():
-            return _proved(corners, at, cycle, lies)
+            return _proved(corners, at, cycle, lies, turns)
         more = MORE * (at.hi - at.lo) + least
         lo, hi = np.minimum(at.lo - more, middle), np.maximum(at.hi + more, middle)
         if not np.isfinite([lo, hi]).all():
@@ -284,19 +315,19 @@ def prove_orbit(corners: Corners, cycle: Cycle, lies: Lies) -> CycleOfMap | str:
     return "no box is found that Newton's operator contracts"
 
 
-def _confirmed(corners: Corners, lo: Array, hi: Array, cycle: Cycle) -> bool:
+def _confirmed(corners: Corners, lo: Array, hi: Array, cycle: Cycle, turns: Turns) -> bool:
     """Whether Newton's operator leads the boxes of a certificate into their interior, as the checker asks of them."""
     middle = 0.5 * (lo + hi)
     first, step = (_sure_steps(corners, *ends, cycle) for ends in ((middle, middle), (lo, hi)))
     if isinstance(first, str) or isinstance(step, str):
         return False
-    off, wide = first[0] - exactly(np.roll(middle, -1, axis=0)[None]), Intervals(lo, hi) - exactly(middle)
+    off, wide = turns.gaps(first[0], np.roll(middle, -1, axis=0)), Intervals(lo, hi) - exactly(middle)
     held = krawczyk(middle[None], inverse(step[1]), off, step[1], Intervals(wide.lo[None], wide.hi[None]))
     room = ROOM * (hi - lo)
     return bool(((lo + room < held.lo[0]) & (held.hi[0] < hi - room)).all())
 
 
-def _proved(corners: Corners, at: Intervals, cycle: Cycle, lies: Lies) -> CycleOfMap | str:
+def _proved(corners: Corners, at: Intervals, cycle: Cycle, lies: Lies, turns: Turns) -> CycleOfMap | str:
     """Prove the sides, branches, period and slope of an orbit that lies in boxes; or say what is missing."""
     step = _sure_steps(corners, at.lo, at.hi, cycle)
     if isinstance(step, str):
@@ -309,7 +340,8 @@ def _proved(corners: Corners, at: Intervals, cycle: Cycle, lies: Lies) -> CycleO
         return "its period may be smaller"
     if not lies(at.lo, at.hi, cycle.side):
         return "its boxes do not lie in the cells that it is looked for in"
-    if not _confirmed(corners, *widened(at.lo, at.hi), cycle):
+    if not _confirmed(corners, *widened(at.lo, at.hi), cycle, turns):
         return "its boxes are too wide for a certificate"
     slope = _product(Intervals(step[1].lo[0], step[1].hi[0]))
-    return CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
+    proved = CycleOfMap(at.lo, at.hi, cycle.side, cycle.branches, *_ends(slope), _attracts(slope))
+    return replace(proved, turns=turns.number) if turns.period.any() else proved

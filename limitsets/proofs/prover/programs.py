@@ -362,6 +362,14 @@ def periods_of(domain: Domain) -> list[list[str | None]]:
     return [[named[p] if p in named else decimal(p) for p in axes] for axes in domain.period.tolist()]
 
 
+def begins_of(domain: Domain) -> list[list[str | None]]:
+    """Write by side and axis where the domain begins along axes that close, None along the others."""
+    return [
+        [lo.hex() if closes else None for lo, closes in zip(axes, domain.periodic, strict=True)]
+        for axes in domain.lo.tolist()
+    ]
+
+
 @arguments_checked
 def formulas(params: Any, domain: Grid | Domain | ArrayLike | None = None, *, sides: int = 1) -> Formulas:
     """Tell the formulas that a certificate of a map would hold, without a proof.

@@ -33,6 +33,7 @@ from limitsets.proofs.prover.converging import attracting_frames
 from limitsets.proofs.prover.goal_of_map import GoalOfMap, within_ends
 from limitsets.proofs.prover.leaving_of_map import with_exits, with_weights
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, is_unstable_in_file, slopes_of, slopes_on
+from limitsets.proofs.prover.programs import begins_of
 from limitsets.proofs.prover.proof import Claim, left_of
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph
@@ -129,7 +130,9 @@ class ProofOfMap(Saved):
 
     def part(self) -> Part:
         """Give what a certificate holds of this box of parameters; a refuted goal stands by itself."""
-        cycles = {"cycles": [_cycle_section(self, cycle) for cycle in self.cycles]}
+        cycles: dict[str, Any] = {"cycles": [_cycle_section(self, cycle) for cycle in self.cycles]}
+        if self.graph.grid.domain.closes:
+            cycles["begins"] = begins_of(self.graph.grid.domain)
         if any(each.claim == "ends-in" and each.verdict == "refuted" for each in self.claims):
             return Part((self.map, self.upper), {"cycles": cycles, "refuted": {}}, {})
         claims = {each.claim: dict(each.section) for each in self.claims if each.verdict == "proved"}
@@ -245,7 +248,9 @@ def _cycle_section(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
     branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
     boxes = cycle.lo, cycle.hi, cycle.side, branches
     corners = proof.map, proof.upper
+    turns = {} if cycle.turns is None else {"turns": cycle.turns.tolist()}
     if cycle.ball is not None:
-        return cycle_in_file(*boxes, cycle.ball.frames, radius=cycle.ball.radius)
+        return cycle_in_file(*boxes, cycle.ball.frames, radius=cycle.ball.radius) | turns
     unstable = cycle.attracts is False and is_unstable_in_file(corners, cycle)
-    return cycle_in_file(*boxes, frames_of(corners, cycle) if cycle.attracts else None, unstable=unstable)
+    frames = frames_of(corners, cycle) if cycle.attracts else None
+    return cycle_in_file(*boxes, frames, unstable=unstable) | turns
