@@ -294,6 +294,7 @@ def test_json_and_figure():
     cavity, tipping, fates, empty = figure.axes
     assert tipping.get_xscale() == "log"
     assert any("2 Hz" in text.get_text() for text in tipping.texts)
+    assert "from rest" in tipping.get_title(loc="left")
     assert not empty.axison
     right, wall, edge = (100 * found.shares.shares[name] for name in ("right", "wall", "edge"))
     words = [text.get_text() for text in fates.get_legend().get_texts()]

@@ -82,7 +82,11 @@ def test_sides_recorded_wrong_are_named_and_move_nothing():
     assert wrong.size
     assert [row for row, *_ in flipped.misread] == wrong.tolist()
     assert all(column == "side_after" for _, column, *_ in flipped.misread)
-    assert flipped.misread_rate[0] == wrong.size / 100
+    share, low, high = flipped.misread_rate
+    assert share == wrong.size / 100
+    # Clopper and Pearson: so many or more at the lower end, so few or fewer at the upper one
+    assert binom.sf(wrong.size - 1, 100, low) == pytest.approx(0.025)
+    assert binom.cdf(wrong.size, 100, high) == pytest.approx(0.025)
     for name in PLACES:
         assert flipped[name].value == pytest.approx(clean[name].value, abs=1e-3 * clean[name].half)
     assert clean.misread == ()

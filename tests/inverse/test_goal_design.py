@@ -313,6 +313,20 @@ def test_what_keeps_the_part_ends_where_the_limit_set_does(name, hi):
     assert found.hi == pytest.approx(hi, abs=1e-6)
 
 
+def test_a_cycle_keeps_the_part_at_its_points():
+    """Three flips that attract, from the formulas of docs/model.md at 50 digits."""
+    scene = ls.load("paper-designed").with_values({"throw.kappa": 12.21, "arm.surface_height": -1.73})
+    facts = reference.paper("designed", kappa=12.21, surface_height=-1.73)
+    points, x, side = {}, mp.mpf(12), 0
+    for _ in range(200):
+        thrown = reference.throw(facts, side, x)
+        x, side = thrown.x, thrown.side
+        points[side] = float(x)
+    intervals = invariant_intervals(scene.map, 12.0, 0)
+    for ends in (intervals.lo, intervals.hi):
+        assert ends == pytest.approx([points[side] for side in range(3)], abs=1e-8)
+
+
 @pytest.mark.parametrize("name", ls.scenes())
 def test_no_start_is_lost_where_all_landings_keep_off_the_ends(name):
     """Against throws from everywhere; of paper-quadrilateral those of side 3 flip from a_3 on and are lost inward."""

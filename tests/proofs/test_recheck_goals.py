@@ -204,6 +204,8 @@ def test_images_without_scatter_do_not_hold_with_it(good, tmp_path):
     report = verdict(f, tmp_path)
     assert report.verdict == "failed"
     assert "is not proved to lie in" in report.reason
+    borders = {end for side in range(3) for end in good.arrays[f"0.edges.{side}"].tolist()}
+    assert {float(end) for end in report.reason.rpartition("(")[2].rstrip(")").split(", ")} <= borders
 
 
 NO_NOISE = [({}, {}), ({"throw.kappa": "1 %"}, {}), ({"gravity.tilt": "1 deg"}, {})]

@@ -13,13 +13,16 @@ import pytest
 from mpmath import mp, mpf
 
 import limitsets as ls
+from limitsets.proofs.prover.attraction import attraction
+from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.goals.recurrent_orbits import closed
-from limitsets.proofs.prover.goals.violating_orbits import Path, ThrowChoice
+from limitsets.proofs.prover.goals.violating_orbits import Path, ThrowChoice, start_that_leaves
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.proofs.prover.proof import write_refutation
 from limitsets.systems.maps import images
 from tests.attack import facts
 from tests.attack.throws import Orbits
+from tests.plates import left_by_some
 from tests.proofs import forge
 from tests.thrower import reference
 
@@ -235,6 +238,18 @@ def test_attracts_all_is_refuted_by_a_start_that_leaves_without_any_noise():
     last = claim.counterexample[-1]
     assert last.lo > 28 or last.hi <= facts.a[last.side]
     assert all(state.hi <= 28 for state in claim.counterexample[:-1])
+
+
+def test_the_one_cell_of_two_that_is_left_is_found():
+    """Next to the joint a part jogs for more than 400 throws; from 25 mm on side 0 it flips behind the joint."""
+    scene = ls.load(left_by_some())
+    covered = cover(parameter_box(scene), 64)
+    ((edges,), *_), cell = covered.grid.edges, covered.grid.index([[25.0]], 0)[0]
+    laid = ((0, edges[0], edges[1]), (0, edges[cell], edges[cell + 1]))
+    assert ls.orbit(scene.map, edges[1], 0, 400).stopped is None
+    first, last = start_that_leaves(attraction(covered), laid)
+    assert edges[cell] < first.lo < edges[cell + 1]
+    assert last.hi <= scene.sides.a[last.side]
 
 
 def test_with_effects_the_periodic_orbit_is_one_of_that_map():

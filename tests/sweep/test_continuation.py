@@ -387,6 +387,28 @@ def test_a_death_on_cells_has_the_bracket_that_they_allow():
     assert re.search(r"at a = 2\.\d{1,4} to 2\.\d{1,4}:", str(death))
 
 
+class Spiral(NamedTuple):
+    """A quarter turn about the origin, which attracts all for growth < 1; beyond 1 all but it leaves."""
+
+    growth: float = 1.0
+
+
+def _spiral(p, x, side):
+    return (-p.growth * x[1], p.growth * x[0]), side, 0
+
+
+ls.register(Spiral, image=_spiral, dimension=2)
+
+
+def test_a_step_on_which_finer_cells_do_not_agree_is_left_out():
+    """At 1.0005 orbits from within 0.2 of the origin stay for 3000 steps, and nothing attracts them."""
+    square = [(-1.0, 1.0), (-1.0, 1.0)]
+    path = ls.continuation(Spiral(1.0), {"growth": (0.5, 1.501)}, steps=2, cells=16, domain=square)
+    assert 0.5 not in path.t
+    for growth, states in zip(path.values["growth"], path.attractors, strict=True):
+        assert len(states) == (growth < 1.0)
+
+
 def test_ends_of_a_bracket_are_rounded_outward():
     def place(value):
         return Place(0.0, {"a": value}, {"a": (value, " in")}, None, None)

@@ -14,6 +14,7 @@ from limitsets import maps
 from limitsets.base.errors import MapError
 from limitsets.feeder.thrower import Throw, fly, throw_map, trace
 from limitsets.systems.maps import drivers
+from limitsets.systems.maps.critical import margins
 from tests.thrower import reference
 from tests.thrower.reference import PAPER, Facts
 
@@ -203,6 +204,8 @@ def test_an_impact_beyond_a_full_turn_is_outside_the_model(flip: str) -> None:
         assert found.code[1:].tolist() == [maps.OUTSIDE_MODEL] * 3
         assert found.x[1:].tolist() == [edge * (1 + 1e-9), 1e3, 1e200]
         assert (found.side[1:] == side).all()
+        none = np.isnan(margins(params, [edge * (1 - 1e-9), edge * (1 + 1e-9), 1e3, 1e200], side))
+        assert none.tolist() == [False, True, True, True]
 
 
 @pytest.mark.parametrize("model", MODELS, ids="-".join)
