@@ -64,6 +64,15 @@ def test_of_a_goal_it_says_for_which_starts():
     assert "&#10003; <b>proved</b>, for every start</td>" in proof_words(lines, (), "")
 
 
+def test_a_margin_says_up_to_where_the_goal_is_proved_and_from_where_it_fails():
+    """At a speed 0.733 % less parts of paper-designed get beyond x = 20."""
+    *_, last = answers({"what": "proof", "scene": ls.dump(PAPER), "margins": ["throw.speed"]})
+    proved, refuted = (last[word].split() for word in ("proved", "refuted"))
+    assert float(proved[0]) < 0.7335 < float(refuted[0]) < 0.75
+    assert last["margin"] == "throw.speed"
+    assert proved[1] == refuted[1] == "%"
+
+
 def test_a_goal_that_is_proved_of_nothing_says_so():
     """The limit set of paper-designed ends at 23.383 in."""
     goal = {"oriented_beyond": {"x": "25 in", "side": 2}}

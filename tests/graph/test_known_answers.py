@@ -149,6 +149,26 @@ def test_a_cell_on_which_the_flip_is_undecided_gets_the_image_of_both_branches(m
     assert set(graph.grid.side_of(successors[successors < graph.n_cells]).tolist()) == {0, 2}
 
 
+def below_the_break(x):
+    return 0.5 * x
+
+
+def steep_from_the_break(x, at):
+    return 0.95 - 100.0 * (x - at)
+
+
+def past_the_break(x, at):
+    return x - at
+
+
+def test_what_a_branch_does_right_beside_its_end_is_seen():
+    """From 0.95 at x = 0.453 the image falls to 0.625 within a sixteenth of the cell, and below 0 within the cell."""
+    params = ls.map(pieces=(below_the_break, steep_from_the_break), margin=past_the_break, at=0.453)
+    graph = ls.transitions(params, ls.grid([(0.0, 1.0)], cells=10), "end-points")
+    reached = graph.successors(4)
+    assert reached[reached < 10].tolist() == list(range(10))
+
+
 @METHODS
 def test_images_of_cells_hold_the_images_of_their_points(method):
     scene = ls.load("paper-initial")

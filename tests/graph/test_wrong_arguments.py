@@ -295,6 +295,14 @@ def test_a_large_graph_is_told_of_before_it_is_built(monkeypatch, capsys):
     assert capsys.readouterr().err == ""
 
 
+def test_of_a_limited_memory_there_is_what_is_not_in_use(monkeypatch, tmp_path):
+    limit, used = tmp_path / "memory.max", tmp_path / "memory.current"
+    limit.write_text("5000\n")
+    used.write_text("2000\n")
+    monkeypatch.setattr(memory, "LIMITS", ((limit, used), (tmp_path / "none", used)))
+    assert memory._free_bytes() == 3000
+
+
 def test_an_image_method_that_there_is_not():
     allowed = "boxes, corners, corners-padded, end-points"
     with pytest.raises(AnswerError, match=f"^the image method is 'random'; allowed: {allowed}; correct"):

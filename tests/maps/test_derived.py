@@ -15,6 +15,7 @@ from limitsets.systems.cells import Domain
 from limitsets.systems.graph.images.enclosed import BoxImages, enclosures
 from limitsets.systems.maps.critical import margins
 from limitsets.systems.maps.derived import MAYBE, NEVER, SURE, branch_boxes
+from limitsets.systems.maps.kernels import decision
 from tests.maps_of_tests import Tent
 
 # ----------------------------------------------------------------
@@ -197,6 +198,11 @@ def test_a_margin_decides_between_two_branches():
 
 def _hill(x, b, n):
     return b * x**n / (1 + x**n)
+
+
+@pytest.mark.parametrize(("x", "slope"), [(0.25, 1.9), (0.75, -1.9)])
+def test_a_decision_has_the_slope_of_the_branch_that_the_margin_takes(x, slope):
+    assert decision(Tent(1.9), x, 0) == (x - 0.5, slope, True)
 
 
 def test_a_map_with_a_real_power_is_enclosed():

@@ -151,6 +151,9 @@ def test_states_curve_and_shares_are_drawn():
         assert sorted(sides) == pytest.approx([3.6, 5.75, 6.75], abs=1e-9)
     (line,) = (each for each in curve.lines if each.get_label().startswith("chain"))
     assert line.get_ydata() == pytest.approx(found.filled.right)
+    (marks,) = (shares for shares in curve.containers if shares.get_label().endswith("a new part each pass"))
+    # nine, even along the logarithmic axis from 1 to 10; two pairs fall on one pass
+    assert marks.lines[0].get_xdata().tolist() == sorted({round(10 ** (k / 8)) for k in range(9)})
     widths = [bar.get_width() for bar in shares.patches]
     assert widths[len(widths) // 2 :] == pytest.approx(found.filled.last.tolist())
     assert len(memory.get_yticks()) == 6

@@ -128,6 +128,13 @@ def test_shares_of_the_cubic_map(method):
     assert not (found.inner[0] & found.outer[1]).mask.any()
 
 
+def test_a_basin_of_the_only_cell_is_every_start():
+    """x' = x/2 keeps [-1, 1]."""
+    found = ls.resilience.basin_stability(*setting(Contraction(0.5, 0.0), [(-1.0, 1.0)], 1, "boxes"))
+    (share,) = found.attractors
+    assert (found.how, share.lo, share.hi) == ("proved", 1.0, 1.0)
+
+
 def test_sampled_shares_lie_in_their_intervals():
     graph, attractors = setting(CUBIC, [(-1.0, 1.1)], 1500)
     inside = 0

@@ -17,6 +17,7 @@ from limitsets.feeder.scattering import (
     still_map,
     thrown,
 )
+from limitsets.parameters.noise import absorbing
 from limitsets.parameters.noise.absorbing import absorption, classes, feeding, random_starts, with_border
 from limitsets.parameters.noise.cell_images import BoxcarOperator, Boxcars, laid
 from limitsets.parameters.noise.ulam import transfer
@@ -360,6 +361,15 @@ def test_walk_off_both_ends():
     assert part.escape == pytest.approx(1.0 - np.cos(np.pi / 62), rel=1e-7)
     assert not part.closed
     assert part.leads_to["outside"] == pytest.approx(part.escape, rel=1e-12)
+
+
+def test_the_search_for_a_distribution_ends_after_so_many_steps(monkeypatch):
+    """A walk that mixes slowly, from even weights: seven steps are seven products, far from the half sine."""
+    monkeypatch.setattr(absorbing, "_arnoldi", lambda part: None)
+    monkeypatch.setattr(absorbing, "MOST_STEPS", 7)
+    _, residual, products = absorbing.distribution(walk(60, 0.5), np.arange(61))
+    assert products == 7
+    assert residual > 1e-3
 
 
 def test_two_cells_closed():

@@ -267,3 +267,12 @@ def test_about_one_point_of_a_thousand_is_checked_whatever_the_chunks(block):
     numbers = np.arange(200_000, dtype=np.uint64)
     mixed = (numbers * checking.SCATTERED) % np.uint64(2**32)
     assert (mixed % np.uint64(checking.SAMPLED) == 0).sum() == pytest.approx(200, rel=0.3)
+
+
+def test_the_points_at_multiples_of_a_thousand_are_checked(block):
+    """Of the numbers in mixed order: points whose place in it is known, by the inverse of the odd factor."""
+    inverse = pow(2654435761, -1, 2**32)
+    places = (1000, 1001, 2000, 2002, 3001, 7_001_000)
+    numbered = block._replace(numbers=np.array([place * inverse % 2**32 for place in places]))
+    checked = checking.checks(numbered, told(block)) != checking.NOT_CHECKED
+    assert checked.tolist() == [True, False, True, False, False, True]
