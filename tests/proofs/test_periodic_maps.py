@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -234,3 +235,13 @@ def test_formulas_name_the_period() -> None:
     table = ls.formulas(ls.map(pendulum, push=0.0), plane).table
     assert table["periodic"] == [["tau", None]]
     assert not any("modulo" in text for text in ls.formulas(params).lines)
+
+
+def test_a_proof_says_how_many_cells_of_its_basin_a_certificate_shows(tmp_path: Path) -> None:
+    """Cells that recur beside the cycle of period 2 are passed by every orbit: ranks end there."""
+    proof = ls.certify(ls.map(circle, omega=0.48, k=0.9), line(0.0, 1000), ["basin"])
+    report = ls.recheck(proof.save(tmp_path / "circle.proof.zip", recheck=False))
+    (share,) = re.findall(r"cells that cover ([0-9.]+) %", " ".join(report.statement))
+    (shown,) = re.findall(r"a certificate shows (\d+) of them", str(proof))
+    assert float(share) == pytest.approx(int(shown) / 10, abs=0.1001)  # the checker rounds down
+    assert int(shown) < len(proof.enters)

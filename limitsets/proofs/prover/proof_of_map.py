@@ -196,7 +196,20 @@ class ProofOfMap(Saved):
             return tuple(tables)
         kind = "no image leads out" if self.final is None else "no image leads out, or orbits tend to a cycle"
         kept = _region(self.cells, "Attracting cells", kind)
-        return *tables, kept, _region(self.enters, "Basin", "every point of its cells enters them")
+        held = _region(self.enters, "Basin", "every point of its cells enters them", self._ranked())
+        return *tables, kept, held
+
+    def _ranked(self) -> str:
+        """Say of how many cells a certificate shows that they lead to the attracting cells, if not of all."""
+        if self.final is not None or self.goal is not None or not passing(self.graph).any():
+            return ""
+        ranked, count = int((self.arrays["rank"] >= 0).sum()), len(self.enters)
+        if ranked == count:
+            return ""
+        return (
+            f"; a certificate shows {ranked} of them, for its ranks do not pass through cells that recur: finer "
+            "cells, or ends= with boxes around the attracting cells, show more"
+        )
 
     def __str__(self) -> str:
         return "\n\n".join(table.text() for table in self.tables())
@@ -215,7 +228,7 @@ def _cycle_table(cycles: tuple[CycleOfMap, ...]) -> Table:
     )
 
 
-def _region(cells: CellSet, caption: str, proved: str) -> Table:
+def _region(cells: CellSet, caption: str, proved: str, note: str = "") -> Table:
     """Say where cells are: which intervals on a line, else by boxes around their connected pieces."""
     rows: list[tuple[Any, ...]]
     if cells.grid.dimension == 1:
@@ -225,7 +238,7 @@ def _region(cells: CellSet, caption: str, proved: str) -> Table:
         rows = [(side, *box) for side, boxes in cells.pieces().items() for box in boxes]
     spans = [Column(name, show=".6g", ends=True) for name in names]
     caption += ": boxes around its pieces" if cells.grid.dimension > 1 else ""
-    how = f"proved: {proved}; {len(cells)} of {cells.grid.n_cells} cells"
+    how = f"proved: {proved}; {len(cells)} of {cells.grid.n_cells} cells{note}"
     return Table(("side", *spans), rows, caption, how)
 
 
