@@ -33,7 +33,7 @@ def value(x):
 
 def orbits(function, dimension, period, parts):
     """All orbits of a smallest period among the points with a denominator, and how often each step goes round."""
-    found, met = [], set()
+    listed, met = [], set()
     for start in itertools.product(range(parts), repeat=dimension):
         points, turns = [tuple(value(Fraction(k, parts)) for k in start)], []
         for _ in range(period):
@@ -43,8 +43,8 @@ def orbits(function, dimension, period, parts):
         smallest = len(set(points[:-1])) == period
         if points[-1] == points[0] and smallest and points[0] not in met:
             met |= set(points)
-            found.append(cycle([[float(v) for v in point] for point in points[:-1]]) | {"turns": turns})
-    return found
+            listed.append(cycle([[float(v) for v in point] for point in points[:-1]]) | {"turns": turns})
+    return listed
 
 
 def certificate(function, dimension, listed, periods=("1", "1"), begins=(BEGIN, BEGIN), **more):
