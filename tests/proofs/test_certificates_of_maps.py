@@ -34,6 +34,11 @@ def logistic(x, r):
     return r * x * (1.0 - x)
 
 
+def turned(x, omega):
+    y = x + omega - 0.9 / (2 * math.pi) * math.sin(2 * math.pi * x)
+    return y - math.floor(y)
+
+
 def spiral(x, y):
     return 0.4 * x - 0.4 * y + 0.1 * x**2, 0.4 * x + 0.4 * y
 
@@ -49,6 +54,8 @@ CASES = {
     "gap": (gap, [(-1.3, 1.2)], 1000, {}, "trapping attracts-all expanding cycles", (2, -0.26 / 0.96)),
     "logistic": (lambda: ls.map(logistic, r=3.2), [(0.4, 0.9)], 512, {}, "invariant cycles", (2, TWO)),
     "range": (lambda: ls.map(ricker, r=2.3), [(0.02, 2.6)], 1000, {"r": 2.35}, "trapping basin", None),
+    # a jump of floor has an image, and no slope
+    "jump": (lambda: ls.map(turned, omega=0.05), [(0.0, 1.0)], 256, {}, "trapping basin", None),
     "spiral": (lambda: ls.map(spiral), [(-1, 1), (-1, 1)], 64, {}, "trapping basin cycles", (1, 0.0)),
     "leslie": (ls.maps.Leslie, [(-0.001, 90), (-0.001, 70)], 64, {}, "trapping basin", None),
     "textbook": (lambda: ls.maps.Logistic(2.5), [(0.1, 0.9)], 512, {}, "attracts-all", None),

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from limitsets.feeder.engine.depression import Pose
 
 
-# A curve with more points than this has no marks.
+# Marks on a curve at each pass, for so many passes at most.
 MARKS = 9
 
 

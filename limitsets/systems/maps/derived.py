@@ -267,7 +267,7 @@ class BranchBoxes:
     lo, hi : ndarray, shape (n, d)
         The images.
     slope_lo, slope_hi : ndarray, shape (n, d, d)
-        Entry [k, i, j] holds every dx_i'/dx_j on box k.
+        Entry [k, i, j] holds every dx_i'/dx_j on box k; all numbers where these are not bounded.
     state : ndarray of int8, shape (n,)
         Whether the map takes this branch there: `SURE`, `NEVER`, `MAYBE`; `UNKNOWN` where nothing is proved.
     side : int
@@ -296,7 +296,8 @@ def branch_boxes(lo_map: Any, hi_map: Any, side: int, branch: int, lo: Floats, h
     image, slope, state = np.full((2, n, d), np.nan), np.full((2, n, d, d), np.nan), np.empty(n, np.int8)
     corners = [tuple(np.ascontiguousarray(end[:, k]) for k in range(d)) for end in (lo, hi)]
     to = _enclose_branch(lo_map, hi_map, side, branch, corners[0], corners[1], image, slope, state)
-    state[~(np.isfinite(image).all(axis=(0, 2)) & np.isfinite(slope).all(axis=(0, 2, 3)))] = UNKNOWN
+    state[~np.isfinite(image).all(axis=(0, 2))] = UNKNOWN
+    slope[:, ~np.isfinite(slope).all(axis=0)] = [[-np.inf], [np.inf]]  # a jump has an image, and no slope
     return BranchBoxes(image[0], image[1], slope[0], slope[1], state, to)
 
 
