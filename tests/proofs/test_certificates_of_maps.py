@@ -43,6 +43,10 @@ def spiral(x, y):
     return 0.4 * x - 0.4 * y + 0.1 * x**2, 0.4 * x + 0.4 * y
 
 
+def rivals(x, y):
+    return 3.0 * x / (1.0 + x + 2.0 * y), 3.0 * y / (1.0 + y + 2.0 * x)
+
+
 def gap():
     return ls.map(pieces=(low, high), margin=place, s=1.4)
 
@@ -77,6 +81,14 @@ def header_of(file):
 
 
 @pytest.mark.parametrize("name", CASES)
+def test_cells_on_a_face_that_stays_are_invariant_and_not_trapping(tmp_path):
+    """Each of two rivals alone is at 2 and attracts, on an axis, which is mapped into itself: no image is off it."""
+    proof = ls.certify(ls.map(rivals), ls.grid([(0.0, 3.0)] * 2, cells=64), ["trapping", "invariant"])
+    assert [claim.verdict for claim in proof.claims] == ["undecided", "proved"]
+    assert "may reach the border of the domain" in proof.claims[0].reason
+    assert ls.recheck(proof.save(tmp_path / "rivals.proof.zip", recheck=False)).verdict == "proved"
+
+
 def test_what_is_proved_is_saved_and_rechecked(name, tmp_path):
     proof, file, orbit = certified(name, tmp_path)
     report = ls.recheck(file)

@@ -1,10 +1,11 @@
 """Proofs about any map on a grid: what the enclosed images of the cells imply, and periodic orbits.
 
-*Invariant, trapping*: no image of an attracting component meets a cell outside; cells are closed, so the images lie in
-the interior of the component, relative to the domain.
-*Attracts all*: besides, no image leaves the domain and every recurrent component attracts, or orbits pass through: its
-cells, cut finer, do not recur.  Then the rank of a cell, the longest path to an attracting cell, falls along every
-orbit outside, but for the stays where orbits pass, which are bounded.
+*Invariant*: no image of an attracting component meets a cell outside.
+*Trapping*: besides, no image reaches the border of the domain; cells are closed, so the images lie in the interior of
+the component.
+*Attracts all*: the components are invariant, no image leaves the domain, and every recurrent component attracts, or
+orbits pass through: its cells, cut finer, do not recur.  Then the rank of a cell, the longest path to an attracting
+cell, falls along every orbit outside, but for the stays where orbits pass, which are bounded.
 *Basin*: orbits from the cells all of whose paths end in attracting cells enter these, and stay.
 *Ends in*: the cells of some boxes from which no path leaves these boxes are mapped into each other; from the cells with
 the starts every path leads there.
@@ -19,6 +20,7 @@ For two corners of parameters all of it holds for each of the maps between.
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -48,7 +50,7 @@ from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import transitions
 from limitsets.systems.graph.components import ranks
-from limitsets.systems.maps import coerce, kernels, kind_of
+from limitsets.systems.maps import coerce, has_slope, kernels, kind_of
 from limitsets.systems.maps.contract import compiled_kind_of
 from limitsets.systems.maps.derived import NEVER, UNKNOWN, branch_boxes
 from limitsets.systems.sets.basin import longest_stays
@@ -68,6 +70,25 @@ def _invariant(proof: ProofOfMap) -> Claim:
     if not len(proof.cells):
         return Claim("invariant", "undecided", "there are no attracting cells", {})
     return Claim("invariant", "proved", "", {})
+
+
+def _trapping(proof: ProofOfMap) -> Claim:
+    """Prove that images lie in the interior of the cells: not on the border of the domain either."""
+    grid, numbers = proof.graph.grid, proof.cells.numbers()
+    domain, (lo, hi, sides) = grid.domain, grid.corners(numbers)
+    ends = ~np.array(domain.periodic)
+    at_border = ((lo <= domain.lo[sides]) | (hi >= domain.hi[sides]))[:, ends].any()
+    branches = range(len(kind_of(proof.map).branches)) if at_border and has_slope(proof.map) else ()
+    for side, branch in itertools.product(np.unique(sides).tolist(), branches):
+        mine = numbers[sides == side]
+        boxes = branch_boxes(proof.map, proof.upper, side, branch, *grid.boxes(mine, side))
+        inside = (boxes.lo > domain.lo[boxes.side]) & (boxes.hi < domain.hi[boxes.side])
+        reaching = np.flatnonzero(~inside[:, ends].all(axis=1) & (boxes.state != NEVER))
+        if reaching.size:
+            where = f"the image of {_place(grid, int(mine[reaching[0]]))} may reach the border of the domain"
+            reason = f"{where}: widen the domain, or claim invariant"
+            return Claim("trapping", "undecided", reason, {}, final=True)
+    return replace(_invariant(proof), claim="trapping")
 
 
 def _ends_in(proof: ProofOfMap) -> Claim:
@@ -194,7 +215,7 @@ PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "expanding": _expanding,
     "invariant": _invariant,
     "basin": lambda proof: replace(_invariant(proof), claim="basin"),
-    "trapping": lambda proof: replace(_invariant(proof), claim="trapping"),
+    "trapping": _trapping,
 }
 CLAIMS_OF_MAP = (*PROVERS, "cycles", "all-cycles", "converges")
 """What can be claimed of any map."""
