@@ -7,6 +7,7 @@ every cell where its paths end.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -18,7 +19,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from limitsets.systems.maps.codes import OUTSIDE, UNDECIDED
 
-__all__ = ["HI", "LO", "Answer", "by_cmgdb", "by_scipy"]
+__all__ = ["HI", "LO", "Answer", "by_cmgdb", "by_scipy", "morse_by_cmgdb"]
 
 LO, HI = (-0.001, -0.001), (90.0, 70.0)
 
@@ -51,33 +52,60 @@ def reduced(order: NDArray[np.bool_], sizes: list[int]) -> set[tuple[int, int]]:
     return {(sizes[i], sizes[j]) for i, j in np.argwhere(proper & ~between)}
 
 
-def by_cmgdb(depth: int, *, adaptive: bool = False) -> Answer:
-    """CMGDB on all cells at once (or halving only what recurs, its own default), the map evaluated in batches.
-
-    The basins, per set of components that a cell can reach, ask for a second pass over the map: CMGDB's way to them.
-    """
+def cmgdb() -> Any:
+    """CMGDB, without the warnings of its import."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import CMGDB
+    return CMGDB
+
+
+def morse_by_cmgdb(
+    images: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    ends: tuple[Sequence[float], Sequence[float]],
+    depth: int,
+    *,
+    periodic: bool | Sequence[bool] = False,
+    adaptive: bool = False,
+) -> tuple[Any, Any]:
+    """Morse graph and map graph of CMGDB, from a function of points (n, d) that is called in batches.
+
+    Along an axis that closes images are moved to begin in the domain: of the cat map's lift it loses cells else.
+    """
+    rival = cmgdb()
+    levels = (depth, depth) if adaptive else (depth, depth, depth, 10_000)
 
     def scalar(rectangle: list[float]) -> list[float]:
         raise AssertionError("the batch map was to be called")
 
     def batch(rectangles: NDArray[np.float64]) -> NDArray[np.float64]:
-        return CMGDB.BoxMapBatch(images, rectangles, padding=True)
+        after = rival.BoxMapBatch(images, rectangles, padding=True)
+        if not np.any(periodic):
+            return after
+        begin, period = np.array(ends[0]), np.subtract(ends[1], ends[0])
+        turns = np.where(periodic, np.floor((after[:, : begin.size] - begin) / period), 0.0)
+        return after - np.tile(turns * period, 2)
 
-    begin = perf_counter()
-    levels = (depth, depth) if adaptive else (depth, depth, depth, 10_000)
-    model = CMGDB.Model(*levels, list(LO), list(HI), scalar)
+    closing = (np.broadcast_to(periodic, len(ends[0])).tolist(),) if np.any(periodic) else ()
+    model = rival.Model(*levels, *map(list, ends), *closing, scalar)
     model.set_batch_map(batch)
-    morse, graph = CMGDB.ComputeMorseGraph(model)
+    return rival.ComputeMorseGraph(model)
+
+
+def by_cmgdb(depth: int, *, adaptive: bool = False) -> Answer:
+    """CMGDB on all cells at once (or halving only what recurs, its own default), the map evaluated in batches.
+
+    The basins, per set of components that a cell can reach, ask for a second pass over the map: CMGDB's way to them.
+    """
+    begin = perf_counter()
+    morse, graph = morse_by_cmgdb(images, (LO, HI), depth, adaptive=adaptive)
     sizes = [len(morse.morse_set(v)) for v in morse.vertices()]
     order = {(sizes[i], sizes[j]) for i, j in morse.edges()}
     seconds = perf_counter() - begin
     basins: dict[Any, int] = {}
     if not adaptive:
         graph.build_cache()
-        masks = CMGDB.MorseReachabilityMasks(graph, morse, np.arange(graph.num_vertices()))
+        masks = cmgdb().MorseReachabilityMasks(graph, morse, np.arange(graph.num_vertices()))
         for mask, count in zip(*np.unique(np.asarray(masks), return_counts=True), strict=True):
             reached = frozenset(size for k, size in enumerate(sizes) if int(mask) >> k & 1)
             basins[reached] = int(count)
