@@ -21,6 +21,7 @@ from limitsets.systems.graph.ranges import Ranges
 from limitsets.systems.maps import INWARD, images
 from limitsets.systems.maps.pieces import point_of
 from limitsets.systems.topology import topologies
+from tests.bench.leslie_rivals import morse_by_cmgdb
 from tests.bench.measure import Turns, limit, take_turns, versus
 from tests.browsers import browser
 from tests.explorer.served import Visitor, running, served
@@ -247,21 +248,12 @@ def neuron(b, k):
 
 def sizes_by_cmgdb(b, k):
     """Sizes of the recurrent components at one point."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import CMGDB
 
     def images_of(points):
         x, y = points[:, 0], points[:, 1]
         return np.column_stack([x * x * np.exp(y - x) + k, 0.89 * y - b * x + 0.28])
 
-    def scalar(rectangle):
-        raise AssertionError("the batch map was to be called")
-
-    lo, hi = zip(*PHASE, strict=True)
-    model = CMGDB.Model(HALVINGS, HALVINGS, HALVINGS, 10_000, list(lo), list(hi), scalar)
-    model.set_batch_map(lambda boxes: CMGDB.BoxMapBatch(images_of, boxes, padding=True))
-    morse, _ = CMGDB.ComputeMorseGraph(model)
+    morse, _ = morse_by_cmgdb(images_of, tuple(zip(*PHASE, strict=True)), HALVINGS)
     return sorted(len(morse.morse_set(v)) for v in morse.vertices())
 
 

@@ -80,7 +80,6 @@ def header_of(file):
         return json.loads(packed.read("header.json"))
 
 
-@pytest.mark.parametrize("name", CASES)
 def test_cells_on_a_face_that_stays_are_invariant_and_not_trapping(tmp_path):
     """Each of two rivals alone is at 2 and attracts, on an axis, which is mapped into itself: no image is off it."""
     proof = ls.certify(ls.map(rivals), ls.grid([(0.0, 3.0)] * 2, cells=64), ["trapping", "invariant"])
@@ -89,6 +88,7 @@ def test_cells_on_a_face_that_stays_are_invariant_and_not_trapping(tmp_path):
     assert ls.recheck(proof.save(tmp_path / "rivals.proof.zip", recheck=False)).verdict == "proved"
 
 
+@pytest.mark.parametrize("name", CASES)
 def test_what_is_proved_is_saved_and_rechecked(name, tmp_path):
     proof, file, orbit = certified(name, tmp_path)
     report = ls.recheck(file)
