@@ -46,6 +46,10 @@ def turned(x, y, z):
     return 0.5 * y, 0.5 * z, 0.5 * math.sin(x)
 
 
+def rivals(x, y):
+    return 3.0 * x / (1.0 + x + 2.0 * y), 3.0 * y / (1.0 + y + 2.0 * x)
+
+
 def around(points, domain, wide, fine):
     """Edges of 256 cells along each axis, and finer ones near some points."""
     axes = [
@@ -157,6 +161,8 @@ def test_starts_end_in_ends_that_hold_the_balls(tmp_path):
         (ls.map(ricker, r=2.0), line(0.02, 2.6, 512), "through ["),  # the slope is -1
         (ls.map(ricker, r=3.1), line(0.02, 4.0, 512), "no cycle that attracts is found"),
         (ls.map(turned), ls.grid([(-1, 1)] * 3, cells=8), "at most two dimensions"),
+        # the two that attract lie on the border; orbits from x = y end on the saddle (2/3, 2/3)
+        (ls.map(rivals), ls.grid([(0, 3)] * 2, cells=16), "no balls around it in the domain are contracted"),
     ],
 )
 def test_what_is_missing_is_said(lower, grid, reason):

@@ -176,7 +176,8 @@ def converging_claim(proof: ProofOfMap) -> tuple[ProofOfMap, Claim]:
             else:
                 ball, why = None, "no cell lies in the balls that are contracted: take finer cells there"
         chosen.append(replace(cycle, ball=ball))
-        missing += [f"period {cycle.period} through {cycle.lo[0]}: {why}"] if why else []
+        # what attracts and has no ball tells more than an orbit that ended on a saddle
+        missing[:0] = [f"period {cycle.period} through {cycle.lo[0]}: {why}"] if why else []
     if not drawn:
         reason = missing[0] if missing else "no cycle that attracts is found"
         return proof, Claim("converges", "undecided", reason, {})
