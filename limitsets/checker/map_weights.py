@@ -30,13 +30,16 @@ from .any_map import Map, floats_around
 from .balls import Array
 from .map_cells import MapCells
 
-LEAST, MOST = 2.0**-500, 2.0**500  # of weights and slopes: no quotient of two leaves the range of doubles
+SMALLEST, LARGEST = (
+    2.0**-500,
+    2.0**500,
+)  # of weights and slopes: no quotient of two leaves the range of doubles
 ROOM = 1.0 - 2.0**-20  # sums of at most 2^31 quotients are right to 2^-21
 
 
 def check_weights(the_map: Map, c: MapCells) -> str:
     """Check that the cells without a rank receive less than their weights; "" or the reason."""
-    received, fits = np.zeros(len(c.rank)), (c.weight >= LEAST) & (c.weight <= MOST)
+    received, fits = np.zeros(len(c.rank)), (c.weight >= SMALLEST) & (c.weight <= LARGEST)
     if not fits[c.thin].all():
         return f"{c.name(int(np.argmax(c.thin & ~fits)))}: its weight is not between 2^-500 and 2^500"
     for branch, side in itertools.product(range(len(c.target)), range(len(c.edges))):
@@ -61,11 +64,11 @@ def add_received(the_map: Map, c: MapCells, key: tuple[int, int], received: Arra
             continue
         slope = the_map.image[key].gradients(the_map.piece(c.box(cell)[1]).balls)[0][0]
         least = floats_around(abs(slope))[0]
-        if not ((slope > 0 or slope < 0) and least >= LEAST):
+        if not ((slope > 0 or slope < 0) and least >= SMALLEST):
             return f"{c.name(cell)}: that the slope on branch {branch} has one sign is not proved"
         if before != (cell - 1, bool(slope > 0)):
             runs.append([])
-        runs[-1].append((first, last, float(c.weight[cell]) / min(least, MOST)))
+        runs[-1].append((first, last, float(c.weight[cell]) / min(least, LARGEST)))
         before = cell, bool(slope > 0)
     for run in runs:
         first, last = min(low for low, _, _ in run), max(high for _, high, _ in run)
