@@ -10,7 +10,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.proofs.prover import certificate_of_map
-from limitsets.proofs.prover.certificate import DeniedError
+from limitsets.proofs.prover.certificate import DeniedError, written
 from limitsets.proofs.prover.certificate_of_map import frames_to_try
 
 
@@ -254,3 +254,9 @@ def test_every_step_contracts_in_the_frames_of_an_attracting_orbit(slopes):
         after = chosen[(k + 1) % len(slopes)]
         size *= np.linalg.norm(np.linalg.solve(after, slope @ chosen[k]), 2)
     assert size < 1.0
+
+
+def test_a_text_that_no_checker_reads_is_not_written(tmp_path):
+    with pytest.raises(AnswerError, match=r"is '5\.0 MB'; allowed: at most 4 MB"):
+        written(tmp_path / "long.proof.zip", {"boxes": ["x" * 2**20] * 5}, {}, {}, recheck=False, workers=1)
+    assert not list(tmp_path.iterdir())

@@ -181,6 +181,16 @@ def test_cycles_of_a_graph_in_one_and_two_dimensions():
     assert Counter(c.period for c in ls.cycles(plane, 4, within=within)) == {1: 1, 2: 1, 4: 1}
 
 
+def in_space(x, y, z):
+    return 1.4 - x**2 - 0.1 * z, x, y
+
+
+def test_cycles_in_space_are_those_that_certify_lists():
+    graph = ls.transitions(ls.map(in_space), ls.grid([(-1.65, 1.65)] * 3, cells=4))
+    with pytest.raises(AnswerError, match="of 3 coordinates'; allowed: one or two; limitsets.certify"):
+        ls.cycles(graph, 1)
+
+
 def test_wrong_questions():
     graph = ls.transitions(maps.Logistic(3.2), ls.grid([(0.0, 1.0)], cells=64))
     with pytest.raises(AnswerError, match="largest period"):

@@ -186,6 +186,9 @@ class Saved(Tabled):
         raise NotImplementedError  # each answer has its own
 
 
+# Letters of a header at most.
+MOST_TEXT = 4 << 20
+
 # Brackets of the impact are widened by this share of the angle, so that another arithmetic can confirm them.
 SLACK = 2.0**-34
 
@@ -416,13 +419,20 @@ def written(
     }
     form = {"format": "limitsets-proof", "version": 3}
     whole = {**form, **header, "producer": _producer(), "arrays": described}
+    text = json.dumps(whole, indent=1)
+    if len(text) > MOST_TEXT:
+        value, way = (
+            f"{len(text) / 2**20:.1f} MB",
+            "claim fewer orbits, or fewer boxes of parameters, in one file",
+        )
+        raise AnswerError("the text of the certificate", value, "at most 4 MB, which the checker reads", way)
     packed = io.BytesIO()
     np.savez(packed, **arrays)  # type: ignore[arg-type]  # arrays by name
     target, seconds, denied = Path(path), None, None
     with replaced(target.parent) as draft:
         written = draft / target.name
         with zipfile.ZipFile(written, "w", zipfile.ZIP_STORED) as file:
-            file.writestr("header.json", json.dumps(whole, indent=1))
+            file.writestr("header.json", text)
             file.writestr("arrays.npz", packed.getvalue())
         if recheck:
             kept = target.with_name(target.name.removesuffix(".zip").removesuffix(".proof") + ".denied.zip")

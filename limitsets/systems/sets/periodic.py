@@ -475,6 +475,11 @@ def cycles_from(
     kind = compiled_kind_of(params, "cycles")
     line = kind.dimension == 1 and domain is not None and domain.closes
     if not (kind.dimension == 2 or line) or not has_slope(params):
+        if kind.dimension > 2:
+            way = 'limitsets.certify(map, grid, ["all-cycles"], period=3) lists all of a box'
+            raise AnswerError(
+                "the map of cycles", f"{kind.name}, of {kind.dimension} coordinates", "one or two", way
+            )
         raise AnswerError("the map", kind.name, "a map of the plane with image_on", "register image_on")
     x = np.asarray(starts, dtype=np.float64).reshape(-1, kind.dimension)
     sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), (len(x),)))
