@@ -187,7 +187,7 @@ def in_space(x, y, z):
 
 def test_cycles_in_space_are_those_that_certify_lists():
     graph = ls.transitions(ls.map(in_space), ls.grid([(-1.65, 1.65)] * 3, cells=4))
-    with pytest.raises(AnswerError, match="of 3 coordinates'; allowed: one or two; limitsets.certify"):
+    with pytest.raises(AnswerError, match=r"of 3 coordinates'; allowed: one or two; limitsets\.certify"):
         ls.cycles(graph, 1)
 
 
