@@ -4,7 +4,7 @@ docs/certificates.md, "What it rests on", number 5, and "Certificates of any map
 """
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -43,12 +43,14 @@ def range_max(values: Array, first: Array, last: Array) -> Array:
 
 
 class Way(NamedTuple):
-    """A way from cells to others: a jog or a flip, or a branch of a map."""
+    """A way from cells to others: a jog or a flip, or a branch of a map.
+
+    `extremes` leads from labels and some cells to the least and the largest label among the target cells of each.
+    """
 
     name: str
     possible: Array  # from which cells it is
     extremes: Callable[[Array, Array], tuple[Array, Array]]
-    """From labels and some cells to the least and the largest label among the target cells of each of these."""
 
 
 class Labelled:
@@ -59,28 +61,30 @@ class Labelled:
 
     def name(self, cell: int) -> str:
         """Name a cell, for people."""
-        raise NotImplementedError
+        raise NotImplementedError  # on an arm, or in one to three coordinates
 
     def ways(self) -> list[Way]:
         """Return the ways to target cells."""
-        raise NotImplementedError
+        raise NotImplementedError  # jog and flip, or branches
 
     def check_components(self, cells: Array) -> str:
         """Check that some cells of components map into cells of their own component; "" or the reason."""
-        for way in self.ways():
-            chosen = np.flatnonzero(cells & way.possible)
-            least, most = way.extremes(self.component, chosen)
+        for way, chosen, least, most in self.targets(self.component, cells):
             bad = chosen[(least != self.component[chosen]) | (most != self.component[chosen])]
             if len(bad):
-                return f"{self.name(int(bad[0]))}: {way.name} may lead out of its component"
+                return f"{self.name(int(bad[0]))}: {way} may lead out of its component"
         return ""
 
     def check_falling(self, what: str, label: Array, cells: Array) -> str:
         """Check that a label falls along every way from some cells, to targets that have one; "" or the reason."""
-        for way in self.ways():
-            chosen = np.flatnonzero(cells & way.possible)
-            least, most = way.extremes(label, chosen)
+        for way, chosen, least, most in self.targets(label, cells):
             bad = chosen[(least < 0) | (most >= label[chosen])]
             if len(bad):
-                return f"{self.name(int(bad[0]))}: the {what} does not fall along {way.name}"
+                return f"{self.name(int(bad[0]))}: the {what} does not fall along {way}"
         return ""
+
+    def targets(self, label: Array, cells: Array) -> Iterator[tuple[str, Array, Array, Array]]:
+        """Give by way the cells, of some, from which it is possible, and the extremes of a label among targets."""
+        for way in self.ways():
+            chosen = np.flatnonzero(cells & way.possible)
+            yield way.name, chosen, *way.extremes(label, chosen)

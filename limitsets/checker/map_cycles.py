@@ -30,9 +30,7 @@ class Listed(NamedTuple):
     boxes: Boxes
     side: list[int]
     branch: list[int]
-    turns: list[
-        list[int]
-    ]  # by point and axis the periods that are taken off the image, 0 along axes that end
+    turns: list[list[int]]  # by point and axis: periods that are taken off the image, 0 where an axis ends
     attracts: bool
     frames: list[list[list[float]]]  # by point a matrix, [] where none is needed
     radius: float | None  # of the balls in these frames that the map contracts

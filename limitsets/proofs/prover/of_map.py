@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -34,6 +34,7 @@ from limitsets.base import (
     arguments_checked_as,
     shown_in_notebooks,
 )
+from limitsets.base.arrays import Ints
 from limitsets.numbers.interval import guard
 from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.cycles_of_map import (
@@ -52,7 +53,7 @@ from limitsets.systems.graph import transitions
 from limitsets.systems.graph.components import ranks
 from limitsets.systems.maps import coerce, has_slope, kernels, kind_of
 from limitsets.systems.maps.contract import compiled_kind_of
-from limitsets.systems.maps.derived import NEVER, UNKNOWN, branch_boxes
+from limitsets.systems.maps.derived import NEVER, UNKNOWN, BranchBoxes, branch_boxes
 from limitsets.systems.sets.basin import longest_stays
 
 # ---------------------------------------------------------------- claims about cells
@@ -72,16 +73,22 @@ def _invariant(proof: ProofOfMap) -> Claim:
     return Claim("invariant", "proved", "", {})
 
 
+def _boxes(proof: ProofOfMap) -> Iterator[tuple[Ints, BranchBoxes]]:
+    """Give the attracting cells by side and branch, with their images and slopes."""
+    grid, numbers = proof.graph.grid, proof.cells.numbers()
+    sides, branches = grid.side_of(numbers), range(len(kind_of(proof.map).branches))
+    for side, branch in itertools.product(np.unique(sides).tolist(), branches):
+        mine = numbers[sides == side]
+        yield mine, branch_boxes(proof.map, proof.upper, side, branch, *grid.boxes(mine, side))
+
+
 def _trapping(proof: ProofOfMap) -> Claim:
     """Prove that images lie in the interior of the cells: not on the border of the domain either."""
     grid, numbers = proof.graph.grid, proof.cells.numbers()
     domain, (lo, hi, sides) = grid.domain, grid.corners(numbers)
     ends = ~np.array(domain.periodic)
     at_border = ((lo <= domain.lo[sides]) | (hi >= domain.hi[sides]))[:, ends].any()
-    branches = range(len(kind_of(proof.map).branches)) if at_border and has_slope(proof.map) else ()
-    for side, branch in itertools.product(np.unique(sides).tolist(), branches):
-        mine = numbers[sides == side]
-        boxes = branch_boxes(proof.map, proof.upper, side, branch, *grid.boxes(mine, side))
+    for mine, boxes in _boxes(proof) if at_border and has_slope(proof.map) else ():
         inside = (boxes.lo > domain.lo[boxes.side]) & (boxes.hi < domain.hi[boxes.side])
         reaching = np.flatnonzero(~inside[:, ends].all(axis=1) & (boxes.state != NEVER))
         if reaching.size:
@@ -152,23 +159,18 @@ def _expanding(proof: ProofOfMap) -> Claim:
         return Claim("expanding", "undecided", reason, {}, final=True)
     if not len(proof.cells):
         return Claim("expanding", "undecided", "there are no attracting cells", {})
-    numbers = proof.cells.numbers()
-    sides, least, most, place = grid.side_of(numbers), np.inf, 0.0, ""
-    for side in np.unique(sides).tolist():
-        mine = numbers[sides == side]
-        lo, hi = grid.boxes(mine, side)
-        for branch in range(len(kind_of(proof.map).branches)):
-            boxes = branch_boxes(proof.map, proof.upper, side, branch, lo, hi)
-            low, high = boxes.slope_lo[:, 0, 0], boxes.slope_hi[:, 0, 0]
-            slope = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
-            slope[boxes.state == UNKNOWN] = 0.0
-            slope[boxes.state == NEVER] = np.inf
-            largest = np.maximum(np.abs(low), np.abs(high))
-            largest[boxes.state == UNKNOWN] = np.inf
-            most = max(most, float(largest[boxes.state != NEVER].max(initial=0.0)))
-            worst = int(slope.argmin())
-            if slope[worst] < least:
-                least, place = float(slope[worst]), _place(grid, int(mine[worst]))
+    least, most, place = np.inf, 0.0, ""
+    for mine, boxes in _boxes(proof):
+        low, high = boxes.slope_lo[:, 0, 0], boxes.slope_hi[:, 0, 0]
+        slope = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
+        slope[boxes.state == UNKNOWN] = 0.0
+        slope[boxes.state == NEVER] = np.inf
+        largest = np.maximum(np.abs(low), np.abs(high))
+        largest[boxes.state == UNKNOWN] = np.inf
+        most = max(most, float(largest[boxes.state != NEVER].max(initial=0.0)))
+        worst = int(slope.argmin())
+        if slope[worst] < least:
+            least, place = float(slope[worst]), _place(grid, int(mine[worst]))
     if most < 1.0:
         reason = f"on all attracting cells the slope is at most {most:.6g} in modulus"
         return Claim("expanding", "refuted", reason, {}, final=True)
