@@ -283,10 +283,7 @@ OTHERS = (
 
 @pytest.mark.parametrize("line", [*AUDITED, *OTHERS])
 def test_every_command_names_what_is_left_out(capfd, line):
-    few = (
-        {"tolerance": {"throw.speed": "1 %"}} if "--robust" in line else {}
-    )  # for a minute less than the default
-    found = with_cavity(tables={"world": RUBBED, "feedback": FEEDBACK, **few})
+    found = with_cavity(tables={"world": RUBBED, "feedback": FEEDBACK})
     written(found)
     _, out, _ = run(capfd, line)
     (told,) = [row for row in out.splitlines() if row.startswith(LEFT_OUT)]
