@@ -68,7 +68,7 @@ class Interval:
         return _div(other, self)
 
     def __pow__(self, exponent: Interval | float) -> Interval:
-        return _pow(self, exponent)
+        return _whole_pow(self, exponent) if isinstance(exponent, int) else _real_pow(self, exponent)
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -122,11 +122,8 @@ def _real_pow(a: Any, exponent: Any) -> Interval:
     return Interval(lo, hi)
 
 
-def _pow(a: Any, exponent: Any) -> Interval:
-    if isinstance(exponent, int):
-        lo, hi = arithmetic.power(ends_of(a), exponent)
-    else:
-        lo, hi = exponential.real_power(ends_of(a), ends_of(exponent))
+def _whole_pow(a: Any, count: Any) -> Interval:
+    lo, hi = arithmetic.power(ends_of(a), count)
     return Interval(lo, hi)
 
 
@@ -159,7 +156,7 @@ for _stubs, _method in (
 ):
     for _stub in _stubs:
         operation(_stub, Interval, _method)
-operation(operator.pow, Interval, _real_pow, left=_pow)
+operation(operator.pow, Interval, _real_pow, whole=_whole_pow)
 
 
 def _whole_number(x: Any) -> int:

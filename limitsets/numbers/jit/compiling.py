@@ -11,6 +11,7 @@ from typing import Any, TypeVar, overload
 
 import numba
 from numba.core import codegen, config
+from numba.core.compiler import Compiler
 from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
 
@@ -48,7 +49,44 @@ _use_widest_vectors()
 _COMMON = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 ESTIMATE = {**_COMMON, "fastmath": {"contract"}}
 PROOF = {**_COMMON, "fastmath": False}
-OVERLOAD = ("error_model", "fastmath", "no_cfunc_wrapper")  # what an overload takes of these
+
+
+# ----------------------------------------------------------------
+# Kernels within others: parts of the machine code of their callers, with none of their own.
+
+
+class _Part(codegen.JITCodeLibrary):  # type: ignore[misc]  # numba has no types
+    """Code that callers take into theirs.
+
+    Numba makes machine code of it too, which nothing runs: a quarter of the time in which a map compiles.
+    """
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    @property
+    def codegen(self) -> Any:
+        """What numba asks to fill in a place of the machine code, of which there is none."""
+        return python_types.SimpleNamespace(set_env=lambda name, env: None)
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Give no place of the machine code, as numba does of a function that Python does not call."""
+        return 0
+
+
+class _Within(Compiler):  # type: ignore[misc]  # numba has no types
+    """How kernels within others are compiled."""
+
+    def __init__(self, typing_context: Any, target_context: Any, library: Any, *rest: Any) -> None:
+        super().__init__(typing_context, target_context, library, *rest)
+        self.state.library = _Part(target_context.codegen(), "part of callers")
+
+
+def overload_options(*, proof: bool, inlined: bool = True) -> dict[str, Any]:
+    """Give the options under which numba compiles a method of a function of many."""
+    return {**(PROOF if proof else ESTIMATE), "forceinline": inlined, "pipeline_class": _Within}
 
 
 # ----------------------------------------------------------------
@@ -287,6 +325,11 @@ def compiled(function: F, options: dict[str, Any], entry: bool, counting: bool =
     dispatcher = numba.jit(**options, forceinline=not entry, _nrt=counting)(function)
     if entry and hasattr(dispatcher, "_compiler"):
         _interleaved(dispatcher)
+    elif hasattr(dispatcher, "_compiler"):  # for Python; compiled code is given a part
+        flags = {**options, "forceinline": True, "_nrt": counting, "no_cpython_wrapper": True}
+        part = numba.jit(**flags, pipeline_class=_Within)(function)
+        dispatcher.get_call_template, dispatcher.get_overload = part.get_call_template, part.get_overload
+        dispatcher._compiling_counter = part._compiling_counter  # by which numba sees that it calls itself
     # The folder's name vouches for the package's own files only: a loop defined elsewhere is not kept.
     inside = PACKAGE in Path(function.__code__.co_filename).resolve().parents
     if entry and inside and CACHE is not None and hasattr(dispatcher, "_cache"):

@@ -10,7 +10,7 @@ import numpy as np
 from numba import extending, types
 
 from limitsets.base import MapError
-from limitsets.numbers.jit.compiling import ESTIMATE, OVERLOAD, PROOF, with_helpers
+from limitsets.numbers.jit.compiling import overload_options, with_helpers
 
 P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
@@ -119,8 +119,7 @@ def generic(
         return functools.partial(generic, proof=proof, inlined=inlined, default=default, chained=chained)
     default = _handed_on if chained else default
     methods: dict[Any, Callable[..., Any]] = {}
-    given = PROOF if proof else ESTIMATE
-    options = {**{key: given[key] for key in OVERLOAD}, "forceinline": inlined}
+    options = overload_options(proof=proof, inlined=inlined)
 
     def one_after_another(entries: Any, value: Any, *rest: Any) -> Any:
         return chosen(entries[1:], chosen(entries[0], value, *rest), *rest)
@@ -181,6 +180,4 @@ def _choose_row(stack: Any, k: Any) -> Any:
     return scope["method"]
 
 
-extending.overload(
-    row_of, jit_options={**{key: ESTIMATE[key] for key in OVERLOAD}, "forceinline": True}, strict=False
-)(_choose_row)
+extending.overload(row_of, jit_options=overload_options(proof=False), strict=False)(_choose_row)

@@ -12,7 +12,7 @@ from llvmlite import ir
 from numba import extending, types
 from numba.core import cgutils
 
-from limitsets.numbers.jit.compiling import ESTIMATE, OVERLOAD, PROOF, compiled
+from limitsets.numbers.jit.compiling import PROOF, compiled, overload_options
 
 # ----------------------------------------------------------------
 # A mark that compiled code leaves where a function was asked beyond where it is defined.
@@ -200,6 +200,7 @@ def operation(
     *,
     left: Callable[..., Any] | None = None,
     right: Callable[..., Any] | None = None,
+    whole: Callable[..., Any] | None = None,
     beside: tuple[type, ...] = (),
 ) -> None:
     """Give a number a method of an operator, or of any function of Python, in compiled code.
@@ -215,6 +216,8 @@ def operation(
         A function that closes over nothing: a lambda, or one of a module.
     left, right : callable, optional
         The methods where only the first of two arguments is of the class, and where only the second is; as `method`.
+    whole : callable, optional
+        The method where the last argument is a whole number; as `method`.
     beside : tuple of type
         Classes of numbers that may stand beside this one as plain ones may.
     """
@@ -226,11 +229,11 @@ def operation(
             return method if all(plain) else None
         if not (any(mine) and all(np.logical_or(mine, plain))):
             return None
+        if whole is not None and isinstance(args[-1], types.Integer):
+            return whole
         return (left or method) if not mine[-1] else (right or method) if not mine[0] else method
 
-    given = ESTIMATE if cls is float else PROOF
-    options = {**{key: given[key] for key in OVERLOAD}, "forceinline": True}
-    extending.overload(stub, jit_options=options, strict=False)(choose)
+    extending.overload(stub, jit_options=overload_options(proof=cls is not float), strict=False)(choose)
 
 
 def corners_as_numbers(number: type, array: type) -> Callable[[Any, Any], Any]:
@@ -295,8 +298,7 @@ def of_entries(function: Callable[..., Any]) -> Callable[..., Any]:
         exec(f"def method(entries, *more):\n    return ({calls})", scope)  # noqa: S102  # our own text
         return scope["method"]  # type: ignore[no-any-return]  # made by exec
 
-    options = {**{key: PROOF[key] for key in OVERLOAD}, "forceinline": True}
-    extending.overload(each, jit_options=options, strict=False)(choose)
+    extending.overload(each, jit_options=overload_options(proof=True), strict=False)(choose)
     return each
 
 
@@ -305,8 +307,9 @@ def formula(function: F) -> F:
 
     Operations on floats may be contracted; those of other numbers are their own.
     """
-    options = {**{key: ESTIMATE[key] for key in OVERLOAD}, "forceinline": True}
-    extending.overload(function, jit_options=options, strict=False)(lambda *args: function)
+    extending.overload(function, jit_options=overload_options(proof=False), strict=False)(
+        lambda *args: function
+    )
     return function
 
 
