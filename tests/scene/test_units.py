@@ -38,16 +38,10 @@ def test_what_measures_different_things_has_no_factor() -> None:
         ("5.75 in", "length", "in", 5.75),
         ("0.1 in", "length", "in", 0.1),
         ("2.54 cm", "length", "in", 1.0),
-        ("1 ft", "length", "in", 12.0),
         ("-.5e1 in", "length", "in", -5.0),
         ("+7. in", "length", "in", 7.0),
         ("0 m", "length", "in", 0.0),
         ("1   in", "length", "mm", 25.4),
-        ("180 deg", "angle", "rad", 3.141592653589793),
-        ("360 deg/s", "angular speed", "rad/s", 6.283185307179586),
-        ("9.80665 m/s^2", "acceleration", "in/s^2", 9.80665 / 0.0254),
-        ("1 lb", "mass", "kg", 0.45359237),
-        ("1 kg/m^2", "mass per area", "kg/in^2", 0.00064516),
         ("1 %", "share", "", 0.01),
         ("0.7%", "share", "", 0.007),
         ("600 um", "length", "mm", 0.6),
@@ -55,12 +49,6 @@ def test_what_measures_different_things_has_no_factor() -> None:
         ("600 \u03bcm", "length", "mm", 0.6),  # Greek mu
         ("45 \u00b0", "angle", "deg", 45.0),
         ("45\u00b0", "angle", "deg", 45.0),
-        ("25 rpm", "angular speed", "deg/s", 150.0),  # 25 turns of 360 deg in 60 s
-        ("60 rpm", "angular speed", "rad/s", 6.283185307179586),
-        ("6000 mg", "mass", "g", 6.0),
-        ("2 t", "mass", "kg", 2000.0),
-        ("0.3 g/cm^2", "mass per area", "kg/m^2", 3.0),
-        ("7.85 g/cm^3", "mass per volume", "kg/m^3", 7850.0),
     ],
 )
 def test_values(text: str, dimension: str, unit: str, value: float) -> None:
