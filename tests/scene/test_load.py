@@ -360,39 +360,6 @@ def test_spoilt_text(place: int, length: int, other: str) -> None:
     assert load(dump(scene)) == scene
 
 
-LENGTHS = st.builds("{:.6f} {}".format, st.floats(4.0, 4.6), st.just("in")) | st.builds(
-    "{:.4e} {}".format, st.floats(10.2, 11.6), st.just("cm")
-)
-
-
-@given(
-    st.lists(LENGTHS, min_size=3, max_size=3),
-    st.floats(0.4, 0.6),
-    st.floats(-2, 2),
-    st.sampled_from(["exact", "small-angle", "small-angle-2"]),
-    st.dictionaries(st.sampled_from(["friction", "restitution"]), st.floats(0, 1) | st.integers(0, 1)),
-    st.text(st.characters(categories=["L", "N"]), min_size=1, max_size=20),
-)
-def test_round_trip(
-    sides: list[str], along: float, height: float, flight: str, world: dict[str, float], name: str
-) -> None:
-    centre = {"side": 0, "along": f"{along * 4!r} in", "above": "0.9 in"}
-    table = {
-        "name": name,
-        "part": {"sides": sides, "mass": {"center": centre, "radius_of_gyration": "3 cm"}},
-        "arm": {"surface_height": f"{height:.8f} in", "length": "2.5 ft"},
-        "throw": {"kappa": "30 in"},
-        "model": {"flight": flight},
-        "world": world,
-    }
-    scene = load(table)
-    again = load(dump(scene))
-    assert again == scene
-    assert again.as_dict() == table
-    assert (again.sides.a == scene.sides.a).all()
-    assert (again.sides.corner == scene.sides.corner).all()
-
-
 # ----------------------------------------------------------------
 # A part with a side on which it cannot rest: what loads, what is refused and how, and where its states lie.
 

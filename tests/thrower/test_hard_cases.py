@@ -217,7 +217,7 @@ def critical_point(part: Part, near: float) -> arb:
     lo, hi = arb(near - 64 * math.ulp(near)), arb(near + 64 * math.ulp(near))
 
     def flips(x: arb) -> bool:
-        return bool(exhaustive.margin_at(part, x, exhaustive.roots(part, x, first=True)[0].phi)[1] > 0)
+        return bool(exhaustive.margin_at(part, x, exhaustive.roots(part, x, first=True)[0].phi) > 0)
 
     before = flips(lo)
     assert before != flips(hi)

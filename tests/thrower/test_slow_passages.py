@@ -33,9 +33,7 @@ from limitsets.systems.sets import limit_set_of
 # steps, the flow that interpolates the map (Julia's equation) to second order.  The angle phi of the impact gives
 # both x and D of a jog in closed form, so that N is one integral, taken here at 40 digits.
 # Where a jog is what the part does, D is convex in phi as long as the centre of mass is right of the vertex (its
-# second derivative is X), and D = 0 at phi = 0: for h > 0 it has one more zero there and no two to merge.  The two
-# that merge at a larger h lie on the jog branch continued beyond the vertex, which is followed by `along`, as limit
-# sets do.
+# second derivative is X), and D = 0 at phi = 0: for h > 0 it has one more zero there.
 
 
 mp.dps = 40

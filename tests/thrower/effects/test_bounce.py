@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,17 @@ from scipy.optimize import brentq
 
 import limitsets as ls
 from limitsets.feeder.scene import Scene
-from limitsets.feeder.thrower import throw_map
 from limitsets.feeder.thrower.contact import force, gives_way, lets_go, next_contact
 from limitsets.feeder.thrower.effects.bounce import Bounce, struck
 from limitsets.feeder.thrower.effects.drive import all_the_way
 from limitsets.feeder.thrower.effects.landing import Landing, first_arrival
 from limitsets.feeder.thrower.flight import turn
-from limitsets.feeder.thrower.full import gather_full, with_effects
+from limitsets.feeder.thrower.full import gather_full
 from limitsets.feeder.thrower.motion import OFF, ON, Arrival, Contact, FullSide, above, right_of
 from limitsets.numbers.jit import entry_of, kernel
 from limitsets.systems.maps import codes, images as images_of_drive
 from tests.kept import kept
-from tests.thrower.effects.test_slip import square
+from tests.thrower.effects.test_slip import regular, square
 from tests.thrower.effects.throws import cases, same_end
 
 # ----------------------------------------------------------------
@@ -34,20 +32,9 @@ SIDES = 60
 
 
 def wheel() -> FullSide:
-    """A regular polygon of many sides, kappa = 4."""
-    half = math.pi / SIDES
-    bare = throw_map(
-        a=[math.sin(half)] * SIDES,
-        d=[math.cos(half)] * SIDES,
-        length=[2 * math.sin(half)] * SIDES,
-        corner=[2 * half] * SIDES,
-        radius_of_gyration=0.7,
-        kappa=4.0,
-        surface_height=0.0,
-        arm_length=50.0,
-    )
-    world = SimpleNamespace(restitution=0.8, bounce_threshold=1e-9)
-    return gather_full(with_effects(bare, {"bounce": True}, world), 0)
+    """A part of many sides that bounces."""
+    half, world = math.pi / SIDES, {"restitution": 0.8, "bounce_threshold": 1e-9}
+    return regular(SIDES, math.sin(half), math.cos(half), 0.7, "bounce", **world)
 
 
 @pytest.mark.sweep

@@ -34,32 +34,21 @@ from tests.thrower.effects.throws import cases
 HALF = math.sqrt(0.5)
 
 
+def regular(sides: int, a: float, d: float, rho: float, effect: str, **world: float) -> FullSide:
+    """A regular polygon on side 0, kappa = 4, with one effect."""
+    part = {
+        "a": [a] * sides,
+        "d": [d] * sides,
+        "length": [2 * a] * sides,
+        "corner": [2 * math.pi / sides] * sides,
+    }
+    throw = {"radius_of_gyration": rho, "kappa": 4.0, "surface_height": 0.0, "arm_length": 50.0}
+    return gather_full(with_effects(throw_map(**part, **throw), {effect: True}, SimpleNamespace(**world)), 0)
+
+
 def square(mu: float, rho: float = math.sqrt(2.0)) -> FullSide:
-    """A square of side 2 on side 0, kappa = 4, with slip."""
-    bare = throw_map(
-        a=[1.0] * 4,
-        d=[1.0] * 4,
-        length=[2.0] * 4,
-        corner=[math.pi / 2] * 4,
-        radius_of_gyration=rho,
-        kappa=4.0,
-        surface_height=0.0,
-        arm_length=50.0,
-    )
-    return gather_full(with_effects(bare, {"slip": True}, SimpleNamespace(friction=mu)), 0)
-
-
-def upright(vx: float, vy: float, omega: float) -> Arrival:
-    """The square coming down on a corner with its centre straight above: X = 0, H = sqrt 2."""
-    return Arrival(0, turn(math.pi / 4), 0.0, vx, vy, omega)
-
-
-def test_a_weak_impulse_of_friction_leaves_it_sliding_and_tips_it_forward() -> None:
-    # J_n = 1, J_t = -1/4; the contact slows by A J_t = 2/4, and the rotation changes by H J_t / rho^2 = -sqrt 2/8
-    after = struck(None, Slip(0.25), square(0.25), upright(2.0, -1.0, 0.0))
-    assert after.slide == pytest.approx(1.5, rel=1e-14)
-    assert after.omega == pytest.approx(-math.sqrt(2.0) / 8, rel=1e-14)
-    assert after.lift == 0.0
+    """A square of side 2 with slip."""
+    return regular(4, 1.0, 1.0, rho, "slip", friction=mu)
 
 
 def test_sliding_stops_and_reverses_on_the_way() -> None:
