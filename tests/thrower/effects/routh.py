@@ -6,7 +6,7 @@ time; friction pulls mu as hard against the sliding, by Coulomb's law:
     d(rates)/dJ = gain @ (friction, 1),        friction = -mu sign(v_t),        v = lever @ rates.
 
 `routh` starts again where v_t comes to 0, in the one of three modes (held, off to the right, off to the left) that
-agrees with itself; `smoothed` has no modes and no events of sliding: friction is -mu tanh(v_t/width).
+agrees with itself.
 """
 
 from __future__ import annotations
