@@ -123,13 +123,25 @@ def collide(part, masses, poses, velocities, **how):
     return np.array(before), np.array(after), [tuple(body.position) for body in bodies]
 
 
-@pytest.mark.parametrize("lift", [0.0, 0.3])
+@pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
+def test_a_central_impact_of_two_parts(e):
+    """v1' = v1 - (1 + e) m2/(m1 + m2) (v1 - v2), and nothing across without friction."""
+    square = polygon(4)
+    poses = [(5.0, 40.0, 0.0), (5.0 + math.sqrt(2.0) + 0.05, 40.0, 0.0)]
+    how = {"sliding": 0.0, "restitution": e}
+    before, after, _ = collide(square, (1.0, 3.0), poses, [(4.0, 1.0), (-2.0, 1.0)], **how)
+    share = (1 + e) * 6.0 / 4.0
+    assert after[0, 0] == pytest.approx(4.0 - 3.0 * share, abs=1e-9)
+    assert after[1, 0] == pytest.approx(-2.0 + share, abs=1e-9)
+    assert after[:, 1:] == pytest.approx(before[:, 1:], abs=1e-9)
+
+
 @pytest.mark.parametrize("e", [0.0, 0.5])
-def test_an_impact_on_the_centre_and_off_it(e, lift):
+def test_an_impact_off_the_centre(e):
     """J = (1 + e) v / c, c = 1/m1 + 1/m2 + (r1 x n)^2/I1 + (r2 x n)^2/I2; the energy lost is (1 - e^2) v^2 / 2 c."""
     square, masses, inertia = polygon(4), (1.0, 2.0), 0.49
-    half = math.cos(math.pi / 4)
-    # the left one stands on a corner, which meets the other's upright side `lift` above its middle
+    half, lift = math.cos(math.pi / 4), 0.3
+    # the left one stands on a corner, which meets the other's upright side 0.3 above its middle
     poses = [(5.0, 40.0, math.pi / 4), (5.0 + 1.0 + half + 0.02, 40.0 - lift, 0.0)]
     how = {"sliding": 0.0, "restitution": e}
     before, after, _ = collide(square, masses, poses, [(3.0, 0.0), (0.0, 0.0)], **how)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,18 +12,21 @@ from scipy.optimize import brentq
 
 import limitsets as ls
 from limitsets.feeder.scene import Scene
+from limitsets.feeder.thrower import throw_map
 from limitsets.feeder.thrower.contact import force, gives_way, lets_go, next_contact
 from limitsets.feeder.thrower.effects.bounce import Bounce, struck
 from limitsets.feeder.thrower.effects.drive import all_the_way
 from limitsets.feeder.thrower.effects.landing import Landing, first_arrival
+from limitsets.feeder.thrower.effects.slip import Slip
 from limitsets.feeder.thrower.flight import turn
-from limitsets.feeder.thrower.full import gather_full
+from limitsets.feeder.thrower.full import gather_full, with_effects
 from limitsets.feeder.thrower.motion import OFF, ON, Arrival, Contact, FullSide, above, right_of
 from limitsets.numbers.jit import entry_of, kernel
 from limitsets.systems.maps import codes, images as images_of_drive
+from limitsets.systems.maps.drivers import images
 from tests.kept import kept
-from tests.thrower.effects.test_slip import regular, square
-from tests.thrower.effects.throws import cases, same_end
+from tests.thrower.effects.test_slip import square
+from tests.thrower.effects.throws import agree, cases, same_end
 
 # ----------------------------------------------------------------
 # Restitution: heights and times of a bouncing part, energy, limits, and an independent simulation.
@@ -32,9 +36,20 @@ SIDES = 60
 
 
 def wheel() -> FullSide:
-    """A part of many sides that bounces."""
-    half, world = math.pi / SIDES, {"restitution": 0.8, "bounce_threshold": 1e-9}
-    return regular(SIDES, math.sin(half), math.cos(half), 0.7, "bounce", **world)
+    """A regular polygon of many sides, kappa = 4."""
+    half = math.pi / SIDES
+    bare = throw_map(
+        a=[math.sin(half)] * SIDES,
+        d=[math.cos(half)] * SIDES,
+        length=[2 * math.sin(half)] * SIDES,
+        corner=[2 * half] * SIDES,
+        radius_of_gyration=0.7,
+        kappa=4.0,
+        surface_height=0.0,
+        arm_length=50.0,
+    )
+    world = SimpleNamespace(restitution=0.8, bounce_threshold=1e-9)
+    return gather_full(with_effects(bare, {"bounce": True}, world), 0)
 
 
 @pytest.mark.sweep
@@ -69,8 +84,8 @@ def test_a_bounce_off_a_corner_beside_the_centre_spins_the_part() -> None:
     assert after.lift == pytest.approx(0.5, rel=1e-12)
 
 
-def test_no_impact_gains_energy() -> None:
-    """With `slip` none does either: `test_impacts_are_those_of_the_integrated_law`."""
+@pytest.mark.parametrize("slips", [False, True])
+def test_no_impact_gains_energy(slips: bool) -> None:
     rng = np.random.default_rng(8)
     for case in cases(15, 8):
         part = gather_full(case.full(("bounce",)), 0)
@@ -81,12 +96,24 @@ def test_no_impact_gains_energy() -> None:
             right, high = right_of(part, vertex, psi), above(part, vertex, psi)
             if vy - omega * right >= 0:
                 continue
+            slip = Slip(float(rng.uniform(0, 2))) if slips else None
             # the most that restitution gives back is all of it
-            after = struck(Bounce(1.0, 0.0), None, part, Arrival(vertex, psi, 0.0, vx, vy, omega))
+            after = struck(Bounce(1.0, 0.0), slip, part, Arrival(vertex, psi, 0.0, vx, vy, omega))
             speed = (after.slide - after.omega * high, after.lift + after.omega * right)
             before = vx**2 + vy**2 + part.own.rho2 * omega**2
             left = speed[0] ** 2 + speed[1] ** 2 + part.own.rho2 * after.omega**2
             assert left <= before * (1 + 1e-13)
+
+
+@pytest.mark.parametrize("names", [("bounce",), ("bounce", "roll")])
+def test_no_restitution_is_the_plastic_map(names: tuple[str, ...]) -> None:
+    plain = tuple(name for name in names if name != "bounce")
+    for case in cases(30, 9, restitution=0.0):
+        xs = np.linspace(case.x, 2 * case.x, 20)
+        full = images(case.full(names), xs, case.side)
+        other = images(case.full(plain) if plain else case.bare, xs, case.side)
+        np.testing.assert_allclose(full.x, other.x, rtol=1e-12)
+        assert (full.side == other.side).all()
 
 
 def test_bounces_below_the_threshold_are_plastic() -> None:
@@ -97,6 +124,18 @@ def test_bounces_below_the_threshold_are_plastic() -> None:
 def test_bounces_without_end_are_outside_the_model() -> None:
     case = cases(1, 11, restitution=1.0, bounce_threshold=1e-9)[0]
     assert case.mapped(("bounce",)) is None
+
+
+@pytest.mark.sweep
+def test_throws_end_where_an_independent_simulation_sees_them_end() -> None:
+    names = ("landing", "bounce")
+    assert [case for case in cases(60, 12) if not agree(case, names)] == []
+
+
+@pytest.mark.sweep
+def test_all_together_end_where_an_independent_simulation_sees_them_end() -> None:
+    names = ("landing", "roll", "slip", "pivot", "bounce")
+    assert [case for case in cases(60, 13) if not agree(case, names)] == []
 
 
 # ----------------------------------------------------------------
@@ -127,6 +166,12 @@ def test_it_slips_where_the_cone_ends() -> None:
     assert abs(along) == pytest.approx(0.1 * off, rel=1e-10)
     # a bullet-proof hold does not
     assert not lets_go(square(5.0), 5.0, start)[1]
+
+
+@pytest.mark.sweep
+def test_throws_end_where_an_independent_simulation_sees_them_end_of_pivot() -> None:
+    names = ("landing", "pivot")
+    assert [case for case in cases(60, 6) if not agree(case, names)] == []
 
 
 # ----------------------------------------------------------------

@@ -25,7 +25,7 @@ from limitsets.systems.maps import advance, codes, images, orbit
 from limitsets.systems.maps.drivers import normal_pair, philox, uniform_pair
 from tests.kept import kept
 from tests.thrower.effects.routh import routh
-from tests.thrower.effects.throws import cases
+from tests.thrower.effects.throws import agree, cases
 
 # ----------------------------------------------------------------
 # Friction of finite strength at impacts: limits, worked numbers, and an independent simulation.
@@ -34,21 +34,19 @@ from tests.thrower.effects.throws import cases
 HALF = math.sqrt(0.5)
 
 
-def regular(sides: int, a: float, d: float, rho: float, effect: str, **world: float) -> FullSide:
-    """A regular polygon on side 0, kappa = 4, with one effect."""
-    part = {
-        "a": [a] * sides,
-        "d": [d] * sides,
-        "length": [2 * a] * sides,
-        "corner": [2 * math.pi / sides] * sides,
-    }
-    throw = {"radius_of_gyration": rho, "kappa": 4.0, "surface_height": 0.0, "arm_length": 50.0}
-    return gather_full(with_effects(throw_map(**part, **throw), {effect: True}, SimpleNamespace(**world)), 0)
-
-
 def square(mu: float, rho: float = math.sqrt(2.0)) -> FullSide:
-    """A square of side 2 with slip."""
-    return regular(4, 1.0, 1.0, rho, "slip", friction=mu)
+    """A square of side 2 on side 0, kappa = 4, with slip."""
+    bare = throw_map(
+        a=[1.0] * 4,
+        d=[1.0] * 4,
+        length=[2.0] * 4,
+        corner=[math.pi / 2] * 4,
+        radius_of_gyration=rho,
+        kappa=4.0,
+        surface_height=0.0,
+        arm_length=50.0,
+    )
+    return gather_full(with_effects(bare, {"slip": True}, SimpleNamespace(friction=mu)), 0)
 
 
 def test_sliding_stops_and_reverses_on_the_way() -> None:
@@ -219,6 +217,12 @@ def test_painleves_paradox_is_outside_the_model() -> None:
     for mu, lost in ((0.28, False), (0.29, True)):
         _, ends = slide_on(square(mu, rho=0.2), mu, -1, Contact(0, psi, 0.0, 0.0, -1.0, 0.0))
         assert (ends == LOST) is lost
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("names", [("landing", "slip"), ("landing", "slip", "roll")])
+def test_throws_end_where_an_independent_simulation_sees_them_end(names: tuple[str, ...]) -> None:
+    assert [case for case in cases(60, 3) if not agree(case, names)] == []
 
 
 # ----------------------------------------------------------------
