@@ -4,7 +4,6 @@ Expected values: the map; textbook mechanics written out here; the cavity's size
 """
 
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -290,12 +289,6 @@ def test_a_part_that_falls_off_is_lost_and_one_taken_out_is_out():
     assert crowd.throw()[0].where == "arm"
 
 
-def test_a_missing_engine_is_named_with_its_remedy(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pymunk", None)
-    with pytest.raises(AnswerError, match=r"pip install 'limitsets\[engine\]'"):
-        Crowd([DESIGNED], friction=1.0)
-
-
 def test_parts_that_overlap_at_the_start_are_refused():
     crowd = Crowd([DESIGNED, DESIGNED], friction=1.0)
     crowd.place(0, 10.0, 2)
@@ -349,27 +342,3 @@ def test_places_converge_where_parts_have_met():
     coarse, middle = (np.abs(np.subtract(places[step], places[5e-4])).max(axis=1) for step in (8e-3, 2e-3))
     assert np.median(middle) < 0.5 * np.median(coarse)
     assert np.median(middle) < 0.02  # less than landings scatter
-
-
-@pytest.mark.sweep
-def test_the_step_halved_moves_no_rate_beyond_its_interval():
-    """Pairs of two triangles on the same seeds: how often both end in the cavity, and how often on side 2."""
-    counts = []
-    for step in (4e-3, 2e-3):
-        both = right = 0
-        for trial in range(150):
-            random = np.random.Generator(np.random.Philox(key=[7, trial]))
-            crowd = Crowd([FED, FED], friction=1.0, step=step)
-            crowd.place(0, float(random.uniform(5.0, 7.0)), 2)
-            crowd.place(1, float(random.uniform(14.0, 18.0)), 2)
-            for _ in range(60):
-                rests = crowd.throw(0.005 * random.normal(), 0.02 * random.normal(size=2))
-                if all(rest.where == "cavity" for rest in rests):
-                    break
-            both += all(rest.where == "cavity" for rest in rests)
-            right += sum(rest.side == 2 for rest in rests)
-        counts.append((both / 150, right / 300))
-    for (coarse, fine), n in zip(zip(*counts, strict=True), (150, 300), strict=True):
-        mean = 0.5 * (coarse + fine)
-        # twice the standard error of the difference of two shares that were not paired
-        assert abs(coarse - fine) <= 2.0 * math.sqrt(2.0 * mean * (1.0 - mean) / n) + 1.0 / n

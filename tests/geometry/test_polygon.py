@@ -11,11 +11,9 @@ from limitsets.base.errors import GeometryError
 from limitsets.feeder.geometry import (
     OnSide,
     convex_polygon,
-    mass_of,
     plate_with_points,
     require_inside,
     require_rest,
-    rest_of,
     resting_sides,
     side_ends,
     triangle,
@@ -54,17 +52,6 @@ def test_height_of_needles_keeps_its_digits(lengths: tuple[float, float, float])
         half = (a + b + c) / 2
         exact = 2 * mpmath.sqrt(half * (half - a) * (half - b) * (half - c)) / a
     assert triangle_of(lengths)[2][1] == pytest.approx(float(exact), rel=2e-15)
-
-
-def test_triangle_serves_other_numbers_and_in_balls_encloses_the_exact_one() -> None:
-    flint = pytest.importorskip("flint")
-    with mpmath.workdps(50):
-        corners = triangle_of([mpmath.mpf(3), mpmath.mpf(4), mpmath.mpf(6)], sqrt=mpmath.sqrt)
-        assert abs(mpmath.hypot(corners[2][0] - 3, corners[2][1]) - 6) < mpmath.mpf(10) ** -48
-        exact = triangle_of([mpmath.mpf(value) for value in PAPER], sqrt=mpmath.sqrt)
-    balls = triangle_of([flint.arb(value) for value in PAPER], sqrt=flint.arb.sqrt)
-    for ball, value in zip(sum(balls, ()), sum(exact, ()), strict=True):
-        assert ball.overlaps(flint.arb(mpmath.nstr(value, 45)))
 
 
 def test_refuses_lengths_of_no_triangle() -> None:
@@ -143,30 +130,6 @@ def test_paper_scenes(along: float, above: float, a: tuple[float, ...], d: tuple
     assert (sides.a[2], sides.d[2]) == (along, above)  # what was given comes back untouched
     np.testing.assert_array_equal(sides.right, sides.length - sides.a)
     require_rest(sides)
-
-
-@pytest.mark.parametrize(("along", "above"), [scene[:2] for scene in SCENES])
-def test_floats_against_fifty_digits(along: float, above: float) -> None:
-    sides = resting_sides(triangle(PAPER), OnSide(2, along, above))
-    with mpmath.workdps(50):
-        corners = triangle_of([mpmath.mpf(length) for length in PAPER], sqrt=mpmath.sqrt)
-        centre = OnSide(2, mpmath.mpf(along), mpmath.mpf(above))
-        exact = rest_of(corners, centre, sqrt=mpmath.sqrt, atan2=mpmath.atan2)
-    for index, array in enumerate((sides.a, sides.d, sides.length, sides.right, sides.corner)):
-        np.testing.assert_allclose(array, [float(row[index]) for row in exact], rtol=0, atol=4e-15)
-
-
-def test_balls_enclose_the_exact_values() -> None:
-    flint = pytest.importorskip("flint")
-    corners = triangle_of([flint.arb(length) for length in PAPER], sqrt=flint.arb.sqrt)
-    along = flint.arb(4.2255778, 1e-3)
-    centre = OnSide(2, along, flint.arb(0.708249))
-    balls = rest_of(corners, centre, sqrt=flint.arb.sqrt, atan2=flint.arb.atan2)
-    for offset in (-9e-4, 0.0, 9e-4):
-        sides = resting_sides(triangle(PAPER), OnSide(2, 4.2255778 + offset, 0.708249))
-        for side, row in enumerate(balls):
-            assert row[0].overlaps(flint.arb(sides.a[side], 1e-14))
-            assert row[1].overlaps(flint.arb(sides.d[side], 1e-14))
 
 
 def test_unit_square() -> None:
@@ -269,13 +232,6 @@ def test_origin_costs_no_digits() -> None:
     near = plate_with_points(corners, 1.0, [(1.0, 1.0, 2.0)])
     far = plate_with_points(corners + 2.0**20, 1.0, [(1.0 + 2.0**20, 1.0 + 2.0**20, 2.0)])
     assert far.radius_of_gyration == near.radius_of_gyration
-
-
-def test_serves_other_numbers() -> None:
-    with mpmath.workdps(40):
-        corners = [(mpmath.mpf(x), mpmath.mpf(y)) for x, y in [(0, 0), (3, 0), (3, 2), (0, 2)]]
-        found = mass_of(corners, mpmath.mpf(1), sqrt=mpmath.sqrt)
-        assert abs(found.radius_of_gyration**2 - mpmath.mpf(13) / 12) < mpmath.mpf(10) ** -38
 
 
 def test_refuses_masses_that_cannot_be() -> None:

@@ -18,7 +18,7 @@ from hypothesis import given, settings, strategies as st
 
 import limitsets as ls
 from limitsets.base.errors import GridError, MapError, SceneError, TipsError
-from limitsets.feeder.goals import AttractsAll, FlipOrder, OrientedBeyond, Reaches, StaysOnArm
+from limitsets.feeder.goals import OrientedBeyond, Reaches, StaysOnArm
 from limitsets.feeder.scene import (
     Deviation,
     Effects,
@@ -141,8 +141,6 @@ def test_units_of_other_workshops(plate: dict[str, Any]) -> None:
             {"reaches": {"x": "2 ft", "side": 0, "every_orbit": True}, "from_anywhere": True},
             Reaches(24.0, 0, every_orbit=True, from_anywhere=True),
         ),
-        ({"attracts_all": True}, AttractsAll()),
-        ({"flip_order": [0, 1, 2]}, FlipOrder((0, 1, 2))),
         ({"stays_on_arm": True, "from_anywhere": False}, StaysOnArm()),
     ],
 )
@@ -174,14 +172,6 @@ def assert_same_numbers(one: Scene, other: Scene) -> None:
         assert getattr(one, name) == getattr(other, name)
     for name in ("a", "d", "length", "right", "corner"):
         np.testing.assert_array_equal(getattr(one.sides, name), getattr(other.sides, name))
-
-
-def test_dump_keeps_the_words_of_quantities(whole: dict[str, Any]) -> None:
-    whole["arm"]["length"] = "28.000e0 in"
-    whole["arm"]["surface_height"] = "-.508  cm"
-    text = dump(load(whole))
-    assert '"28.000e0 in"' in text
-    assert '"-.508  cm"' in text
 
 
 def test_dump_replaces_a_file_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -357,15 +347,6 @@ def test_spoilt_structures(data: st.DataObject) -> None:
     assert load(dump(scene)) == scene
 
 
-@given(st.dictionaries(st.text(max_size=6), ODD, max_size=4))
-def test_random_structures(table: dict[str, Any]) -> None:
-    try:
-        load(table)
-    except SceneError:
-        return
-    raise AssertionError(table)
-
-
 TEXT = dump(load("paper-designed"))
 
 
@@ -377,39 +358,6 @@ def test_spoilt_text(place: int, length: int, other: str) -> None:
     except SceneError:
         return
     assert load(dump(scene)) == scene
-
-
-LENGTHS = st.builds("{:.6f} {}".format, st.floats(4.0, 4.6), st.just("in")) | st.builds(
-    "{:.4e} {}".format, st.floats(10.2, 11.6), st.just("cm")
-)
-
-
-@given(
-    st.lists(LENGTHS, min_size=3, max_size=3),
-    st.floats(0.4, 0.6),
-    st.floats(-2, 2),
-    st.sampled_from(["exact", "small-angle", "small-angle-2"]),
-    st.dictionaries(st.sampled_from(["friction", "restitution"]), st.floats(0, 1) | st.integers(0, 1)),
-    st.text(st.characters(categories=["L", "N"]), min_size=1, max_size=20),
-)
-def test_round_trip(
-    sides: list[str], along: float, height: float, flight: str, world: dict[str, float], name: str
-) -> None:
-    centre = {"side": 0, "along": f"{along * 4!r} in", "above": "0.9 in"}
-    table = {
-        "name": name,
-        "part": {"sides": sides, "mass": {"center": centre, "radius_of_gyration": "3 cm"}},
-        "arm": {"surface_height": f"{height:.8f} in", "length": "2.5 ft"},
-        "throw": {"kappa": "30 in"},
-        "model": {"flight": flight},
-        "world": world,
-    }
-    scene = load(table)
-    again = load(dump(scene))
-    assert again == scene
-    assert again.as_dict() == table
-    assert (again.sides.a == scene.sides.a).all()
-    assert (again.sides.corner == scene.sides.corner).all()
 
 
 # ----------------------------------------------------------------
@@ -470,7 +418,7 @@ def test_what_knows_nothing_of_a_chamfer_is_refused() -> None:
         ),
         ({"goal": {"oriented_beyond": {"x": "10 cm", "side": 3}}}, "goal.oriented_beyond.side", "0, 1, 2, 4"),
         ({"goal": {"flip_order": [0, 3]}}, "goal.flip_order[1]", "cannot rest on it"),
-        ({"cavity": SMALL_CAVITY}, "cavity", "rests on each of its sides"),
+        ({"cavity": SMALL_CAVITY}, "cavity", "rests on each of its sides.*draw the part without it"),
         ({"feedback": ONE_THROW}, "feedback", "rests on each of its sides"),
     ):
         with pytest.raises(SceneError, match=words) as caught:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import limitsets as ls
-from limitsets.base.errors import GeometryError, LimitsetsError, SceneError
+from limitsets.base.errors import LimitsetsError, SceneError
 from limitsets.feeder.scene import dump, load
 from limitsets.feeder.scene.checking import examined
 from limitsets.feeder.thrower.effects import EFFECTS
@@ -63,19 +63,11 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     # keys
     ({"arm/lenght": "28 in"}, "arm.lenght", "did you mean 'length'"),
     ({"arm/length": GONE, "arm/lenght": "28 in"}, "arm.lenght", "did you mean 'length'"),
-    ({"part/mass/centre": 1}, "part.mass.centre", "did you mean 'center'"),
-    ({"part/mass/center/allong": "1 in"}, "part.mass.center.allong", "did you mean 'along'"),
     ({"world/scatter/sped": "1 %"}, "world.scatter.sped", "did you mean 'speed'"),
-    ({"goal/oriented_beyond/xx": "1 in"}, "goal.oriented_beyond.xx", "did you mean 'x'"),
     ({"gaol": {}}, "gaol", "did you mean 'goal'"),
     ({"effects/landings": True}, "effects.landings", "did you mean 'landing'"),
     ({"arm/length": GONE}, "arm.length", "required key is 'missing'"),
-    ({"part": GONE}, "part", "required"),
-    ({"throw": GONE}, "throw", "required"),
-    ({"part/mass": GONE}, "part.mass", "required"),
-    ({"part/mass/center/side": GONE}, "part.mass.center.side", "required"),
     # tray
-    ({"tray": {}}, "tray.depression_width", "required"),
     ({"tray": TRAY | {"rows": 1}}, "tray.rows", "agitation, depression_depth, depression_width, pitch, wash"),
     (
         {"tray": TRAY | {"depression_width": "6.7 in"}},
@@ -85,21 +77,14 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"tray": TRAY | {"depression_depth": "3.07 in"}}, "tray.depression_depth", "deeper than the part"),
     ({"tray": TRAY | {"pitch": "7.02 in"}}, "tray.pitch", "above the width of a depression, 7.02 in"),
     ({"tray": TRAY | {"agitation": "0 in"}}, "tray.agitation", "above 0"),
-    ({"tray": TRAY | {"wash": "1 s"}}, "tray.wash", "length"),
     # feedback
-    ({"feedback": {}}, "feedback.throws", "required"),
     ({"feedback": {"throws": []}}, "feedback.throws", "at least 1"),
-    (feedback({}), "feedback.throws[0].name", "required"),
     (feedback({"name": "own"}), "feedback.throws[0]", "kappa or speed"),
     (feedback(OWN | {"speed": "9 rpm"}), "feedback.throws[0]", "kappa and speed"),
-    (feedback(OWN | {"kapa": "2 in"}), "feedback.throws[0].kapa", "did you mean 'kappa'"),
     (feedback({"name": "a", "kappa": "0 in"}), "feedback.throws[0].kappa", "above 0"),
-    (feedback({"name": "a", "speed": "2 in"}), "feedback.throws[0].speed", "unit of length"),
     ({"throw": {"kappa": "25 in"}, "gravity": GONE}, "feedback.throws[0].speed", "add [gravity]"),
     (feedback(OWN, OWN), "feedback.throws[1].name", "a name of its own"),
     (feedback(OWN, sensor={}), "feedback.sensor", "beyond or side"),
-    (feedback(OWN, sensor={"near": "2 in"}), "feedback.sensor.near", "beyond, error, side"),
-    (feedback(OWN, sensor="beyond"), "feedback.sensor", "a table"),
     (feedback(OWN, sensor={"beyond": "-1 in"}), "feedback.sensor.beyond", "from 0"),
     (feedback(OWN, sensor={"beyond": "90 in"}), "feedback.sensor.beyond", "to the arm's length"),
     (feedback(OWN, sensor={"side": 3}), "feedback.sensor.side", "0 to 2"),
@@ -108,34 +93,24 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     (feedback(OWN, sensor={"beyond": "2 in", "error": "-1 in"}), "feedback.sensor.error", "0 or more"),
     # quantities
     ({"arm/length": 28}, "arm.length", "write it as text with its unit"),
-    ({"arm/length": 28.0}, "arm.length", "write it as text with its unit"),
-    ({"arm/length": "28"}, "arm.length", "add the unit"),
-    ({"arm/length": ["28 in"]}, "arm.length", "a list of 1"),
     ({"arm/length": {"value": "28 in"}}, "arm.length", "a table"),
-    ({"throw/speed": "158.02 in"}, "throw.speed", "in is a unit of length"),
-    ({"throw/speed": float("nan")}, "throw.speed", "nan"),
     ({"throw/speed": None}, "throw.speed", "None"),
     ({"world/friction": float("inf")}, "world.friction", "a finite number"),
     # types
     ({"part": []}, "part", "a table"),
-    ({"part": "triangle"}, "part", "a table"),
     ({"part/sides": "5.75 in"}, "part.sides", "a list"),
-    ({"part/mass/center/side": 2.0}, "part.mass.center.side", "whole number"),
     ({"part/mass/center/side": True}, "part.mass.center.side", "whole number"),
     ({"part/mass/center/side": "2"}, "part.mass.center.side", "whole number"),
     ({"part/mass/center/side": 10**5000}, "part.mass.center.side", "an integer of"),
     ({"name": 3}, "name", "letters"),
     ({"name": ""}, "name", "letters"),
     ({"name": "../../etc"}, "name", "letters"),
-    ({"name": "a\nb"}, "name", "letters"),
     ({"tolerance": ["1 %"]}, "tolerance", "a table"),
     ({"tolerance": {"throw": {"speed": "1 %"}}}, "tolerance.throw", "quoted"),
     # shape
     ({"part/sides": ["1 in", "2 in"]}, "part.sides", "3, a triangle"),
     ({"part/sides": ["1 in"] * 4}, "part.sides", "vertices"),
     ({"part/sides/1": "0 in"}, "part.sides[1]", "above 0"),
-    ({"part/sides/1": "-3.6 in"}, "part.sides[1]", "above 0"),
-    ({"part/sides/1": "36 in"}, "part.sides", "triangle inequality"),
     ({"part/sides/1": "0.999999 in"}, "part.sides", "triangle inequality"),
     ({"part/sides": GONE}, "part", "neither sides nor vertices"),
     ({"part": BOTH | {"mass": {"plate_density": "1 kg/m^2"}}}, "part", "sides and vertices"),
@@ -143,33 +118,25 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"part/mass": {}}, "part.mass", "empty"),
     ({"part/mass/center": GONE}, "part.mass", "only radius_of_gyration"),
     ({"part/mass/radius_of_gyration": GONE}, "part.mass", "only center"),
-    ({"part/mass/plate_density": "1 kg/m^2"}, "part.mass", "not both"),
+    ({"part/mass/plate_density": "1 kg/m^2"}, "part.mass", "not both: a point mass"),
     ({"part/mass": {"points": []}}, "part.mass", "only points"),
     ({"part/mass/radius_of_gyration": "0 in"}, "part.mass.radius_of_gyration", "above 0"),
     ({"part/mass/center/side": 3}, "part.mass.center.side", "0 to 2"),
-    ({"part/mass/center/side": -1}, "part.mass.center.side", "from 0"),
     ({"part/mass/center/above": "-0.1 in"}, "part.mass.center", "outside, 0.1 in beyond side 2"),
-    ({"part/mass/center/above": "30 in"}, "part.mass.center", "outside"),
-    ({"part/mass/center/along": "6.6 in"}, "part.mass.center", "outside"),
     ({"part/mass/center/above": "0 in"}, "part.mass.center", "above side 2"),
     # arm and throw
     ({"arm/length": "0 in"}, "arm.length", "above 0"),
-    ({"arm/length": "-28 in"}, "arm.length", "above 0"),
     ({"arm/length": "4 in"}, "arm.length", "side 2"),
     ({"throw/kappa": "25 in"}, "throw", "kappa and speed"),
     ({"throw": {}}, "throw", "neither kappa nor speed"),
     ({"throw/speed": "0 deg/s"}, "throw.speed", "above 0"),
-    ({"throw/speed": "-158 deg/s"}, "throw.speed", "above 0"),
     ({"throw/speed": "1e-8 deg/s"}, "throw.speed", "gravity/speed^2"),
     ({"throw": {"kappa": "0 in"}}, "throw.kappa", "above 0"),
-    ({"throw": {"kappa": "-1 in"}}, "throw.kappa", "above 0"),
     ({"gravity": GONE}, "throw.speed", "add [gravity]"),
     ({"gravity/acceleration": "193 in/s^2"}, "gravity", "not both"),
     ({"gravity": {}}, "gravity", "acceleration or tilt"),
     ({"gravity": {"acceleration": "0 in/s^2"}}, "gravity.acceleration", "above 0"),
-    ({"gravity": {"acceleration": "193 in"}}, "gravity.acceleration", "in is a unit of length"),
     ({"gravity/tilt": "0 deg"}, "gravity.tilt", "up to 90 deg"),
-    ({"gravity/tilt": "-30 deg"}, "gravity.tilt", "up to 90 deg"),
     ({"gravity/tilt": "90.001 deg"}, "gravity.tilt", "up to 90 deg"),
     ({"model/flight": "small"}, "model.flight", '"small-angle"'),
     ({"model/flip": "Signed"}, "model.flip", '"signed" or "energy"'),
@@ -177,11 +144,9 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"goal": {}}, "goal", "name exactly one"),
     ({"goal/attracts_all": True}, "goal", "name exactly one"),
     ({"goal": {"attracts_all": False}}, "goal.attracts_all", "leave the line out"),
-    ({"goal/oriented_beyond/x": 20}, "goal.oriented_beyond.x", "as text"),
     ({"goal/oriented_beyond/x": "20 deg"}, "goal.oriented_beyond.x", "dimension is wrong"),
     ({"goal/oriented_beyond/x": "28 in"}, "goal.oriented_beyond.x", "below the arm's length"),
     ({"goal/oriented_beyond/side": 3}, "goal.oriented_beyond.side", "0 to 2"),
-    ({"goal": {"reaches": {"x": "1 in", "side": 7}}}, "goal.reaches.side", "0 to 2"),
     (
         {"goal": {"reaches": {"x": "1 in", "side": 0, "every_orbit": 1}}},
         "goal.reaches.every_orbit",
@@ -190,7 +155,6 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"goal": {"flip_order": [0, 3]}}, "goal.flip_order[1]", "0 to 2"),
     ({"goal": {"flip_order": []}}, "goal.flip_order", "at least 1"),
     # cavity
-    ({"cavity": {}}, "cavity.position", "required"),
     ({"cavity": CAVITY | {"size": "1 in"}}, "cavity.size", "angle, depth, position, tips, width"),
     ({"cavity": CAVITY | {"position": "28.001 in"}}, "cavity.position", "up to the arm's length, 28 in"),
     ({"cavity": CAVITY | {"position": "4.2 in"}}, "cavity.position", "the part resting on side 2 needs"),
@@ -199,9 +163,6 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"cavity": CAVITY | {"depth": "0 in"}}, "cavity.depth", "above 0"),
     ({"cavity": CAVITY | {"angle": "0 deg"}}, "cavity.angle", "below 90 deg"),
     ({"cavity": CAVITY | {"angle": "90 deg"}}, "cavity.angle", "below 90 deg"),
-    ({"cavity": CAVITY | {"angle": "-5 deg"}}, "cavity.angle", "below 90 deg"),
-    ({"world/throw_rate": "2"}, "world.throw_rate", "add the unit"),
-    ({"world/throw_rate": "2 hz"}, "world.throw_rate", "did you mean 'Hz'"),
     ({"world/throw_rate": "0 Hz"}, "world.throw_rate", "above 0"),
     # world, effects, tolerance
     ({"world/friction": "0.9"}, "world.friction", "without a unit"),
@@ -215,9 +176,6 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"effects/spread": "wide"}, "effects.spread", '"bounded" or "gaussian"'),
     ({"effects/slip": True, "world/friction": GONE}, "effects.slip", "slip needs it: add world.friction"),
     ({"effects/pivot": True, "world": GONE}, "effects.pivot", "world.friction"),
-    ({"effects/bounce": True, "world/restitution": GONE}, "effects.bounce", "world.restitution"),
-    ({"effects/bounce": True, "world/bounce_threshold": GONE}, "effects.bounce", "world.bounce_threshold"),
-    ({"effects/drive": True, "world/stroke": GONE}, "effects.drive", "world.stroke"),
     ({"effects/spread": "bounded", "world/scatter": {}}, "effects.spread", "world.scatter"),
     ({"effects/drive": True, "effects/slip": True}, "effects.drive", "drive or slip"),
     ({"effects/drive": True, "effects/pivot": True}, "effects.drive", "drive or pivot"),
@@ -288,14 +246,8 @@ def test_an_effect_that_is_not_declared_is_an_unknown_key(
     assert caught.value.key == "effects.roll"
 
 
-def test_part_that_tips_over_names_the_side_and_the_lack(plate: dict[str, Any]) -> None:
-    plate["part"]["vertices"] = [["0 cm", "0 cm"], ["2 cm", "0 cm"], ["9 cm", "4 cm"], ["7 cm", "4 cm"]]
-    del plate["part"]["mass"]["points"]
-    with pytest.raises(GeometryError, match=r"on side 0: it tips over the right end by 2.5 cm") as caught:
-        load(plate)
-    assert caught.value.key == "part.mass"
-
-
+SKEWED = [["0 cm", "0 cm"], ["2 cm", "0 cm"], ["9 cm", "4 cm"], ["7 cm", "4 cm"]]
+CLOCKWISE = [["0 cm", "4 cm"], ["6 cm", "4 cm"], ["6 cm", "0 cm"], ["0 cm", "0 cm"]]
 TINY = [[f"{x}e-200 cm", f"{y}e-200 cm"] for x, y in ["00", "10", "01"]]
 THIN = {"part/mass/plate_thickness": "0 mm"}
 
@@ -307,6 +259,12 @@ THIN = {"part/mass/plate_thickness": "0 mm"}
         ({"part/vertices/2/1": "4 s"}, "part.vertices[2].y", "not known"),
         ({"part/vertices/2": "6 cm"}, "part.vertices[2]", "a list"),
         ({"part/vertices/2": ["1 cm", "1 cm"]}, "part.vertices", "inward"),
+        ({"part/vertices": CLOCKWISE}, "part.vertices", "reverse the list"),
+        (
+            {"part/vertices": SKEWED, "part/mass/points": GONE},
+            "part.mass",
+            "on side 0: it tips over the right end by 2.5 cm",
+        ),
         ({"part/vertices": TINY}, "part.vertices", "smaller"),
         ({"part/vertices": []}, "part.vertices", "from 3"),
         ({"part/vertices": [["0 cm", "0 cm"]] * 2000}, "part.vertices", "at most 1000"),
@@ -336,12 +294,6 @@ def test_refuses_vertices_and_points(
     changes: dict[str, Any], key: str, words: str, plate: dict[str, Any]
 ) -> None:
     refused(plate, changes, key, words)
-
-
-def test_clockwise_vertices_are_named_so(plate: dict[str, Any]) -> None:
-    plate["part"]["vertices"].reverse()
-    with pytest.raises(GeometryError, match=r"clockwise.*reverse the list"):
-        load(plate)
 
 
 @pytest.mark.parametrize(
@@ -460,12 +412,6 @@ def test_what_does_not_take_a_chamfer_names_the_way_out(command: Any) -> None:
     assert "[cavity]" not in caught.value.remedy
 
 
-def test_a_chamfer_with_a_cavity_is_told_the_same() -> None:
-    cavity = {"position": "30 cm", "width": "10 cm", "depth": "4 cm", "angle": "40 deg"}
-    with pytest.raises(SceneError, match="draw the part without it"):
-        ls.load(chamfered(effects=BOTH_REMEDIES, cavity=cavity))
-
-
 def test_the_way_out_works() -> None:
     """The edges beside the chamfer of this square meet in the corner (4, 4)."""
     tree = chamfered()
@@ -513,14 +459,6 @@ def test_the_worked_example_of_the_page_is_the_sum_of_its_pieces() -> None:
         assert (cx, cy) == pytest.approx(centre, abs=5e-4)
         rho = math.sqrt(mass @ (own + (x - cx) ** 2 + (y - cy) ** 2) / mass.sum())
         assert rho == pytest.approx(radius, abs=5e-4)
-
-
-def test_points_beside_a_measured_mass_are_told_how_to_be_added() -> None:
-    tree = plate()
-    center = {"side": 0, "along": "40 mm", "above": "20 mm"}
-    tree["part"]["mass"] |= {"center": center, "radius_of_gyration": "25 mm"}
-    with pytest.raises(SceneError, match="parallel-axis"):
-        ls.load(tree)
 
 
 @pytest.mark.parametrize(

@@ -124,15 +124,14 @@ class Exact(NamedTuple):
 
     phi: arb
     phi_condition: float
-    omega: arb
     margin: arb
     flips: bool
     displacement: arb
     displacement_condition: float
 
 
-def margin_at(part: Part, x: float | arb, phi: arb) -> tuple[arb, arb]:
-    """Rotation after the impact, and the number that is positive where the part flips."""
+def margin_at(part: Part, x: float | arb, phi: arb) -> arb:
+    """The number that is positive where the part flips."""
     a, d, kappa, rho = arb(part.a), arb(part.d), arb(part.kappa), arb(part.rho)
     right, above = a * phi.cos() - d * phi.sin(), a * phi.sin() + d * phi.cos()
     ell = (a**2 + d**2).sqrt()
@@ -140,8 +139,8 @@ def margin_at(part: Part, x: float | arb, phi: arb) -> tuple[arb, arb]:
     omega = (rho**2 + right * (arb(x) - kappa * phi) + above * (arb(part.h) + d)) / inertia
     kinetic, climb = inertia * omega**2 / 2, kappa * (ell - above)
     if part.flip == "energy":
-        return omega, kinetic - climb if right > 0 else arb(1)
-    return omega, (kinetic if omega > 0 else -kinetic) - (climb if right > 0 else -climb)
+        return kinetic - climb if right > 0 else arb(1)
+    return (kinetic if omega > 0 else -kinetic) - (climb if right > 0 else -climb)
 
 
 def throw(part: Part, x: float) -> Exact | None:
@@ -154,7 +153,7 @@ def throw(part: Part, x: float) -> Exact | None:
     spread = sum((abs(term) for term in height.terms(phi)), arb(0))
     # The angle is rounded as well.
     phi_condition = max(1.0, float((spread / abs(height.slope(phi)) / phi).mid()))
-    omega, margin = margin_at(part, x, phi)
+    margin = margin_at(part, x, phi)
     flips = bool(margin > 0)
     terms = [
         arb(part.a) * 2 * (phi / 2).sin() ** 2,
@@ -166,4 +165,4 @@ def throw(part: Part, x: float) -> Exact | None:
     bend = arb(part.a) * phi.sin() - 2 * arb(part.d) * (phi / 2).sin() ** 2 - arb(part.h)
     moved = sum((abs(term) for term in terms), arb(0)) + abs(bend) * phi * phi_condition
     condition = math.inf if shift.contains(0) else float((moved / abs(shift)).mid())
-    return Exact(phi, phi_condition, omega, margin, flips, shift, condition)
+    return Exact(phi, phi_condition, margin, flips, shift, condition)

@@ -40,6 +40,7 @@ def check(part: Part, x: float) -> exhaustive.Exact | None:
     found = maps.images(params, [x], 0)
     if exact is None:
         assert (found.code[0], found.side[0], found.x[0]) == (maps.OUTSIDE_MODEL, 0, x), what
+        assert np.isnan(margins(params, [x], 0)).all(), what
         return None
     assert ulps(exact.phi, fly(params, x, 0).phi) <= ULPS * exact.phi_condition, what
     told = trace(params, x, 0).displacement
@@ -195,6 +196,8 @@ def test_the_smallest_of_many_roots() -> None:
 def test_a_first_root_beyond_a_full_turn_is_outside_the_model() -> None:
     for part in (Part(2.0, 1.0, 7.0), Part(2.0, 1.0, 1.5), Part(0.01, 5.0, 4.0)):
         edge = math.pi * part.kappa
+        before = check(part, edge * (1.0 - 1e-9))
+        assert before is not None or part.kappa < math.hypot(part.a, part.d)
         for factor in (1.0 + 1e-13, 1.001, 2.0, 1e6, 1e300):
             if edge * factor > part.a and edge * factor < 1e6:
                 assert not exhaustive.roots(part, edge * factor) or part.kappa < math.hypot(part.a, part.d)
@@ -214,7 +217,7 @@ def critical_point(part: Part, near: float) -> arb:
     lo, hi = arb(near - 64 * math.ulp(near)), arb(near + 64 * math.ulp(near))
 
     def flips(x: arb) -> bool:
-        return bool(exhaustive.margin_at(part, x, exhaustive.roots(part, x, first=True)[0].phi)[1] > 0)
+        return bool(exhaustive.margin_at(part, x, exhaustive.roots(part, x, first=True)[0].phi) > 0)
 
     before = flips(lo)
     assert before != flips(hi)

@@ -231,9 +231,8 @@ class Plate:
 
     def seated(self, side: int, x: float = 0.0) -> Pose:
         """Give the pose of a part on a side on the floor of the depression, the middle of its side at x."""
-        stage = self._stage()
         offset = float(self.part.sides.a[side]) - 0.5 * float(self.part.sides.length[side])
-        return self.lowered(x + offset, stage.flat[side], -self.depth)
+        return self.lowered(x + offset, self._stage().flat[side], -self.depth)
 
     def settle(
         self, pose: Pose, motion: Motion, watch: Callable[[float, Pose, Motion], None] | None = None

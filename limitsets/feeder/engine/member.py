@@ -302,12 +302,11 @@ class Member:
         radius, phase = self.polar[self.vertex]
         return side, self.place[0] - radius * math.cos(angle + phase), angle
 
-    def lie_down(self, space: Any) -> int:
-        """Lie on the face that comes down, at rest, and let go of the corner; which side."""
+    def lie_down(self, space: Any) -> None:
+        """Lie on the face that comes down, at rest, and let go of the corner."""
         side, x, angle = self.coming_down()
         self.let_go(space)
         self.stand((x, self.scene.surface_height + float(self.scene.sides.d[side]), angle))
-        return side
 
     def soften(self, bias: float) -> None:
         """Let the joint take back its drift as slowly as contacts their overlap, or they would never rest."""

@@ -153,13 +153,10 @@ def set_up(scene: Scene, x: float, side: int) -> Stage:
     """Put a part on the arm at the moment of release: it has the velocity of a turn at rate 1 about the joint."""
     pymunk = pymunk_module()
     height, d = scene.surface_height, float(scene.sides.d[side])
-    flat = []
-    for each in range(len(scene.vertices)):
-        left, right = side_ends(len(scene.vertices), each)
-        along, up = (scene.vertices[right] - scene.vertices[left]).tolist()
-        flat.append(-math.atan2(up, along))
-    about = (scene.vertices - scene.centre).tolist()
-    corners = tuple((across, up) for across, up in about)
+    ends = (side_ends(len(scene.vertices), each) for each in range(len(scene.vertices)))
+    sides = ((scene.vertices[right] - scene.vertices[left]).tolist() for left, right in ends)
+    flat = tuple(-math.atan2(up, along) for along, up in sides)
+    corners = tuple((across, up) for across, up in (scene.vertices - scene.centre).tolist())
     body = pymunk.Body(1.0, scene.radius_of_gyration**2)
     body.angle = flat[side]
     body.position = (x, height + d)
@@ -170,9 +167,7 @@ def set_up(scene: Scene, x: float, side: int) -> Stage:
     space.gravity = (0.0, -scene.kappa)
     space.add(body, part)
     size = float(scene.sides.length.max())
-    return Stage(
-        space, body, part, corners=corners, flat=tuple(flat), height=height, kappa=scene.kappa, size=size
-    )
+    return Stage(space, body, part, corners=corners, flat=flat, height=height, kappa=scene.kappa, size=size)
 
 
 # ----------------------------------------------------------------
@@ -328,14 +323,13 @@ def turn_and_roll(
     body, time, vertex, face, down = stage.body, 0.0, struck, -1, 0.0
     restitution, threshold = bounce
     while time <= patience:
-        came = down if face >= 0 else 0.0
         impulse = _stick(stage, vertex)
         if restitution > 0.0 and _bounce(stage, vertex, restitution * impulse, threshold):
             time += fly(stage, patience)
             vertex, face = _lands(stage), -1
             continue
         if face >= 0:
-            moving = body.angular_velocity * came > 0.0
+            moving = body.angular_velocity * down > 0.0
             if not rolls or not moving or body.kinetic_energy < ROCKING * stage.kappa * stage.size:
                 return time, face
         took, face = turn_on_hinge(stage, vertex, step, patience - time)

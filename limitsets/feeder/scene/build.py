@@ -61,8 +61,9 @@ def resolve_goal(table: Tree, rests: list[bool], arm_length: float, resolver: Re
         ((name, word),) = words.items()
         values = {name: read(word, given, key)}
     else:
-        written = {name: word for name, word in words.items() if name in given}
-        values = {name: read(word, given[name], f"{key}.{name}") for name, word in written.items()}
+        values = {
+            name: read(word, given[name], f"{key}.{name}") for name, word in words.items() if name in given
+        }
     return goal(**values, from_anywhere=table.get("from_anywhere", False))  # type: ignore[call-arg]  # a kind is a dataclass
 
 

@@ -23,6 +23,7 @@ from limitsets.feeder.scene.scene import Scene
 from limitsets.feeder.scene.units import UNITS, parse
 from limitsets.feeder.scene.validation import plain
 
+_BUILTIN = resources.files("limitsets.feeder.scene") / "builtin"
 _MOST_BYTES = 1 << 20
 _MOST_DOTS = 16
 # what may hold a point without being a dotted key; the order is that of TOML's own lexer
@@ -43,10 +44,8 @@ def scenes() -> list[str]:
     >>> scenes()[0]
     'paper-designed'
     """
-    folder = resources.files("limitsets.feeder.scene") / "builtin"
-    return sorted(
-        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
-    )
+    names = (entry.name for entry in _BUILTIN.iterdir())
+    return sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml"))
 
 
 def load(source: str | Path | Mapping[str, Any] | Scene) -> Scene:
@@ -119,8 +118,10 @@ def structure_of(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any]
         raise SceneError("the source of a scene", shown(source), allowed, "give one of these")
     # a name that no terminal can print would fail in the error that reports it
     file = str(source).encode("utf-8", "backslashreplace").decode()
-    builtin = isinstance(source, str) and file in scenes()
-    text = _builtin(file) if builtin else _decoded(_read(Path(source), file), file)
+    if isinstance(source, str) and file in scenes():
+        text = (_BUILTIN / f"{file}.toml").read_text(encoding="utf-8")
+    else:
+        text = _decoded(_read(Path(source), file), file)
     stem = Path(file).stem
     return {"name": stem if can_name(stem) else "scene", **_parsed(text, file)}, file
 
@@ -128,12 +129,6 @@ def structure_of(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any]
 def can_name(stem: str) -> bool:
     """Say whether the stem of a file can name a scene."""
     return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,63}", stem) is not None
-
-
-def _builtin(name: str) -> str:
-    return (resources.files("limitsets.feeder.scene") / "builtin" / f"{name}.toml").read_text(
-        encoding="utf-8"
-    )
 
 
 def _read(path: Path, file: str) -> bytes:

@@ -207,9 +207,8 @@ class Scene(Tabled):
         if self.effects.spread is None:
             return self.map
         full = cast("FullThrow", self.map)
-        own = {"seed": float(seed)}
         return full._replace(effects=tuple(
-            each._replace(**own) if "seed" in each._fields else each for each in full.effects
+            each._replace(seed=float(seed)) if "seed" in each._fields else each for each in full.effects
         ))  # fmt: skip
 
     def _facts(self) -> World:
@@ -286,9 +285,8 @@ class Scene(Tabled):
         }
         number = derived.get(name)
         if number is None:
-            remedy = "add [gravity]" if name == "throw.speed" else "it is given in other words here"
-            if name == NOISE_ONLY:
-                remedy = "it names the noise of landings only"
+            remedies = {"throw.speed": "add [gravity]", NOISE_ONLY: "it names the noise of landings only"}
+            remedy = remedies.get(name, "it is given in other words here")
             raise SceneError(
                 "the quantity", name, "a quantity that the scene gives", remedy, key=name, file=self.file
             )

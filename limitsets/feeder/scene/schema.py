@@ -338,7 +338,7 @@ WRITTEN: dict[str, Key] = {
 
 def _goal_key(goal: type[Goal]) -> Key:
     """Say what is written after a goal's word: `true`, the one field it has, or a table of several."""
-    words, says = words_of(goal), _first_line(goal)
+    words, says = words_of(goal), (goal.__doc__ or "").partition("\n")[0].rstrip(".")
     if not words:
         return Key(YES, says, True)
     if len(words) == 1:
@@ -354,10 +354,6 @@ def _goal_key(goal: type[Goal]) -> Key:
         ),
         says,
     )
-
-
-def _first_line(goal: type[Goal]) -> str:
-    return (goal.__doc__ or "").partition("\n")[0].rstrip(".")
 
 
 def _fact_key(fact: Fact) -> Key:

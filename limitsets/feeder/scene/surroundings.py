@@ -250,11 +250,12 @@ def resolve_feedback(count: int, arm_length: float, resolver: Resolver, *, gravi
             raise resolver.refusal(f"{key}.speed", "the gravity", "missing", "a table [gravity]", remedy)
         throws.append(ChosenThrow(each["name"], f"throw.{word}", each[word]))
     table = resolver.text("feedback.sensor")
-    sensor = None if table is None else _sensor(table, "feedback.sensor", count, arm_length, resolver)
+    sensor = None if table is None else _sensor(table, count, arm_length, resolver)
     return Feedback(tuple(throws), sensor)
 
 
-def _sensor(table: Tree, key: str, count: int, arm_length: float, resolver: Resolver) -> Sensor:
+def _sensor(table: Tree, count: int, arm_length: float, resolver: Resolver) -> Sensor:
+    key = "feedback.sensor"
     if "side" in table:
         remedy = "the error of a place: leave it out"
         resolver.require("error" not in table, f"{key}.error", "the error", "none with side", remedy)
@@ -315,8 +316,7 @@ def resolve_tray(
 ) -> Tray:
     """Resolve ``[tray]`` for a part with these vertices and lengths of its sides."""
     sizes = Tray(*(resolver.positive(f"tray.{field.name}", "length") for field in fields(Tray)))
-    corners = [(float(x), float(y)) for x, y in vertices]
-    heights, wanted = heights_over_sides(corners), getattr(goal, "side", None)
+    heights, wanted = heights_over_sides(vertices.tolist()), getattr(goal, "side", None)
     fit_for = range(len(heights)) if wanted is None else [wanted]
     side = min(fit_for, key=lengths.__getitem__)
     unit, width, depth = resolver.unit, sizes.depression_width, sizes.depression_depth

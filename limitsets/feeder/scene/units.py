@@ -113,6 +113,7 @@ _SIZES_BY_KIND: dict[str, dict[str, str | Fraction]] = {
     "rad/s": {"rpm": _PI / 30},
     "s": {"s": "1"},
     "Hz": {"Hz": "1"},
+    "share": {"": "1", "%": "0.01"},
 }
 _SIZES = {
     unit: (kind, Fraction(size)) for kind, sizes in _SIZES_BY_KIND.items() for unit, size in sizes.items()
@@ -275,8 +276,6 @@ def convert(quantity: Quantity, unit: str) -> float:
     """
     if quantity.unit == unit:
         return float(quantity.number)
-    if unit == "":
-        return float(Fraction(quantity.number) / 100)
     return float(Fraction(quantity.number) * exact_factor(quantity.unit, unit))
 
 

@@ -40,9 +40,7 @@ def _plain(value: object, key: str, depth: int, file: str | None) -> Any:
         return {word: _plain(item, _joined(key, word), depth + 1, file) for word, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item, f"{key}[{index}]", depth + 1, file) for index, item in enumerate(value)]
-    if isinstance(value, str | bool | int):
-        return value
-    if isinstance(value, float) and math.isfinite(value):
+    if isinstance(value, str | bool | int) or (isinstance(value, float) and math.isfinite(value)):
         return value
     raise SceneError(
         "this value",

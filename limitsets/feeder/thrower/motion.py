@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base import MapError
-from limitsets.feeder.thrower import motion, motion as motion_box
 from limitsets.feeder.thrower.flight import Turned
 from limitsets.feeder.thrower.params import Side, SideBox, Throw, gather_box, with_kappa
 from limitsets.numbers.interval import Interval
@@ -458,9 +457,8 @@ def put(ways: Ways, turned: int, rolled: bool, x: Interval) -> Ways:
 # What an effect says of itself, and the table of all that a scene may switch on.
 #
 # An effect is one file: a NamedTuple of its numbers, its kernels, and a call of `declare`.  Its kernels are called
-# where
-# `motion.py` and `motion_box.py` have a place for them (``moved.on(Numbers, method)``); boxes enclose nothing of it
-# until it says ``encloses.on(Numbers, enclosed)``.
+# where this file has a place for them (``moved.on(Numbers, method)``); boxes enclose nothing of it until it says
+# ``encloses.on(Numbers, enclosed)``.
 
 
 class Effect(NamedTuple):
@@ -495,23 +493,13 @@ class Effect(NamedTuple):
     @property
     def enclosed(self) -> bool:
         """Whether boxes follow it, with some of its numbers at least."""
-        return self.numbers in motion_box.encloses.methods
+        return self.numbers in encloses.methods
 
 
 EFFECTS: dict[str, Effect] = {}
 """The effects a scene may switch on, by name, in the order in which a throw meets them."""
 
-_PLACES = (
-    motion.thrown,
-    motion.varied,
-    motion.possible,
-    motion.impacted,
-    motion.moved,
-    motion.stays,
-    motion_box.encloses,
-    motion_box.thrown_box,
-    motion_box.moved_box,
-)
+_PLACES = (thrown, varied, possible, impacted, moved, stays, encloses, thrown_box, moved_box)
 
 
 def declare(effect: Effect) -> None:

@@ -232,8 +232,7 @@ def impact_angles(params: Throw | FullThrow, x: ArrayLike, side: int) -> NDArray
     """
     _check_side(params, side)
     starts = np.ascontiguousarray(x, dtype=np.float64)
-    count = starts.size
-    phi, _, _, _ = _seen(params, starts, np.full(count, side, dtype=np.int64), path=False)
+    phi, _, _, _ = _seen(params, starts, np.full(starts.size, side, dtype=np.int64), path=False)
     inside = _rests(params, side) & (starts > params.a[side]) & (phi > 0.0) & (phi <= params.flight.full_turn)
     return np.where(inside, phi, math.nan)
 

@@ -6,7 +6,7 @@ time; friction pulls mu as hard against the sliding, by Coulomb's law:
     d(rates)/dJ = gain @ (friction, 1),        friction = -mu sign(v_t),        v = lever @ rates.
 
 `routh` starts again where v_t comes to 0, in the one of three modes (held, off to the right, off to the left) that
-agrees with itself; `smoothed` has no modes and no events of sliding: friction is -mu tanh(v_t/width).
+agrees with itself.
 """
 
 from __future__ import annotations
@@ -80,23 +80,3 @@ def _leg(
     )
     stopped = way != 0.0 and len(run.t_events[0]) > 0
     return run.y[:, -1], float(run.t[-1]), stopped
-
-
-def smoothed(
-    gain: np.ndarray, lever: np.ndarray, rates: np.ndarray, mu: float, width: float, restitution: float
-) -> np.ndarray:
-    """Rates after an impact in which friction falls to nothing smoothly where the sliding is slower than `width`."""
-
-    def change(_: float, now: np.ndarray) -> np.ndarray:
-        return gain @ (-mu * np.tanh((lever @ now)[0] / width), 1.0)
-
-    def approach(_: float, now: np.ndarray) -> float:
-        return float((lever @ now)[1])
-
-    approach.terminal, approach.direction = True, 1.0
-    # a step that spans the bend at v_t = 0 would spoil where v_n = 0 is found in it
-    how = {"method": "Radau", "rtol": 1e-10, "atol": 1e-11, "max_step": 0.02}
-    run = solve_ivp(change, (0.0, 1e3), rates, events=approach, **how)
-    assert run.status == 1
-    rates, back = run.y[:, -1], restitution * float(run.t[-1])
-    return solve_ivp(change, (0.0, back), rates, **how).y[:, -1]

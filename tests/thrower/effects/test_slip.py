@@ -24,8 +24,8 @@ from limitsets.numbers.jit import entry_of, kernel
 from limitsets.systems.maps import advance, codes, images, orbit
 from limitsets.systems.maps.drivers import normal_pair, philox, uniform_pair
 from tests.kept import kept
-from tests.thrower.effects.routh import routh, smoothed
-from tests.thrower.effects.throws import agree, cases, same_end
+from tests.thrower.effects.routh import routh
+from tests.thrower.effects.throws import agree, cases
 
 # ----------------------------------------------------------------
 # Friction of finite strength at impacts: limits, worked numbers, and an independent simulation.
@@ -47,25 +47,6 @@ def square(mu: float, rho: float = math.sqrt(2.0)) -> FullSide:
         arm_length=50.0,
     )
     return gather_full(with_effects(bare, {"slip": True}, SimpleNamespace(friction=mu)), 0)
-
-
-def upright(vx: float, vy: float, omega: float) -> Arrival:
-    """The square coming down on a corner with its centre straight above: X = 0, H = sqrt 2."""
-    return Arrival(0, turn(math.pi / 4), 0.0, vx, vy, omega)
-
-
-def test_a_weak_impulse_of_friction_leaves_it_sliding_and_tips_it_forward() -> None:
-    # J_n = 1, J_t = -1/4; the contact slows by A J_t = 2/4, and the rotation changes by H J_t / rho^2 = -sqrt 2/8
-    after = struck(None, Slip(0.25), square(0.25), upright(2.0, -1.0, 0.0))
-    assert after.slide == pytest.approx(1.5, rel=1e-14)
-    assert after.omega == pytest.approx(-math.sqrt(2.0) / 8, rel=1e-14)
-    assert after.lift == 0.0
-
-
-def test_friction_that_suffices_sticks() -> None:
-    # J_t = -v_t/A = -1 and J_n = 1: in the cone from mu = 1 on
-    assert struck(None, Slip(1.01), square(1.01), upright(2.0, -1.0, 0.0)).slide == 0.0
-    assert struck(None, Slip(0.99), square(0.99), upright(2.0, -1.0, 0.0)).slide > 0.0
 
 
 def test_sliding_stops_and_reverses_on_the_way() -> None:
@@ -105,10 +86,6 @@ class Meeting:
     def gain(self) -> np.ndarray:
         """Change of the rates by an impulse at the vertex."""
         return np.diag([1.0, 1.0, 1.0 / self.part.own.rho2]) @ self.lever.T
-
-    def stop(self, rates: np.ndarray) -> np.ndarray:
-        """Impulse (J_t, J_n) that stops the vertex."""
-        return np.linalg.solve(self.lever @ self.gain, -self.lever @ rates)
 
     def struck(self, rates: np.ndarray, mu: float, restitution: float = 0.0) -> np.ndarray:
         """Rates after an impact, by the kernels."""
@@ -166,36 +143,6 @@ def test_impacts_are_those_of_the_integrated_law(restitution: float) -> None:
     assert back > 10 or restitution > 0.0
 
 
-@pytest.mark.sweep
-def test_it_is_the_limit_of_friction_that_is_a_smooth_function_of_the_sliding() -> None:
-    rng = np.random.default_rng(41)
-    for at in meetings(40, 41):
-        rates = -at.gain @ (float(rng.uniform(-1.0, 1.0)) * at.mu, 1.0)
-        if (at.lever @ rates)[1] < 0.0:
-            seen = smoothed(at.gain, at.lever, rates, at.mu, 1e-5, 0.6)
-            np.testing.assert_allclose(at.struck(rates, at.mu, 0.6), seen, rtol=0, atol=1e-4)
-
-
-@pytest.mark.sweep
-@pytest.mark.parametrize("restitution", [0.0, 0.6])
-def test_the_law_has_no_jump(restitution: float) -> None:
-    """Approach velocities on a line over v_t = 0 and both borders of the cone: a jump does not shrink with the step."""
-    steep = 0
-    for at in meetings(24, 42):
-        compliance = at.lever @ at.gain
-        steep += abs(compliance[0, 1]) > at.mu * compliance[0, 0]
-        steps = []
-        # the direction of the impulse that stops the vertex goes from one side of the cone to the other
-        for count in (150, 1500):
-            ends = [
-                at.struck(-at.gain @ (share * at.mu, 1.0), at.mu, restitution)
-                for share in np.linspace(-3.0, 3.0, count + 1)
-            ]
-            steps.append(np.abs(np.diff(ends, axis=0)).max())
-        assert steps[1] < steps[0] / 5
-    assert 6 < steep < 18
-
-
 def test_enough_friction_is_that_to_stick_and_not_to_slide_back() -> None:
     """The bare map's impact from the larger of |J_t|/J_n and |B|/A on, and not before."""
     rng, second = np.random.default_rng(43), 0
@@ -242,36 +189,6 @@ def test_without_friction_the_horizontal_velocity_stays_and_nothing_rests() -> N
         high = part.own.a * hit.psi.sin + part.own.d * (1.0 - hit.psi.versin)
         assert after.slide - after.omega * high == pytest.approx(hit.vx, rel=1e-12)
         assert case.mapped(("slip",)) is None
-
-
-def test_endless_friction_is_the_bare_map_where_the_stop_pushes_and_only_there() -> None:
-    stuck, slid = 0, 0
-    for case in cases(60, 2, friction=1e9):
-        # the impulse that stops the vertex, from the throw's formulas in docs/model.md
-        facts = case.body.numbers()
-        a, d, rho = facts["a"][case.side], facts["d"][case.side], case.body.rho
-        phi = _landing(a, d, case.kappa, case.x)
-        if phi > facts["corner"][case.side]:
-            continue
-        right, high = a * math.cos(phi) - d * math.sin(phi), a * math.sin(phi) + d * math.cos(phi)
-        fall = case.x - case.kappa * phi
-        omega = (rho**2 + right * fall + high * (case.height + d)) / (rho**2 + a * a + d * d)
-        push = omega * right - fall
-        if push > 1e-6:
-            stuck += 1
-            assert same_end(case.mapped(("slip",)), case.mapped(()))
-        elif push < -1e-3:
-            slid += 1
-            assert not same_end(case.mapped(("slip",)), case.mapped(()))
-    assert stuck > 20
-    assert slid > 5
-
-
-def _landing(a: float, d: float, kappa: float, x: float) -> float:
-    """Smallest root of the flight, by a scan."""
-    phi = np.linspace(1e-4, 2 * np.pi, 400_000)
-    below = np.flatnonzero(x * phi - a * np.sin(phi) + d * (1 - np.cos(phi)) - kappa / 2 * phi**2 <= 0)
-    return float(phi[below[0]])
 
 
 @kernel(entry=True)
@@ -360,14 +277,6 @@ def test_what_is_drawn_is_uniform_and_normal() -> None:
     pairs(True, len(drawn), drawn)
     for k in (0, 1):
         assert stats.kstest(drawn[:, k], "norm").pvalue > 1e-3
-
-
-def test_no_width_is_no_effect() -> None:
-    still = scene("bounded", speed="0 %", landing="0 in")
-    noisy, plain = orbit(still.map, 15.0, 2, 5000), orbit(DESIGNED.map, 15.0, 2, 5000)
-    # with effects the arithmetic is ordered otherwise: the same to rounding, until chaos has made that large
-    assert np.array_equal(noisy.side[:60], plain.side[:60])
-    assert noisy.x[:60] == pytest.approx(plain.x[:60], abs=1e-9)
 
 
 def test_a_throw_uses_its_own_speed_and_its_own_shift() -> None:
