@@ -152,8 +152,7 @@ class Store:
         wrong = list(differences(self.plan.record, theirs))
         wrong = [each for each in wrong if not each[0].endswith(".sha256")] or wrong
         if wrong:
-            words = [_difference(*each) for each in wrong]
-            shown = "; ".join(words[:_MOST_SHOWN])
+            shown = "; ".join(_difference(*each) for each in wrong[:_MOST_SHOWN])
             more = f" and {len(wrong) - _MOST_SHOWN} more" if len(wrong) > _MOST_SHOWN else ""
             raise LimitsetsError(
                 f"the store {self.path}",
