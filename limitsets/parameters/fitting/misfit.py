@@ -8,9 +8,11 @@ beyond what the fitted quantities can take up (F test)?
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+import operator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -84,12 +86,12 @@ def misfit_of(scene: Scene, start: Start) -> Misfit:
     per_share = max(float(np.median(np.abs(told.per_log_speed))), 1e-12)
     speed, landing = (each.reshape(-1, 1) for each in np.meshgrid(sizes / per_share, sizes))
     landing = np.hypot(landing, 1e-7 * scene.arm_length)
-    tried = whitened(rows, told, speed, landing)
-    loss = np.minimum(tried.residual**2, NAMED**2) + tried.log_variance
+    residual, log_variance = whitened(rows, told, speed, landing)
+    loss = np.minimum(residual**2, NAMED**2) + log_variance
     k = [int(np.argmin(loss.sum(axis=1)))]
 
     def white(miss: Array | None) -> Array:
-        return np.asarray(whitened(rows, told, speed[k], landing[k], miss).residual[0])
+        return np.asarray(whitened(rows, told, speed[k], landing[k], miss)[0][0])
 
     columns = np.stack([white(column[None]) for column in slopes.T], axis=1)
     throws = rows.throws
@@ -295,12 +297,12 @@ def explanation(
 
     def fitted(reading: _Reading) -> _Judged:
         """Return the cost of a reading at its best."""
-        rows, own = _rows(scene, reading, error, known), None
+        rows = _rows(scene, reading, error, known)
         with suppress(DataError):
             own = None if rows is None else robust_start(scene, rows)
-        if own is None or doubtful(scene, own):
-            return _Judged(math.inf, None)
-        return _Judged(_cost(scene, own.rows, own.known, reading.scale), own)
+            if own is not None and not doubtful(scene, own):
+                return _Judged(_cost(scene, own.rows, own.known, reading.scale), own)
+        return _Judged(math.inf, None)
 
     now = math.inf if start is None else _cost(scene, start.rows, start.known, 1.0)
     judged = [(reading, fitted(reading)) for reading in sorted(_readings(scene, throws), key=suits)[:FITTED]]
@@ -315,71 +317,86 @@ def explanation(
     return Explanation(plain.said, False) if gained and best.cost < least.cost else None
 
 
-def _readings(scene: Scene, throws: Throws) -> Iterator[_Reading]:
+def _placed(said: str, throws: Throws, place: Callable[[Array], Array], scale: float = 1.0) -> _Reading:
+    """Read each place as another one."""
+    return _Reading(
+        said, replace(throws, x_before=place(throws.x_before), x_after=place(throws.x_after)), scale
+    )
+
+
+def _readings(scene: Scene, throws: Throws) -> list[_Reading]:
     """Read the same numbers in other ways, none of which has a number to be fitted."""
-    x, y, i, j = throws.x_before, throws.x_after, throws.side_before, throws.side_after
-    swapped = replace(throws, x_before=y, x_after=x)
-    names = "corner" if throws.corner else "x"
-    yield _Reading(
-        "before and after are exchanged: exchange the names of these columns",
-        replace(swapped, side_before=j, side_after=i),
-    )
-    yield _Reading(
-        f"the columns {names}_before and {names}_after are exchanged: exchange their names",
-        swapped,
-    )
-    yield _Reading(
-        "the columns side_before and side_after are exchanged: exchange their names",
-        replace(throws, side_before=j, side_after=i),
-    )
-    yield from _other_sides(len(scene.sides), throws)
-    unit = throws.unit or scene.unit
-    for other in UNITS["length"]:
-        if other != unit:
-            factor = float(exact_factor(other, unit))
-            yield _Reading(
+    unit, arm, length = throws.unit or scene.unit, scene.arm_length, scene.sides.length
+    factors = {other: float(exact_factor(other, unit)) for other in UNITS["length"] if other != unit}
+    sides = throws.side_before, throws.side_after
+    name = "corner" if throws.corner else "x"
+    what, columns = ("the centre of mass", "x") if throws.corner else ("the left corner", "corner")
+    swapped = replace(throws, x_before=throws.x_after, x_after=throws.x_before)
+    readings = [
+        _Reading(
+            "before and after are exchanged: exchange the names of these columns",
+            replace(swapped, side_before=sides[1], side_after=sides[0]),
+        ),
+        _Reading(
+            f"the columns {name}_before and {name}_after are exchanged: exchange their names",
+            swapped,
+        ),
+        _Reading(
+            "the columns side_before and side_after are exchanged: exchange their names",
+            replace(throws, side_before=sides[1], side_after=sides[0]),
+        ),
+        *_other_sides(len(scene.sides), throws),
+        *(
+            _placed(
                 f"the places are in {other}: write [{other}] for [{unit}] in the header",
-                replace(throws, x_before=x * factor, x_after=y * factor),
+                throws,
+                partial(operator.mul, factor),
                 factor,
             )
-    what, columns = ("the centre of mass", "x") if throws.corner else ("the left corner", "corner")
-    yield _Reading(
-        f"the places are those of {what}: name their columns {columns}_before and {columns}_after",
-        replace(throws, corner=not throws.corner),
-    )
-    arm = scene.arm_length
-    yield _Reading(
-        "the places are measured from the arm's end: subtract them from the arm's length",
-        replace(throws, x_before=arm - x, x_after=arm - y),
-    )
-    if max(i.max(), j.max()) < len(scene.sides):
-        length = scene.sides.length
-        yield _Reading(
+            for other, factor in factors.items()
+        ),
+        _Reading(
+            f"the places are those of {what}: name their columns {columns}_before and {columns}_after",
+            replace(throws, corner=not throws.corner),
+        ),
+        _placed(
+            "the places are measured from the arm's end: subtract them from the arm's length",
+            throws,
+            lambda place: arm - place,
+        ),
+    ]
+    if max(map(np.max, sides)) < len(scene.sides):
+        said = (
             "the places are those of the right corner: subtract the length of the side that the part rests on, and"
-            " name their columns corner_before and corner_after",
-            replace(throws, x_before=x - length[i], x_after=y - length[j], corner=True),
+            " name their columns corner_before and corner_after"
         )
+        places = (throws.x_before - length[sides[0]], throws.x_after - length[sides[1]])
+        readings.append(_Reading(said, replace(throws, x_before=places[0], x_after=places[1], corner=True)))
+    return readings
 
 
-def _other_sides(count: int, throws: Throws) -> Iterator[_Reading]:
+def _other_sides(count: int, throws: Throws) -> list[_Reading]:
     """Count the sides from another one, or the other way round."""
     both = np.stack([throws.side_before, throws.side_after])
-
-    def counted(sides: Ints, said: str) -> _Reading:
-        return _Reading(said, replace(throws, side_before=sides[0], side_after=sides[1]))
-
+    ways = []
     if both.max() < count or (both.min() >= 1 and both.max() == count):
-        yield counted(
-            (both - 1) % count,
-            "the sides are counted from 1: subtract 1, the scene has them from 0",
-        )
+        ways.append(("the sides are counted from 1: subtract 1, the scene has them from 0", both - 1))
     if both.max() < count:
-        for first in range(2, count):
-            said = f"the side that the scene calls 0 is called {first}: count the sides as the scene does"
-            yield counted((both - first) % count, said)
-        for first in range(count):
-            said = f"the sides are counted against the flip order, from side {first}: count them as the scene does"
-            yield counted((first - both) % count, said)
+        ways += [
+            (f"the side that the scene calls 0 is called {k}: count the sides as the scene does", both - k)
+            for k in range(2, count)
+        ]
+        ways += [
+            (
+                f"the sides are counted against the flip order, from side {k}: count them as the scene does",
+                k - both,
+            )
+            for k in range(count)
+        ]
+    return [
+        _Reading(said, replace(throws, side_before=sides[0] % count, side_after=sides[1] % count))
+        for said, sides in ways
+    ]
 
 
 Family = tuple[Callable[[float], _Reading], Array]
@@ -387,17 +404,16 @@ Family = tuple[Callable[[float], _Reading], Array]
 
 def _families(scene: Scene, throws: Throws) -> tuple[Family, Family]:
     """Move the origin of places, and scale them."""
-    x, y, unit = throws.x_before, throws.x_after, scene.unit
 
     def moved(by: float) -> _Reading:
-        size = f"{abs(by):.2g} {unit} too {'small' if by > 0 else 'large'}"
+        size = f"{abs(by):.2g} {scene.unit} too {'small' if by > 0 else 'large'}"
         said = f"places seem to be {size}: measure them from the joint"
-        return _Reading(said, replace(throws, x_before=x + by, x_after=y + by))
+        return _placed(said, throws, lambda place: place + by)
 
     def scaled(log: float) -> _Reading:
         factor = math.exp(log)
         said = f"the scale of places seems to be wrong: multiply each place by {factor:.4g}"
-        return _Reading(said, replace(throws, x_before=x * factor, x_after=y * factor), factor)
+        return _placed(said, throws, lambda place: place * factor, factor)
 
     return (moved, ORIGINS * scene.arm_length), (scaled, np.log(SCALES))
 
