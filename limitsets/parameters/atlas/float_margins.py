@@ -188,10 +188,9 @@ class _Search:
             )
         unit = scale.deviation(Fraction(1))
         whole = Deviation(1.0, relative=unit.relative)
-        if unit.relative:
-            most = np.full(self.points.size, MOST)
-        else:
-            most = MOST * np.maximum(np.abs(self._at(quantity)), float(self.scene.sides.length.min()))
+        # of a length or an angle, a share of the value or of the part
+        size = np.maximum(np.abs(self._at(quantity)), float(self.scene.sides.length.min()))
+        most = MOST * (np.ones(self.points.size) if unit.relative else size)
 
         def moved(size: Floats, rows: Ints) -> dict[str, Floats]:
             return self._moved(quantity, whole, size, rows)
@@ -243,5 +242,4 @@ class _Search:
                 stack.params, region_of(stack.lo, stack.hi, stack.anchor), self.points, self.known
             )
             ends.append(threshold_of(self.goal, reach))
-        up = (ends[1] >= ends[0]) == isinstance(self.goal, OrientedBeyond)
-        return np.where(up, 1.0, -1.0)
+        return np.where((ends[1] >= ends[0]) == isinstance(self.goal, OrientedBeyond), 1.0, -1.0)

@@ -76,8 +76,7 @@ def _directed(one: AttractorAtPlace, other: AttractorAtPlace) -> float:
         there = np.array(other.extents[side])
         # Between two bands of the other set the farthest point is the middle of the gap.
         gaps = 0.5 * (there[1:, 0] + there[:-1, 1])
-        points = [x for lo, hi in parts for x in (lo, hi, *gaps[(gaps > lo) & (gaps < hi)].tolist())]
-        x = np.array(points)
+        x = np.array([x for lo, hi in parts for x in (lo, hi, *gaps[(gaps > lo) & (gaps < hi)].tolist())])
         farthest = max(farthest, float(other.distance(x, np.full(x.size, side)).max()))
     return farthest
 

@@ -253,8 +253,7 @@ def _finer(place: Place, cells: int) -> int | None:
 def _rested(snapshot: Snapshot) -> tuple[Array, Ints, Ints]:
     """Last states of orbits from all over the domain that stay, and the attractor that each is at, else -1."""
     domain = snapshot.place.domain
-    per_axis = max(2, round(SPREAD ** (1.0 / domain.dimension)))
-    starts = grid(domain, per_axis)
+    starts = grid(domain, max(2, round(SPREAD ** (1.0 / domain.dimension))))
     x = np.concatenate([starts.centres(side) for side in range(domain.sides)])
     side = starts.side_of(np.arange(len(x)))
     x, side, code, _ = advance(snapshot.place.params, x, side, RESTED)

@@ -244,15 +244,15 @@ def _own(scene: Scene, name: str) -> tuple[float, float]:
     dimension, value = find(name).dimension, scene.value(name)
     corners, size = scene.vertices, float(scene.sides.length.mean())
     half, twice = sorted((0.5 * value, 2.0 * value))
-    if name == "throw.speed" and scene.gravity is not None:
-        lo, hi = (math.sqrt(scene.gravity / (end * size)) for end in reversed(USUAL["throw.kappa"]))
+    if name == "throw.kappa" or (name == "throw.speed" and scene.gravity is not None):
+        lo, hi = (end * size for end in USUAL["throw.kappa"])
+        if name == "throw.speed" and scene.gravity is not None:
+            lo, hi = math.sqrt(scene.gravity / hi), math.sqrt(scene.gravity / lo)
         return lo if lo <= value else half, hi if value <= hi else twice
     if name in USUAL:
         on = int(scene.text["part"]["mass"].get("center", {}).get("side", 0))
         own = float(scene.sides.length[on]) if name.endswith("along") else size
         lo, hi = (end * own for end in USUAL[name])
-        if name == "throw.kappa":
-            return lo if lo <= value else half, hi if value <= hi else twice
         return min(lo, value), max(hi, value)
     if name.startswith("part.mass.points") and name[-1] in "xy":
         axis = "xy".index(name[-1])
@@ -413,9 +413,8 @@ class DesignSearch:
         """Move a population for so many evaluations; the population and its ratings, the best first."""
         from scipy.optimize import differential_evolution
 
-        end, step = self.evaluations + max(evaluations, 1), 0
-        begin = self.evaluations
-        while self.evaluations < end:
+        begin, step = self.evaluations, 0
+        while self.evaluations < begin + max(evaluations, 1):
             evolution = differential_evolution(
                 lambda unknowns: -self.rate(unknowns),
                 [(0.0, 1.0)] * len(self.bounds),

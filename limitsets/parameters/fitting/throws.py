@@ -209,10 +209,9 @@ def _heads(cells: Sequence[str], name: str) -> dict[str, tuple[str, str]]:
         if column in heads:
             raise DataError("the column", column, "each column once", "leave one out", key=key, file=name)
         if column in WITH_UNIT:
-            units = ", ".join(UNITS["length"])
             if unit is None or unit not in UNITS["length"]:
-                remedy = f'write it like "{column} [mm]"'
-                raise DataError("the unit", unit, f"one of {units}", remedy, key=key, file=name)
+                allowed, remedy = f"one of {', '.join(UNITS['length'])}", f'write it like "{column} [mm]"'
+                raise DataError("the unit", unit, allowed, remedy, key=key, file=name)
         elif unit is not None:
             raise DataError("the unit", unit, "none in this column", "leave it out", key=key, file=name)
         heads[column] = (cell.strip(), unit or "")
