@@ -331,11 +331,6 @@ class Plan:
             **self.code,
         }
 
-    @cached_property
-    def digest(self) -> str:
-        """The hash of the plan."""
-        return digest_of(self.record)
-
     def require(self) -> None:
         """Refuse a plan that cannot be carried out, before anything is computed."""
         names = [axis.name for axis in self.axes]

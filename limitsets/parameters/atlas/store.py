@@ -341,7 +341,7 @@ def _attributes(plan: Plan) -> dict[str, Any]:
     """Return the attributes of a store."""
     attributes: dict[str, Any] = {
         "title": f"atlas of {plan.subject.title}",
-        "plan_hash": plan.digest,
+        "plan_hash": digest_of(plan.record),
         "plan": plan.record,
     }
     if isinstance(plan.subject, SceneSubject):

@@ -373,8 +373,8 @@ class _Between(NamedTuple):
         if not group.before:
             came = _whereto(one_side[0], self.before, self.old, reach)
             return self.event("birth", group, f"{words}, its states came to {came}", None, met)
-        many = [self.after.attractors[k] for k in group.after]
-        change = f"{words} -> {' and '.join(State.of(each).words() for each in many)}"
+        others = " and ".join(State.of(self.after.attractors[k]).words() for k in group.after)
+        change = f"{words} -> {others}"
         kind = "merge" if len(group.before) >= len(group.after) else "split"
         return self.event(kind, group, change, None, met)
 
