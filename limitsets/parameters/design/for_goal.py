@@ -30,7 +30,6 @@ from limitsets.feeder.scene import (
     laid_goal,
     laid_goals,
     load,
-    require_rests,
     unit_of,
 )
 from limitsets.parameters.design.search import (
@@ -42,6 +41,7 @@ from limitsets.parameters.design.search import (
     bounds_of,
     design_name,
     of_the_arm,
+    require_searchable,
     said,
     scene_with,
     validity_slack,
@@ -293,11 +293,7 @@ def design_for_goal(
         raise AnswerError(
             "the goal", kind, "oriented_beyond or reaches, with a side and an x", remedy, file=start.file
         )
-    require_rests(start)
-    if start.effects.on():
-        raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
-    if evaluations < 1:
-        raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
+    require_searchable(start, evaluations)
     search = _GoalSearch(start, {}, progress or silent, evaluations)
     rating, room_before, why = search.rated(start)
     search.best = rating, room_before, start
@@ -308,9 +304,8 @@ def design_for_goal(
         search.run(bounds_of(start, vary, bounds), evaluations - search.evaluations, seed)
     _, room, made = search.best
     design = load(made.as_dict() | {"name": design_name(start)})
-    reaches = Reaches(start.goal.x, start.goal.side)
-    asked = (start.goal, reaches) if isinstance(start.goal, OrientedBeyond) else (start.goal,)
-    goals = tuple(laid_goal(goal, start.goal.laid) for goal in asked)
+    fed = (Reaches(start.goal.x, start.goal.side),) if isinstance(start.goal, OrientedBeyond) else ()
+    goals = tuple(laid_goal(goal, start.goal.laid) for goal in (start.goal, *fed))
     return GoalDesign(
         scene=design,
         before=start,

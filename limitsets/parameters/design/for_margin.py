@@ -22,7 +22,7 @@ from limitsets.base import AnswerError, Progress, arguments_checked, shown_in_no
 from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import triangle
 from limitsets.feeder.goals import Goal, Laid, OrientedBeyond, Reaches
-from limitsets.feeder.scene import LaidLike, Scene, load, read_laid, require_rests
+from limitsets.feeder.scene import LaidLike, Scene, load, read_laid
 from limitsets.parameters.design.design_result import Option, RobustDesign, front_of, throws_to_feed
 from limitsets.parameters.design.search import (
     POINT,
@@ -32,6 +32,7 @@ from limitsets.parameters.design.search import (
     Ends,
     bounds_of,
     counterweight_of,
+    require_searchable,
     said,
 )
 from limitsets.parameters.margins.deviations import Signs, Tolerance
@@ -348,9 +349,8 @@ def robust_design(
     ('paper-designed-robust', 2)
     """
     start = load(scene)
+    require_searchable(start, evaluations)
     on = _side(start, side)
-    if evaluations < 1:
-        raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
     ranges = read_laid(start, laid)
     orders, everywhere = orders and not ranges, everywhere and not ranges
     tell = progress or silent
@@ -382,8 +382,8 @@ def robust_design(
         for one in searches:
             one.better = better
     search, population = _searched(searches, evaluations, seed, tell)
-    polish = max(evaluations // POLISH, 1)
-    best = polished(search, population[:POLISHED], partial(search.rounded, decimals=DECIMALS), polish, tell)
+    made_so = partial(search.rounded, decimals=DECIMALS)
+    best = polished(search, population[:POLISHED], made_so, max(evaluations // POLISH, 1), tell)
     if best is None:
         raise _none_feeds(searches, search, population[0], f"{start.name}-robust")
     made, estimate = best
@@ -442,9 +442,6 @@ def _proved(
 
 
 def _side(scene: Scene, side: int | None) -> int:
-    require_rests(scene)
-    if scene.effects.on():
-        raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
     asked = side if side is not None else getattr(scene.goal, "side", len(scene.sides) - 1)
     if not 0 <= asked < len(scene.sides):
         raise AnswerError("the side", asked, f"0 to {len(scene.sides) - 1}", "name a side of this part")

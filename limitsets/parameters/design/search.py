@@ -21,7 +21,7 @@ from limitsets.base import AnswerError, Progress, SceneError
 from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import plate_with_points, side_ends
 from limitsets.feeder.geometry.polygon import above_side
-from limitsets.feeder.scene import Scene, in_units_of
+from limitsets.feeder.scene import Scene, in_units_of, require_rests
 from limitsets.feeder.scene.quantities import find
 from limitsets.feeder.thrower.assumed_box import assumed
 from limitsets.parameters.margins.deviations import Signs, Tolerance
@@ -432,6 +432,15 @@ class DesignSearch:
             self.harden(population[0])
             tell("designs", self.evaluations - begin, evaluations)
         return population, ratings
+
+
+def require_searchable(scene: Scene, evaluations: int) -> None:
+    """Refuse a part that does not rest, a scene with effects, and a search that looks at nothing."""
+    require_rests(scene)
+    if scene.effects.on():
+        raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
+    if evaluations < 1:
+        raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
 
 
 def design_name(start: Scene) -> str:
