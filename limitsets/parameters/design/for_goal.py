@@ -166,11 +166,10 @@ class GoalDesign(Tabled):
 class _GoalSearch:
     """Rate designs by their room, and count what rules them out."""
 
-    def __init__(
-        self, scene: Scene, bounds: Mapping[str, tuple[float, float]], tell: Progress, of: int
-    ) -> None:
+    def __init__(self, scene: Scene, tell: Progress, of: int) -> None:
         assert isinstance(scene.goal, OrientedBeyond | Reaches)
-        self.scene, self.bounds, self.tell, self.of = scene, dict(bounds), tell, of
+        self.scene, self.tell, self.of = scene, tell, of
+        self.bounds: dict[str, tuple[float, float]] = {}
         self.x, self.side, self.laid = scene.goal.x, scene.goal.side, scene.goal.laid
         self.ruled_out, self.evaluations = Counter[str](), 0
         self.best: tuple[float, float, Scene] = (-math.inf, -math.inf, scene)
@@ -294,7 +293,7 @@ def design_for_goal(
             "the goal", kind, "oriented_beyond or reaches, with a side and an x", remedy, file=start.file
         )
     require_searchable(start, evaluations)
-    search = _GoalSearch(start, {}, progress or silent, evaluations)
+    search = _GoalSearch(start, progress or silent, evaluations)
     rating, room_before, why = search.rated(start)
     search.best = rating, room_before, start
     # arm and throw are set in minutes, another part is made: it varies only where they do not meet the goal
