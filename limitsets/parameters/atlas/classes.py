@@ -312,9 +312,6 @@ def _jogs(dataset: xr.Dataset, here: npt.NDArray[np.bool_]) -> str:
     if not (least >= 0).any():
         return ""
     low, high = int(least[least >= 0].min()), int(most.max())
-    span = (
-        f"{low} jog{'s' * (low != 1)}"
-        if low == high
-        else f"{low} {'or' if high == low + 1 else 'to'} {high} jogs"
-    )
-    return f"; {span} a visit"
+    if low == high:
+        return f"; {low} jog{'s' * (low != 1)} a visit"
+    return f"; {low} {'or' if high == low + 1 else 'to'} {high} jogs a visit"

@@ -196,14 +196,12 @@ class _Search:
             return self._moved(quantity, whole, size, rows)
 
         if reading == "per-throw":
-            return (
-                self._least(
-                    lambda size, rows: self._holds(rows, moved(-size, rows), moved(size, rows)),
-                    most,
-                    growing=True,
-                )
-                / unit.value
+            either = self._least(
+                lambda size, rows: self._holds(rows, moved(-size, rows), moved(size, rows)),
+                most,
+                growing=True,
             )
+            return either / unit.value
         less = self._least(lambda size, rows: self._holds(rows, moved(-size, rows)), most, growing=False)
         most = np.minimum(less, most)
         more = self._least(lambda size, rows: self._holds(rows, moved(size, rows)), most, growing=False)
