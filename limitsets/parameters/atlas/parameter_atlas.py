@@ -150,15 +150,13 @@ class Atlas(Tabled):
         ]
         variables = {str(name): _table(variable) for name, variable in data.data_vars.items()}
         subject = {key: plan[key] for key in ("scene", "map", "parameters", "domain") if key in plan}
-        document = {
+        model = self.model
+        return {
             **subject,
             "unit": data.attrs.get("unit_of_length", ""),
             "axes": axes,
             "variables": variables,
-        }
-        if self.model is not None:
-            document["model"] = self.model.to_json()
-        return document | {
+            **({} if model is None else {"model": model.to_json()}),
             "task": plan["task"],
             "plan_hash": data.attrs["plan_hash"],
             "versions": plan["versions"],
@@ -250,12 +248,12 @@ class Atlas(Tabled):
 
 def _table(variable: xr.DataArray) -> dict[str, Any]:
     codes = codes_of(variable.attrs)
-    table = {
+    return {
         "dims": list(variable.dims),
         "unit": variable.attrs.get("units", ""),
         "values": as_plain(variable.values),
+        **({"codes": codes} if codes else {}),
     }
-    return table | ({"codes": codes} if codes else {})
 
 
 @shown_in_notebooks

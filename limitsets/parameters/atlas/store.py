@@ -322,11 +322,9 @@ def _short(value: Any) -> str:
 
 def _described(variable: Variable, length: str) -> dict[str, Any]:
     """Return the attributes of a variable; codes as the CF conventions have them."""
-    attributes: dict[str, Any] = {"long_name": variable.about} if variable.about else {}
-    unit = length if variable.unit == "length" else variable.unit
-    if unit:
-        attributes["units"] = unit
-    return attributes | (_flags(variable.codes) if variable.codes else {})
+    about = {"long_name": variable.about} if variable.about else {}
+    unit = _unit(length if variable.unit == "length" else variable.unit)
+    return about | unit | (_flags(variable.codes) if variable.codes else {})
 
 
 def _flags(codes: Mapping[str, int]) -> dict[str, Any]:

@@ -179,9 +179,8 @@ class Approach(NamedTuple):
         begin, border = self.point(place), self._border(place, self.target)
         if begin is None or border is None:
             return None
-        change = f"{names[border.below]}->{names[border.above]}"
-        if border.kind != "critical":
-            change = {"domain": "end of the domain"}.get(border.kind, border.kind)
+        kinds = {"critical": f"{names[border.below]}->{names[border.above]}", "domain": "end of the domain"}
+        change = kinds.get(border.kind, border.kind)
         itinerary = tuple(names[branch] for branch in self.tracked.word)
         limit = "cycle" if self.start is None else ("c+" if self.tracked.from_above else "c-")
         start = None if self.start is None else begin[0] * (abs(begin[0]) >= TINY)

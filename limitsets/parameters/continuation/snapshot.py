@@ -138,10 +138,9 @@ def _starts(place: Place, sets: Iterable[CellSet]) -> tuple[Array, Ints]:
 
 
 def _of_cycle(cycle: Cycle) -> AttractorAtPlace:
-    extents: Intervals = {}
-    for x, side in sorted(zip(cycle.x.tolist(), cycle.side.tolist(), strict=True)):
-        extents.setdefault(side, []).append((x, x))
-    return AttractorAtPlace(dict(sorted(extents.items())), (), cycle, None, True)
+    sides = np.unique(cycle.side).tolist()
+    extents = {side: [(x, x) for x in sorted(cycle.x[cycle.side == side].tolist())] for side in sides}
+    return AttractorAtPlace(extents, (), cycle, None, True)
 
 
 def _of_intervals(place: Place, extents: Intervals, *, inside: bool) -> AttractorAtPlace | None:

@@ -196,7 +196,6 @@ def _answer(
     # where no error is known the gain of further throws is computed with all scatter as one
     error = own.rows.error if own.rows.known else np.full(len(throws), landing.value / math.sqrt(2.0))
     units = dict(zip(names, units_of_change(new, names).tolist(), strict=True))
-    scatter = (speed.value, landing.value)
     misread, misread_rate = _misread(own.rows, len(scene.sides))
     return Fit(
         scene=new,
@@ -214,7 +213,9 @@ def _answer(
         explained=remark,
         residuals=throws.x_after - told.after[0],
         deviations=np.sqrt(told.variance(own.rows.error, values[-2], loose)[0]),
-        further=further_throws(throws, own.rows.side, error, scene=new, units=units, scatter=scatter),
+        further=further_throws(
+            throws, own.rows.side, error, scene=new, units=units, scatter=(speed.value, landing.value)
+        ),
         seconds=time.perf_counter() - begin,
         likelihood=own,
         best=best,

@@ -200,8 +200,7 @@ def _require_flight(scene: Scene, rows: Rows) -> None:
     short = np.flatnonzero(throws.x_before <= least)
     if short.size:
         k, unit = int(short[0]), scene.unit
-        side = int(throws.side_before[k])
-        beyond = f"beyond the left vertex of side {side}, above {least[k]:.4g} {unit}"
+        beyond = f"beyond the left vertex of side {throws.side_before[k]}, above {least[k]:.4g} {unit}"
         raise DataError(
             "the place before", f"{throws.x_before[k]:g} {unit}",
             "beyond the joint, above 0" if throws.corner else beyond,
