@@ -80,27 +80,24 @@ class Store:
         plan = self.plan
         self.group.attrs.update(_attributes(plan))
         for axis in plan.axes:
-            values = axis.values
             array = self._made(
                 axis.name,
-                values.shape,
-                values.shape,
-                dtype=values.dtype,
+                axis.values.shape,
+                axis.values.shape,
+                dtype=axis.values.dtype,
                 fill=0.0,
                 dims=(axis.name,),
                 attributes=_unit(axis.unit),
             )
-            array[...] = values
-        dims = tuple(f"chunk of {axis.name}" for axis in plan.axes)
-        about = {"long_name": "CRC-32 of the chunk's data; 0 where the chunk is not done"}
+            array[...] = axis.values
         self._made(
             CHECKSUM,
             plan.chunks,
-            (1,) * len(dims),
+            (1,) * len(plan.axes),
             dtype=np.dtype("uint32"),
             fill=0,
-            dims=dims,
-            attributes=about,
+            dims=tuple(f"chunk of {axis.name}" for axis in plan.axes),
+            attributes={"long_name": "CRC-32 of the chunk's data; 0 where the chunk is not done"},
         )
 
     def _made(
@@ -197,10 +194,14 @@ class Store:
         if name not in self.arrays:
             chunks = (*self.plan.chunk, *(max(n, 1) for _, n in variable.dims))
             dims = (*(axis.name for axis in self.plan.axes), *(dim for dim, _ in variable.dims))
-            about = _described(variable, self.plan.subject.unit)
-            dtype = np.dtype(variable.dtype)
             self.arrays[name] = self._made(
-                name, shape, chunks, dtype=dtype, fill=variable.empty, dims=dims, attributes=about
+                name,
+                shape,
+                chunks,
+                dtype=np.dtype(variable.dtype),
+                fill=variable.empty,
+                dims=dims,
+                attributes=_described(variable, self.plan.subject.unit),
             )
         if self.arrays[name].shape != shape:
             raise LimitsetsError(
@@ -272,15 +273,13 @@ def _seal(
 
 def _seal_of(array: Any, attributes: Mapping[str, Any]) -> int:
     """Return the checksum of what an array in a store says of itself, with these attributes."""
-    dims = tuple(array.metadata.dimension_names or ())
-    name = array.path.rpartition("/")[2]
     return _seal(
-        name,
+        array.path.rpartition("/")[2],
         array.shape,
         array.chunks,
         dtype=array.dtype,
         fill=array.fill_value,
-        dims=dims,
+        dims=tuple(array.metadata.dimension_names or ()),
         attributes=attributes,
     )
 

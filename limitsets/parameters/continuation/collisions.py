@@ -284,8 +284,7 @@ def nearest(approach: Approach, middle: float) -> tuple[float, float] | None:
     sign = 1.0 if between > 0.0 else -1.0
     if not (0.0 < sign * between <= min(sign * first, sign * last)):
         return None
-    options = {"xatol": 1e-12}
     minimum = minimize_scalar(
-        lambda t: sign * approach.at(t), bounds=(lo, hi), method="bounded", options=options
+        lambda t: sign * approach.at(t), bounds=(lo, hi), method="bounded", options={"xatol": 1e-12}
     )
     return float(minimum.x), sign * float(minimum.fun)

@@ -489,12 +489,13 @@ def continuation(
 def _answer(curve: Path, follower: Follower) -> Continuation:
     numbers = numbered(follower)
     visited = [follower.at(t) for t in sorted(follower.snapshots)]
-    names = visited[0].place.values
     return Continuation(
         name=curve.name,
         unit=curve.unit,
         t=np.array([each.t for each in visited]),
-        values={name: np.array([each.place.values[name] for each in visited]) for name in names},
+        values={
+            name: np.array([each.place.values[name] for each in visited]) for name in visited[0].place.values
+        },
         attractors=tuple(
             {
                 number: State.of(attractor)

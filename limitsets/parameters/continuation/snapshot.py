@@ -302,9 +302,8 @@ def confirmed(snapshot: Snapshot) -> Snapshot | None:
 def _sampled(attractor: AttractorAtPlace) -> tuple[Array, Ints]:
     """States of an attractor."""
     if attractor.cells is not None:
-        cover = attractor.cells.grid
         numbers = attractor.cells.numbers()
-        lo, hi, sides = cover.corners(numbers[:: max(1, numbers.size // 64)])
+        lo, hi, sides = attractor.cells.grid.corners(numbers[:: max(1, numbers.size // 64)])
         return 0.5 * (lo + hi), sides
     parts = [(side, *pair) for side, pairs in attractor.extents.items() for pair in pairs]
     width = 1 if attractor.cycle is not None else SAMPLED

@@ -142,9 +142,12 @@ def _errors(film: Throws, error: float | str | None, scene: Scene) -> tuple[bool
     column = bool(np.isfinite(film.error).all())
     if error is not None:
         if column:
-            remedy = "leave --error or the column out"
             raise DataError(
-                "the error", "given twice", "an option or a column", remedy, file=film.file or None
+                "the error",
+                "given twice",
+                "an option or a column",
+                "leave --error or the column out",
+                file=film.file or None,
             )
         return True, np.full(len(film), length_of(error, scene, "the error"))
     if column:

@@ -138,9 +138,14 @@ def throws_in(file: str | Path, scene: Scene, *, anywhere: bool = False) -> Thro
         if not any(cell.strip() for cell in cells):
             continue
         if len(cells) != len(heads):
-            allowed = f"{len(heads)}, one for each column"
-            remedy = "correct the row; decimals have a point"
-            raise DataError("the number of cells", len(cells), allowed, remedy, key=f"row {line}", file=name)
+            raise DataError(
+                "the number of cells",
+                len(cells),
+                f"{len(heads)}, one for each column",
+                "correct the row; decimals have a point",
+                key=f"row {line}",
+                file=name,
+            )
         lines.append(line)
         for (column, (head, unit)), cell in zip(heads.items(), cells, strict=True):
             key = f"row {line}, column {head}"
@@ -247,8 +252,14 @@ def _cell(cell: str, column: str, unit: str, key: str, scene: Scene, name: str) 
     try:
         value = convert(parse(f"{text} {unit}", "length"), scene.unit)
     except SceneError:
-        allowed = "a decimal number, its unit in the header"
-        raise DataError("the number", shown(text), allowed, "correct it", key=key, file=name) from None
+        raise DataError(
+            "the number",
+            shown(text),
+            "a decimal number, its unit in the header",
+            "correct it",
+            key=key,
+            file=name,
+        ) from None
     if column == "error" and value <= 0:
         raise DataError("the error", shown(text), "above 0", "give a standard deviation", key=key, file=name)
     return value
