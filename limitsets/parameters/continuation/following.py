@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import count, pairwise
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -161,7 +162,7 @@ class Follower:
     def __init__(self, path: Path, cells: int, most: int) -> None:
         self.path, self.cells, self.most = path, cells, most
         self.snapshots: dict[float, Snapshot] = {}
-        self.matches: dict[tuple[Snapshot, Snapshot], Match] = {}
+        self.match = cache(matched)  # of two places, found once
         self.sure: dict[float, bool] = {}
         self.met: list[Met] = []
         self.left = most
@@ -172,12 +173,6 @@ class Follower:
             self.snapshots[t] = snapshot_at(self.path.at(t), self.cells)
             self.left -= 1
         return self.snapshots[t]
-
-    def match(self, lo: Snapshot, hi: Snapshot) -> Match:
-        """Match of two places, found once."""
-        if (lo, hi) not in self.matches:
-            self.matches[lo, hi] = matched(lo, hi)
-        return self.matches[lo, hi]
 
     def is_sure(self, t: float) -> bool:
         """Whether an event may begin or end at a place: where cells decide, finer ones have to agree."""
