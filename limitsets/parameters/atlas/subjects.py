@@ -224,13 +224,11 @@ class MapSubject:
     def record(self) -> dict[str, Any]:
         """What a store keeps of it."""
         cls, domain = type(self.params), self.domain
-        fields: dict[str, Any] = {
+        return {
             "map": f"{cls.__module__}:{cls.__qualname__}",
             "parameters": _plain(self.params),
+            **({} if domain is None else {"domain": {"lo": domain.lo.tolist(), "hi": domain.hi.tolist()}}),
         }
-        if domain is not None:
-            fields["domain"] = {"lo": domain.lo.tolist(), "hi": domain.hi.tolist()}
-        return fields
 
     @property
     def title(self) -> str:

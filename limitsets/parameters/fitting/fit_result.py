@@ -165,12 +165,17 @@ class Fit(Tabled):
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        rows = [(each.name, each.value, (each.lo, each.hi), each.unit) for each in self.quantities]
-        for name, each, factor, unit in (
+        scatters = (
             ("scatter of throw.speed", self.speed, 100.0, "%"),
             ("scatter of landing.x", self.landing, 1.0, self.scene.unit),
-        ):
-            rows.append((name, factor * each.value, (factor * each.lo, factor * each.hi), unit))
+        )
+        rows = [
+            *((each.name, each.value, (each.lo, each.hi), each.unit) for each in self.quantities),
+            *(
+                (name, factor * each.value, (factor * each.lo, factor * each.hi), unit)
+                for name, each, factor, unit in scatters
+            ),
+        ]
         columns = (
             "quantity",
             Column("value", show=_number),
