@@ -213,7 +213,7 @@ def snapshot_at(place: Place, cells: int) -> Snapshot:
     rows = recorded(place, x[code >= 0], side[code >= 0], MOST_PERIOD)
     cycles, left = attracting_cycles(place, rows)
     attractors = [_of_cycle(cycle) for cycle in cycles]
-    attractors += _grown_sets(place, Recorded(*(each[left] for each in rows)), sets)
+    attractors += _grown_sets(place, Recorded(rows.x[left], rows.side[left], rows.code[left]), sets)
     ordered = sorted(
         _least(attractors, 1e-9 * place.extent),
         key=lambda each: min((side, parts[0][0]) for side, parts in each.extents.items()),
