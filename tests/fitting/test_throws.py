@@ -32,8 +32,15 @@ def write(tmp_path):
     return written
 
 
+HEAD_CORNERS = "corner_before [mm],side_before,corner_after [mm],side_after"
+
+
 def read(path):
     return read_throws(path, ls.load("paper-designed"))
+
+
+def lines(head, *rows):
+    return "\n".join([head, *rows])
 
 
 def test_places_come_in_the_units_of_the_scene(write):
@@ -53,14 +60,15 @@ def test_places_come_in_the_units_of_the_scene(write):
 
 
 def test_columns_may_stand_in_any_order_and_have_units_of_their_own(write):
-    rows = "\n".join(["2,25.4,2,1 "] * 8)
-    throws = read(write(f"side_after,x_before [cm],side_before,x_after [ft]\n{rows}\n"))
+    throws = read(write(lines("side_after,x_before [cm],side_before,x_after [ft]", *["2,25.4,2,1 "] * 8)))
     assert (throws.x_before[0], throws.x_after[0]) == (10.0, 12.0)
+    throws = read(write(lines(HEAD_CORNERS, *["127,2,130,2"] * 8)))
+    assert (throws.corner, throws.unit, throws.x_before[0]) == (True, "mm", 5.0)
 
 
 def test_a_reading_shared_by_two_rows_is_known_by_its_number(write):
     rows = ["254,2,256.54,2,a", "256.54,2,260,2,a", "260.3,2,262,2,a", "262,2,265,2,b"] * 2
-    throws = read(write("\n".join([f"{HEAD},run", *rows])))
+    throws = read(write(lines(f"{HEAD},run", *rows)))
     assert throws.shared.tolist() == [False, True, False, False] * 2
     assert throws.read_twice == pytest.approx([0.3 / 25.4] * 2)
 
@@ -86,7 +94,7 @@ def test_a_reading_shared_by_two_rows_is_known_by_its_number(write):
     ],
 )
 def test_a_bad_cell_is_one_line_with_file_row_and_column(write, bad, place, said):
-    path = write("\n".join([HEAD, ROW, ROW, bad] + [ROW] * 8))
+    path = write(lines(HEAD, ROW, ROW, bad, *[ROW] * 8))
     with pytest.raises(DataError) as caught:
         read(path)
     text = str(caught.value)
@@ -108,10 +116,13 @@ def test_a_bad_cell_is_one_line_with_file_row_and_column(write, bad, place, said
         ("x_before [mm],side_before,x_after [mm],x_after [mm]", "each column once"),
         ("x_before [mm],side_before,x_after [mm],run", "side_after missing"),
         ("x_before [mm];side_before;x_after [mm];side_after", "commas separate columns"),
+        ("corner_before [mm],side_before,x_after [mm],side_after", "two places of one kind"),
+        ("corner_before [mm],side_before,side_after", "corner_after missing"),
+        ("corner_befor [mm],side_before,corner_after [mm],side_after", "did you mean 'corner_before [mm]'"),
     ],
 )
 def test_a_bad_header_is_one_line(write, head, said):
-    path = write("\n".join([head] + [ROW] * 9))
+    path = write(lines(head, *[ROW] * 9))
     with pytest.raises(DataError) as caught:
         read(path)
     assert str(caught.value).startswith(f"{path}: row 1")
@@ -119,53 +130,46 @@ def test_a_bad_header_is_one_line(write, head, said):
 
 
 def test_files_that_are_none(write, tmp_path):
-    with pytest.raises(DataError, match="could not be opened"):
-        read(tmp_path / "none.csv")
-    with pytest.raises(DataError, match="could not be opened"):
-        read(tmp_path)
-    with pytest.raises(DataError, match="empty"):
-        read(write(""))
-    with pytest.raises(DataError, match="8 at least"):
-        read(write("\n".join([HEAD] + [ROW] * 7)))
-    with pytest.raises(DataError, match="UTF-8"):
-        read(write(f"{HEAD}\n{ROW}\n\u00e9", encoding="latin-1"))
-    with pytest.raises(DataError, match="separated by commas"):
-        read(write(f'{HEAD}\n{ROW}\n"254,2'))
-
-
-def test_an_error_of_0_is_none(write):
-    with pytest.raises(DataError, match=r"row 2, column error \[mm\]"):
-        read(write("\n".join([f"{HEAD},error [mm]"] + [f"{ROW},0"] * 8)))
-
-
-def test_a_throw_from_where_no_part_flies_names_the_row(write):
-    path = write("\n".join([HEAD, *[ROW] * 8, "40,2,41,2"]))
-    with pytest.raises(
-        DataError, match=r"row 10: the place before is '1.574\S* in'.*beyond the left vertex of side 2"
+    for path in (tmp_path / "none.csv", tmp_path):
+        with pytest.raises(DataError, match="could not be opened"):
+            read(path)
+    for text, encoding, said in (
+        ("", "utf-8", "empty"),
+        (lines(HEAD, *[ROW] * 7), "utf-8", "8 at least"),
+        (lines(HEAD, ROW, "\u00e9"), "latin-1", "UTF-8"),
+        (lines(HEAD, ROW, '"254,2'), "utf-8", "separated by commas"),
     ):
-        ls.fit("paper-designed", path)
+        with pytest.raises(DataError, match=said):
+            read(write(text, encoding=encoding))
 
 
-def test_landings_that_tell_nothing_are_an_error(write):
-    text = "\n".join(
-        [HEAD] + [f"{150 + k * 37 % 400},{k % 3},{100 + k * 91 % 500},{k * 7 % 3}" for k in range(40)]
-    )
-    with pytest.raises(DataError, match="check units and sides"):
-        ls.fit("paper-designed", write(text), error="0.5 mm")
+SCATTERED = [f"{150 + k * 37 % 400},{k % 3},{100 + k * 91 % 500},{k * 7 % 3}" for k in range(40)]
+NO_FLIGHT = r"row 10: the place before is '1.574\S* in'.*beyond the left vertex of side 2"
+AT_THE_JOINT = r"row 10: the place before is '-0\.0393701 in'.*beyond the joint"
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "error", "said"),
+    [
+        (f"{HEAD},error [mm]", [f"{ROW},0"] * 8, None, r"row 2, column error \[mm\]"),
+        (f"{HEAD},error [mm]", [f"{ROW},0.5"] * 8, "0.5 mm", "given twice"),
+        (HEAD, [*[ROW] * 8, "40,2,41,2"], None, NO_FLIGHT),
+        (HEAD_CORNERS, [*["127,2,130,2"] * 8, "-1,2,5,2"], None, AT_THE_JOINT),
+        (HEAD, SCATTERED, "0.5 mm", "check units and sides"),
+    ],
+    ids=["no error", "two errors", "no flight", "at the joint", "landings that tell nothing"],
+)
+def test_films_that_are_no_throws_of_the_part(write, head, rows, error, said):
+    with pytest.raises(DataError, match=said):
+        ls.fit("paper-designed", write(lines(head, *rows)), error=error)
 
 
 def test_one_throw_again_and_again_tells_no_quantity_from_the_others(write):
-    found = ls.fit("paper-designed", write("\n".join([HEAD] + [ROW] * 20)), error="0.5 mm")
+    found = ls.fit("paper-designed", write(lines(HEAD, *[ROW] * 20)), error="0.5 mm")
     assert not any(np.isfinite(each.half) for each in found.quantities)
     assert len(found.held) == 4
     assert [each.name for each in found.quantities] == list(found.undetermined)
     assert not found.misfit.lacking
-
-
-def test_the_error_is_given_once(write):
-    path = write("\n".join([f"{HEAD},error [mm]"] + [f"{ROW},0.5"] * 8))
-    with pytest.raises(DataError, match="given twice"):
-        ls.fit("paper-designed", path, error="0.5 mm")
 
 
 # ----------------------------------------------------------------
@@ -173,13 +177,6 @@ def test_the_error_is_given_once(write):
 
 
 FIVE = (*PLACES, RADIUS)
-HEAD_CORNERS = "corner_before [mm],side_before,corner_after [mm],side_after"
-
-
-def read_corners(tmp_path, head, *rows):
-    path = tmp_path / "throws.csv"
-    path.write_text("\n".join([head, *(rows or ["127,2,130,2"] * 8)]), encoding="utf-8")
-    return read_throws(path, ls.load("paper-designed"))
 
 
 def covered(count, seed):
@@ -200,15 +197,13 @@ def test_intervals_from_corners_hold_the_truth():
         assert held[name] >= binom.ppf(1e-4, 20, 0.95), name
 
 
-def test_one_film_of_corners_gives_the_machine(tmp_path):
+def test_one_film_of_corners_gives_the_machine(write):
     draw = np.random.default_rng(61)
     truth = machine(draw)
     seen = film(draw, truth, error=0.0, speed=0.0, landing=0.0, known=False, corner=True)
     columns = (each.tolist() for each in (seen.x_before, seen.side_before, seen.x_after, seen.side_after))
-    path = tmp_path / "throws.csv"
     rows = [",".join(map(repr, row)) for row in zip(*columns, strict=True)]
-    path.write_text("\n".join([HEAD_CORNERS.replace("mm", "in"), *rows]), encoding="utf-8")
-    found = ls.fit(aimed_at(), path)
+    found = ls.fit(aimed_at(), write(lines(HEAD_CORNERS.replace("mm", "in"), *rows)))
     assert not found.misfit.lacking
     for name in PLACES:
         assert found[name].value == pytest.approx(truth[name], abs=1e-4)
@@ -245,30 +240,3 @@ def test_the_bootstrap_films_what_the_film_showed():
     again = bootstrap(found, 12)
     for name in (KAPPA, ALONG, ABOVE, HEIGHT):
         assert again.covered[name] >= binom.ppf(1e-4, 12, 0.95), name
-
-
-def test_corners_stand_in_columns_of_their_own(tmp_path):
-    throws = read_corners(tmp_path, HEAD_CORNERS)
-    assert (throws.corner, throws.unit) == (True, "mm")
-    assert throws.x_before[0] == 5.0
-
-
-@pytest.mark.parametrize(
-    ("head", "said"),
-    [
-        ("corner_before [mm],side_before,x_after [mm],side_after", "two places of one kind"),
-        ("corner_before [mm],side_before,side_after", "corner_after missing"),
-        ("corner_befor [mm],side_before,corner_after [mm],side_after", "did you mean 'corner_before [mm]'"),
-    ],
-)
-def test_a_bad_header_of_corners_is_one_line(tmp_path, head, said):
-    with pytest.raises(DataError) as caught:
-        read_corners(tmp_path, head)
-    assert said in str(caught.value)
-
-
-def test_a_throw_from_the_joint_names_the_row(tmp_path):
-    path = tmp_path / "throws.csv"
-    path.write_text("\n".join([HEAD_CORNERS, *["127,2,130,2"] * 8, "-1,2,5,2"]), encoding="utf-8")
-    with pytest.raises(DataError, match=r"row 10: the place before is '-0\.0393701 in'.*beyond the joint"):
-        ls.fit("paper-designed", path)

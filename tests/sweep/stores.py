@@ -24,6 +24,11 @@ def bytes_of(store):
     return {str(file.relative_to(root)): file.read_bytes() for file in root.rglob("*") if file.is_file()}
 
 
+def flags_of(variable):
+    """The codes of a variable by their names."""
+    return dict(zip(variable.attrs["flag_meanings"].split(), variable.attrs["flag_values"], strict=True))
+
+
 class Shuffled(Executor):
     """Runs what it is given in random order."""
 

@@ -18,10 +18,12 @@ from limitsets import maps
 from limitsets.base.errors import LimitsetsError, SceneError
 from limitsets.base.files import as_json
 from limitsets.parameters.atlas import Axis, atlas
+from limitsets.parameters.atlas.parameter_atlas import plan_of
 from limitsets.parameters.atlas.plan import chunk_shape
 from limitsets.parameters.atlas.subjects import SceneSubject, axis_of
+from limitsets.parameters.atlas.work import answer
 from tests.maps_of_tests import Tent
-from tests.sweep.stores import Shuffled, bytes_of, run
+from tests.sweep.stores import Shuffled, bytes_of, flags_of, run
 from tests.sweep.tasks_of_tests import TASK, X, Y
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -93,10 +95,6 @@ def test_each_point_has_the_scene_that_its_coordinates_write(computed):
 
 
 # ---------------------------------------------------------------- points and variables
-
-
-def flags_of(variable):
-    return dict(zip(variable.attrs["flag_meanings"].split(), variable.attrs["flag_values"], strict=True))
 
 
 def test_points_without_a_scene_or_an_answer_have_a_status_and_no_numbers(computed):
@@ -207,15 +205,11 @@ def test_the_default_task_tells_the_topology_of_the_designed_feeder():
 # ---------------------------------------------------------------- the same, however it is computed
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_the_order_of_completion_does_not_show(seed, tmp_path, whole):
-    run(tmp_path / "s.zarr", executor=Shuffled(seed))
-    assert bytes_of(tmp_path / "s.zarr") == whole
-
-
-@pytest.mark.parametrize("workers", [1, 3])
-def test_the_number_of_processes_does_not_show(workers, tmp_path, whole):
-    run(tmp_path / "s.zarr", workers=workers)
+@pytest.mark.parametrize(
+    "options", [*({"executor": Shuffled(seed)} for seed in range(3)), {"workers": 1}, {"workers": 3}]
+)
+def test_neither_the_order_of_completion_nor_the_number_of_processes_shows(options, tmp_path, whole):
+    run(tmp_path / "s.zarr", **options)
     assert bytes_of(tmp_path / "s.zarr") == whole
 
 
@@ -300,56 +294,42 @@ def test_a_store_of_another_version_or_of_edited_code_is_refused(tmp_path, monke
     ],
 )
 def test_a_worker_with_other_code_refuses_to_work(name, other, words, monkeypatch):
-    from limitsets.parameters.atlas.parameter_atlas import plan_of
-    from limitsets.parameters.atlas.work import answer
-
     plan = plan_of("paper-designed", X, task=TASK)
     monkeypatch.setattr(f"limitsets.parameters.atlas.plan.{name}", other)
     with pytest.raises(LimitsetsError, match=words):
         answer(plan, 0)
 
 
-@pytest.mark.parametrize("what", ["file", "folder", "other zarr"])
-def test_what_is_no_store_is_not_touched(what, tmp_path):
-    place = tmp_path / "s.zarr"
-    if what == "file":
-        place.write_text("a letter")
-    elif what == "folder":
-        place.mkdir()
-        (place / "letter").write_text("a letter")
-    else:
-        xr.Dataset({"a": ("x", [1.0])}).to_zarr(place, consolidated=False)
-    before = place.read_bytes() if what == "file" else bytes_of(place)
-    with pytest.raises(LimitsetsError):
-        run(place)
-    assert (place.read_bytes() if what == "file" else bytes_of(place)) == before
+def test_what_is_no_store_is_not_touched(tmp_path):
+    (tmp_path / "file.zarr").write_text("a letter")
+    (tmp_path / "folder.zarr").mkdir()
+    (tmp_path / "folder.zarr" / "letter").write_text("a letter")
+    xr.Dataset({"a": ("x", [1.0])}).to_zarr(tmp_path / "other.zarr", consolidated=False)
+    before = bytes_of(tmp_path)
+    for place in sorted(tmp_path.iterdir()):
+        with pytest.raises(LimitsetsError):
+            run(place)
+    assert bytes_of(tmp_path) == before
 
 
 # ---------------------------------------------------------------- tasks that cannot be asked
 
 
-TASKS = {
-    "nowhere": ("no.such.module:function", "No module named"),
-    "no function": ("math:nothing", "nothing"),
-    "no callable": ("math:pi", "it is none"),
-    "no name": ("math", "module:function"),
-    "lambda": (lambda scene: {}, "workers import it by its name"),
-    "failing": ("tests.sweep.tasks_of_tests:failing", r"ZeroDivisionError.*arm\.surface_height -0\.5"),
-    "uneven": ("tests.sweep.tasks_of_tests:uneven", "one shape"),
-    "no numbers": ("limitsets.scene:dump", "returns is 'str'; allowed: a dict"),
-}
-
-
-@pytest.mark.parametrize("name", TASKS)
-def test_tasks_that_cannot_be_asked_are_refused(name):
-    task, words = TASKS[name]
-    with pytest.raises(LimitsetsError, match=words):
-        atlas("paper-designed", "arm.surface_height=-1:0:5", task=task, chunk=(5,))
+OF_TESTS = "tests.sweep.tasks_of_tests"
+HEIGHTS = {"x": "arm.surface_height=-1:0:5", "chunk": (5,)}
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
+        (HEIGHTS | {"task": "no.such.module:function"}, "No module named"),
+        (HEIGHTS | {"task": "math:nothing"}, "nothing"),
+        (HEIGHTS | {"task": "math:pi"}, "it is none"),
+        (HEIGHTS | {"task": "math"}, "module:function"),
+        (HEIGHTS | {"task": lambda scene: {}}, "workers import it by its name"),
+        (HEIGHTS | {"task": f"{OF_TESTS}:failing"}, r"ZeroDivisionError.*arm\.surface_height -0\.5"),
+        (HEIGHTS | {"task": f"{OF_TESTS}:uneven"}, "one shape"),
+        (HEIGHTS | {"task": "limitsets.scene:dump"}, "returns is 'str'; allowed: a dict"),
         ({"variables": ["nothing"], "task": BLOCKS}, "the variable is 'nothing'; allowed: kappa"),
         ({"variables": ["nothing"], "task": TASK}, "returns as nothing is 'missing'"),
         ({"y": X, "task": TASK}, "name each once"),
@@ -361,9 +341,9 @@ def test_tasks_that_cannot_be_asked_are_refused(name):
         ({"domain": [(0, 1)], "task": TASK}, "a scene has one"),
     ],
 )
-def test_other_things_that_cannot_be_are_refused(options, words):
+def test_what_cannot_be_asked_is_refused(options, words):
     with pytest.raises(LimitsetsError, match=words):
-        atlas("paper-designed", X, **options)
+        atlas("paper-designed", **({"x": X} | options))
 
 
 def test_gravity_does_not_vary_in_blocks_where_the_throw_is_given_by_kappa():
@@ -454,26 +434,21 @@ def python(code, *flags):
 
 
 HEAVY = {"xarray", "zarr", "pandas", "pyarrow", "dask", "distributed"}
-
-
-def test_the_room_of_atlases_loads_none_of_their_libraries():
-    loaded = python("import sys\nimport limitsets.sweep\nprint(*sys.modules)").split()
-    assert "limitsets" in loaded
-    assert not HEAVY & set(loaded)
+# The topology of a point needs no graph library, optimizer or proof.
+NEEDLESS = {
+    "networkx",
+    "scipy.optimize",
+    "scipy.sparse",
+    "limitsets.proofs",
+    "limitsets.parameters.continuation",
+}
 
 
 def test_what_a_worker_computes_by_loads_what_it_needs_alone():
-    """Each worker begins with these imports: the topology of a point needs no graph library, optimizer or proof."""
+    """Each worker begins with these imports, those of the room among them."""
     loaded = python("import sys\nimport limitsets.sweep.of_topology\nprint(*sys.modules)").split()
-    assert "limitsets.parameters.atlas.of_topology" in loaded
-    needless = {
-        "networkx",
-        "scipy.optimize",
-        "scipy.sparse",
-        "limitsets.proofs",
-        "limitsets.parameters.continuation",
-    }
-    assert not needless & set(loaded)
+    assert {"limitsets.parameters.atlas", "limitsets.parameters.atlas.of_topology"} <= set(loaded)
+    assert not (HEAVY | NEEDLESS) & set(loaded)
 
 
 @pytest.mark.sweep

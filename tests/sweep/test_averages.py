@@ -263,12 +263,6 @@ def test_a_threshold_that_a_proof_denies_is_found(block, every, monkeypatch):
     assert (found == checking.CONTRADICTED).sum() >= 4
 
 
-def test_about_one_point_of_a_thousand_is_checked_whatever_the_chunks(block):
-    numbers = np.arange(200_000, dtype=np.uint64)
-    mixed = (numbers * checking.SCATTERED) % np.uint64(2**32)
-    assert (mixed % np.uint64(checking.SAMPLED) == 0).sum() == pytest.approx(200, rel=0.3)
-
-
 def test_the_points_at_multiples_of_a_thousand_are_checked(block):
     """Of the numbers in mixed order: points whose place in it is known, by the inverse of the odd factor."""
     inverse = pow(2654435761, -1, 2**32)

@@ -13,7 +13,7 @@ from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.parameters.atlas import atlas
 from limitsets.parameters.atlas.classes import FIELDS, classes, legend, named_class
 from limitsets.parameters.atlas.work import refined
-from tests.sweep.stores import Shuffled, bytes_of
+from tests.sweep.stores import Shuffled, bytes_of, flags_of
 
 # ----------------------------------------------------------------
 # Classes: written down by hand here; their numbers by hashlib, their examples by theory.
@@ -122,8 +122,7 @@ def test_an_atlas_stores_what_its_fields_say(feeders):
     data = feeders.dataset
     numbers, names = classes(data)
     assert np.array_equal(data["class"].values, numbers)
-    attributes = data["class"].attrs
-    assert dict(zip(attributes["flag_values"], attributes["flag_meanings"].split(), strict=True)) == names
+    assert {code: name for name, code in flags_of(data["class"]).items()} == names
     # docs/physics: h <= 0 and slow throws lose every start, and one attractor holds the paper's design
     assert named_class(names[int(numbers[0, 0])]).words == "no attractors; every start leaves"
     near = data["class"].sel({"throw.speed": 158, "arm.surface_height": -0.2}, method="nearest")
@@ -317,8 +316,6 @@ def test_what_cannot_be_refined():
 def test_checks_count_once():
     given = {"domain": [(0, 1)], "chunk": (64, 64), "variables": ["checked"]}
     found = atlas(maps.Circle(), "omega=0.2:0.24:64", "coupling=0.05:0.15:64", refine=True, **given).dataset
-    flags = found.checked.attrs
-    none = dict(zip(flags["flag_meanings"].split(), flags["flag_values"], strict=True))["not_checked"]
     filled = found.level.values < 0
     assert filled.mean() > 0.8
-    assert (found.checked.values[filled] == none).all()
+    assert (found.checked.values[filled] == flags_of(found.checked)["not_checked"]).all()

@@ -10,8 +10,6 @@ import numpy as np
 from limitsets.systems.topology import Topologies
 from tests.topology.reference import Reference
 
-__all__ = ["class_of", "differences"]
-
 EXTENT, SHARE = 1e-6, 0.02
 
 

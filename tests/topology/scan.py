@@ -10,8 +10,6 @@ from scipy.sparse import csr_array
 
 from limitsets.systems.maps import INWARD, images
 
-__all__ = ["Floats", "Interval", "Ints", "Scan", "merged"]
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Interval = tuple[int, float, float]  # side, lo, hi

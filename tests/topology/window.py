@@ -12,8 +12,6 @@ from limitsets.feeder.scene.arrays import ThrowStack, throw_stack
 from limitsets.systems.topology import Topologies, topologies
 from tests.topology.compare import class_of
 
-__all__ = ["HEIGHT", "SPEED", "Points", "points_of"]
-
 # The window of the atlas: speed [deg/s], height of the surface [in].
 SPEED, HEIGHT = (120.0, 180.0), (-1.0, 0.2)
 # How near a pair comes to a boundary, and how far apart its points are at first, as shares of the window.

@@ -85,12 +85,8 @@ class AttractorKind(NamedTuple):
             return phrase
         if self.flip_order is None:
             return f"{phrase}, the order changes"
-        one = len(self.flip_order) == 1
-        return (
-            f"{phrase}, side {self.flip_order[0]} alone"
-            if one
-            else f"{phrase}, {'-'.join(map(str, self.flip_order))}"
-        )
+        order = "-".join(map(str, self.flip_order))
+        return f"{phrase}, side {order} alone" if len(self.flip_order) == 1 else f"{phrase}, {order}"
 
 
 class TopologyClass(NamedTuple):
@@ -213,24 +209,16 @@ def classes(found: Any) -> tuple[npt.NDArray[np.int64], dict[int, str]]:
     >>> bool(numbers[0] == numbers[2]), [named_class(names[k]).words for k in numbers[:2].tolist()]
     (True, ['one attractor, a cycle of 2', 'one attractor, a cycle of 3'])
     """
-    fields = [_values(found, name) for name in FIELDS]
-    shape, n = fields[0].shape, fields[0].size
-    attractors, undecided, bands, order, period, leaves, collapses = fields
-    columns = [attractors.reshape(n, 1), undecided.reshape(n, 1) > 0]
-    columns += [each.reshape(n, -1) for each in (bands, order, period)]
-    columns += [_some(each).reshape(n, 1) for each in (leaves, collapses)]
+    attractors, undecided, bands, order, period, leaves, collapses = (_values(found, name) for name in FIELDS)
+    n, sides = attractors.size, bands.shape[-1]
+    whole = [undecided > 0, attractors, _some(leaves), _some(collapses)]
+    kinds = np.concatenate([bands, order, period[..., None]], axis=-1).reshape(n, -1)
+    columns = [*(each.reshape(n, 1) for each in whole), kinds]
     rows = np.concatenate(columns, axis=1, dtype=np.int64, casting="unsafe")
-    slots, sides = bands.shape[-2:]
-    seen: dict[bytes, int] = {}
-    names: dict[int, str] = {}
-    numbers = np.empty(n, np.int64)
-    for k, row in enumerate(rows):
-        key = row.tobytes()
-        if key not in seen:
-            seen[key], name = _numbered(row.tolist(), slots, sides)
-            names |= {seen[key]: name} if name else {}
-        numbers[k] = seen[key]
-    return numbers.reshape(shape), dict(sorted(names.items()))
+    keys = [row.tobytes() for row in rows]
+    entries = {key: _numbered(row.tolist(), sides) for key, row in dict(zip(keys, rows, strict=True)).items()}
+    numbers = np.array([entries[key][0] for key in keys], np.int64).reshape(attractors.shape)
+    return numbers, {number: name for number, name in sorted(entries.values()) if name}
 
 
 def _values(points: Any, name: str) -> npt.NDArray[Any]:
@@ -245,27 +233,22 @@ def _some(share: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
     return (share > ROUNDING).astype(np.int64) + (share >= 1.0 - ROUNDING)
 
 
-def _numbered(row: list[int], slots: int, sides: int) -> tuple[int, str]:
-    if row[1]:
+def _numbered(row: list[int], sides: int) -> tuple[int, str]:
+    """Read a row of `classes`: number and name, the attractors in the order of their names' parts."""
+    undecided, attractors, leaves, collapses, *numbers = row
+    if undecided:
         return UNDECIDED, UNDECIDED_NAME
-    if row[0] < 0:
+    if attractors < 0:
         return NOWHERE, ""
-    topology_class = _class_of(row, slots, sides)
-    return topology_class.number, topology_class.name
-
-
-def _class_of(row: list[int], slots: int, sides: int) -> TopologyClass:
-    """Read a row of `classes`: the class, its attractors in the order of their names' parts."""
-    cells = slots * sides
-    bands, orders, periods = row[2 : 2 + cells], row[2 + cells : 2 + 2 * cells], row[2 + 2 * cells : -2]
-    kinds = []
-    for a in range(row[0]):
-        order = orders[a * sides : (a + 1) * sides]
+    kinds, width = [], 2 * sides + 1
+    for k in range(0, attractors * width, width):
+        bands, order = tuple(numbers[k : k + sides]), numbers[k + sides : k + 2 * sides]
         visited = None if _IRREGULAR in order else tuple(side for side in order if side >= 0)
-        kinds.append(AttractorKind(tuple(bands[a * sides : (a + 1) * sides]), visited, periods[a]))
-    words = ("none", "some", "all")
+        kinds.append(AttractorKind(bands, visited, numbers[k + width - 1]))
     kinds.sort(key=lambda kind: (kind.bands, kind.flip_order or (), kind.period))
-    return TopologyClass(tuple(kinds), words[row[-2]], words[row[-1]])
+    words = ("none", "some", "all")
+    topology_class = TopologyClass(tuple(kinds), words[leaves], words[collapses])
+    return topology_class.number, topology_class.name
 
 
 class Entry(NamedTuple):
@@ -290,22 +273,22 @@ def legend(dataset: xr.Dataset) -> list[Entry]:
     list of Entry
     """
     numbers, names = numbers_of(dataset)
-    there = numbers != NOWHERE
+    there = int((numbers != NOWHERE).sum())
     entries = []
     for number, name in names.items():
         here = numbers == number
-        if not here.any():
-            continue
-        kind = None if number == UNDECIDED else named_class(name)
-        own = "map" in dataset.attrs.get("plan", {})  # which has no joint
-        said = (
-            None
-            if kind is None
-            else (kind.said(*OVER_THE_ENDS) if own else kind.words + _jogs(dataset, here))
-        )
-        words = said or UNDECIDED_NAME
-        entries.append(Entry(number, name, words, float(here.sum() / there.sum())))
+        if here.any():
+            entries.append(Entry(number, name, _words(dataset, name, here), float(here.sum() / there)))
     return sorted(entries, key=lambda each: (each.number == UNDECIDED, -each.share, each.name))
+
+
+def _words(dataset: xr.Dataset, name: str, here: npt.NDArray[np.bool_]) -> str:
+    """Say a class by its name, of a map with the ends of its domain, for it has no joint."""
+    if name == UNDECIDED_NAME:
+        return name
+    if "map" in dataset.attrs.get("plan", {}):
+        return named_class(name).said(*OVER_THE_ENDS)
+    return named_class(name).words + _jogs(dataset, here)
 
 
 def is_classified(dataset: xr.Dataset) -> bool:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -100,16 +99,13 @@ class _Search:
     ) -> None:
         self.scene, self.points, self.known, self.goal = scene, points, known, goal
         self.values = {name: each[points] for name, each in values.items()}
-        self.nominal: dict[str, Floats] = {}
+        self.nominal = dict(self.values)
 
     def _at(self, name: str) -> Floats:
         """Values of a quantity at the points, of the speed those of kappa where that is given."""
         key = "throw.kappa" if self._by_kappa(name) else name
         if key not in self.nominal:
-            fixed = key not in self.values
-            self.nominal[key] = (
-                np.full(self.points.size, self.scene.value(key)) if fixed else self.values[key]
-            )
+            self.nominal[key] = np.full(self.points.size, self.scene.value(key))
         return self.nominal[key]
 
     def _moved(self, name: str, deviation: Deviation, sizes: Floats, rows: Ints) -> dict[str, Floats]:
@@ -143,19 +139,11 @@ class _Search:
             self.known,
             None if beside is None else beside.params,
         )
-        lost = np.isinf(reach).any(axis=1) | ~stack.possible
-        lost |= False if beside is None else ~beside.possible
+        possible = stack.possible if beside is None else stack.possible & beside.possible
         threshold = threshold_of(self.goal, reach)
-        if isinstance(self.goal, OrientedBeyond):
-            good = ~(threshold > self.goal.x)
-        else:
-            good = threshold >= self.goal.x
-        return np.asarray(good & ~lost)
-
-    def _holds_at(
-        self, name: str, deviation: Deviation, sign: float, size: Floats, rows: Ints
-    ) -> NDArray[np.bool_]:
-        return self._holds(rows, self._moved(name, deviation, sign * size, rows))
+        beyond = threshold > self.goal.x  # false where there is no threshold
+        good = ~beyond if isinstance(self.goal, OrientedBeyond) else threshold >= self.goal.x
+        return np.asarray(good & possible & ~np.isinf(reach).any(axis=1))
 
     def _least(
         self, holds: Callable[[Floats, Ints], NDArray[np.bool_]], most: Floats, growing: bool
@@ -200,26 +188,24 @@ class _Search:
             )
         unit = scale.deviation(Fraction(1))
         whole = Deviation(1.0, relative=unit.relative)
-        if unit.relative:
-            most = np.full(self.points.size, MOST)
-        else:
-            most = MOST * np.maximum(np.abs(self._at(quantity)), float(self.scene.sides.length.min()))
+        # of a length or an angle, a share of the value or of the part
+        size = np.maximum(np.abs(self._at(quantity)), float(self.scene.sides.length.min()))
+        most = MOST * (np.ones(self.points.size) if unit.relative else size)
+
+        def moved(size: Floats, rows: Ints) -> dict[str, Floats]:
+            return self._moved(quantity, whole, size, rows)
+
         if reading == "per-throw":
-            sizes = self._least(
-                lambda size, rows: self._holds(
-                    rows, self._moved(quantity, whole, -size, rows), self._moved(quantity, whole, size, rows)
-                ),
+            either = self._least(
+                lambda size, rows: self._holds(rows, moved(-size, rows), moved(size, rows)),
                 most,
                 growing=True,
             )
-        else:
-            sizes = most
-            for sign in (-1.0, 1.0):
-                one = self._least(
-                    partial(self._holds_at, quantity, whole, sign), np.minimum(sizes, most), growing=False
-                )
-                sizes = np.minimum(one, sizes if sign > 0 else np.inf)
-        return sizes / unit.value
+            return either / unit.value
+        less = self._least(lambda size, rows: self._holds(rows, moved(-size, rows)), most, growing=False)
+        most = np.minimum(less, most)
+        more = self._least(lambda size, rows: self._holds(rows, moved(size, rows)), most, growing=False)
+        return np.minimum(less, more) / unit.value
 
     def joint(self) -> Floats:
         """Factors on the scene's tolerance, along the corner that differences of the threshold point at."""
@@ -230,8 +216,8 @@ class _Search:
                 "a scene with [tolerance]",
                 "name the quantities and their scales there",
             )
-        rows, names = np.arange(self.points.size), list(self.scene.tolerance)
-        deviations = {name: self.scene.tolerance[name] for name in names if name != "landing.x"}
+        rows = np.arange(self.points.size)
+        deviations = {name: each for name, each in self.scene.tolerance.items() if name != "landing.x"}
         signs = {name: self._sign(name, each, rows) for name, each in deviations.items()}
 
         def holds(size: Floats, chosen: Ints) -> NDArray[np.bool_]:
@@ -254,6 +240,4 @@ class _Search:
                 stack.params, region_of(stack.lo, stack.hi, stack.anchor), self.points, self.known
             )
             ends.append(threshold_of(self.goal, reach))
-        rises = ends[1] >= ends[0]
-        up = rises if isinstance(self.goal, OrientedBeyond) else ~rises
-        return np.where(up, 1.0, -1.0)
+        return np.where((ends[1] >= ends[0]) == isinstance(self.goal, OrientedBeyond), 1.0, -1.0)

@@ -36,8 +36,7 @@ def morse(block: Block, cells: int = 128, method: str | None = None) -> Mapping[
     """
     points, rows = block.points, []
     for k in range(block.numbers.size):
-        anchor = None if points.anchor is None else points.anchor[k]
-        domain = Domain(points.lo[k], points.hi[k], anchor)
+        domain = Domain(points.lo[k], points.hi[k], None if points.anchor is None else points.anchor[k])
         graph = transitions(point_of(points.params, k), grid(domain, cells=cells), method)
         component, others = components_of(graph)
         attractors = int(component.max(initial=-1)) + 1

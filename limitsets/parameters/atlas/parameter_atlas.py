@@ -119,8 +119,8 @@ class Atlas(Tabled):
     def tables(self) -> tuple[Table, ...]:
         """Give what the answers range over."""
         rows = [self._range(str(name)) for name in sorted(self.dataset, key=str)]
-        axes = " and ".join(self.axes)
-        return (Table(("variable", "values", "unit", "what"), rows, f"Atlas over {axes}", self._how),)
+        caption = f"Atlas over {' and '.join(self.axes)}"
+        return (Table(("variable", "values", "unit", "what"), rows, caption, self._how),)
 
     def _range(self, name: str) -> tuple[str, str, str, str]:
         """Say what one variable ranges over, apart from where there is nothing; of codes how many points have each."""
@@ -150,15 +150,13 @@ class Atlas(Tabled):
         ]
         variables = {str(name): _table(variable) for name, variable in data.data_vars.items()}
         subject = {key: plan[key] for key in ("scene", "map", "parameters", "domain") if key in plan}
-        document = {
+        model = self.model
+        return {
             **subject,
             "unit": data.attrs.get("unit_of_length", ""),
             "axes": axes,
             "variables": variables,
-        }
-        if self.model is not None:
-            document["model"] = self.model.to_json()
-        return document | {
+            **({} if model is None else {"model": model.to_json()}),
             "task": plan["task"],
             "plan_hash": data.attrs["plan_hash"],
             "versions": plan["versions"],
@@ -224,9 +222,12 @@ class Atlas(Tabled):
         if self.map is not None:
             if executor is not None or grid is None:
                 thing, given = ("executor", "given") if grid is not None else ("grid", None)
-                way = "ask so: .certify(limitsets.grid([(lo, hi)], cells=1024), claims)"
-                allowed = "cells, and no executor, of an atlas of a map"
-                raise LimitsetsError(f"the argument {thing} of certify", given, allowed, way)
+                raise LimitsetsError(
+                    f"the argument {thing} of certify",
+                    given,
+                    "cells, and no executor, of an atlas of a map",
+                    "ask so: .certify(limitsets.grid([(lo, hi)], cells=1024), claims)",
+                )
             ends = [{name: float(self.dataset[name].values[end]) for name in self.axes} for end in (0, -1)]
             lower, upper = (MapSubject(self.map, None).at(values) for values in ends)
             return certified_map(lower, grid, claims, upper=upper, progress=progress, **levels, **asked)
@@ -250,12 +251,12 @@ class Atlas(Tabled):
 
 def _table(variable: xr.DataArray) -> dict[str, Any]:
     codes = codes_of(variable.attrs)
-    table = {
+    return {
         "dims": list(variable.dims),
         "unit": variable.attrs.get("units", ""),
         "values": as_plain(variable.values),
+        **({"codes": codes} if codes else {}),
     }
-    return table | ({"codes": codes} if codes else {})
 
 
 @shown_in_notebooks

@@ -308,13 +308,14 @@ class Plan:
 
     def words(self, region: Region) -> str:
         """Name a region by the values of its axes."""
-        named = []
-        for axis, part in zip(self.axes, region, strict=True):
-            lo, hi = axis.values[part.start], axis.values[part.stop - 1]
-            named.append(
-                f"{axis.name} {f'{lo:.9g}' if lo == hi else f'{lo:.9g} to {hi:.9g}'} {axis.unit}".rstrip()
-            )
-        return ", ".join(named)
+        spans = [
+            (axis, axis.values[part.start], axis.values[part.stop - 1])
+            for axis, part in zip(self.axes, region, strict=True)
+        ]
+        return ", ".join(
+            f"{axis.name} {f'{lo:.9g}' if lo == hi else f'{lo:.9g} to {hi:.9g}'} {axis.unit}".rstrip()
+            for axis, lo, hi in spans
+        )
 
     @cached_property
     def record(self) -> dict[str, Any]:
@@ -330,11 +331,6 @@ class Plan:
             "refine": None if self.refine is None else list(self.refine),
             **self.code,
         }
-
-    @cached_property
-    def digest(self) -> str:
-        """The hash of the plan."""
-        return digest_of(self.record)
 
     def require(self) -> None:
         """Refuse a plan that cannot be carried out, before anything is computed."""

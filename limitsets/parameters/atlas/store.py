@@ -80,27 +80,24 @@ class Store:
         plan = self.plan
         self.group.attrs.update(_attributes(plan))
         for axis in plan.axes:
-            values = axis.values
             array = self._made(
                 axis.name,
-                values.shape,
-                values.shape,
-                dtype=values.dtype,
+                axis.values.shape,
+                axis.values.shape,
+                dtype=axis.values.dtype,
                 fill=0.0,
                 dims=(axis.name,),
                 attributes=_unit(axis.unit),
             )
-            array[...] = values
-        dims = tuple(f"chunk of {axis.name}" for axis in plan.axes)
-        about = {"long_name": "CRC-32 of the chunk's data; 0 where the chunk is not done"}
+            array[...] = axis.values
         self._made(
             CHECKSUM,
             plan.chunks,
-            (1,) * len(dims),
+            (1,) * len(plan.axes),
             dtype=np.dtype("uint32"),
             fill=0,
-            dims=dims,
-            attributes=about,
+            dims=tuple(f"chunk of {axis.name}" for axis in plan.axes),
+            attributes={"long_name": "CRC-32 of the chunk's data; 0 where the chunk is not done"},
         )
 
     def _made(
@@ -152,8 +149,7 @@ class Store:
         wrong = list(differences(self.plan.record, theirs))
         wrong = [each for each in wrong if not each[0].endswith(".sha256")] or wrong
         if wrong:
-            words = [_difference(*each) for each in wrong]
-            shown = "; ".join(words[:_MOST_SHOWN])
+            shown = "; ".join(_difference(*each) for each in wrong[:_MOST_SHOWN])
             more = f" and {len(wrong) - _MOST_SHOWN} more" if len(wrong) > _MOST_SHOWN else ""
             raise LimitsetsError(
                 f"the store {self.path}",
@@ -198,10 +194,14 @@ class Store:
         if name not in self.arrays:
             chunks = (*self.plan.chunk, *(max(n, 1) for _, n in variable.dims))
             dims = (*(axis.name for axis in self.plan.axes), *(dim for dim, _ in variable.dims))
-            about = _described(variable, self.plan.subject.unit)
-            dtype = np.dtype(variable.dtype)
             self.arrays[name] = self._made(
-                name, shape, chunks, dtype=dtype, fill=variable.empty, dims=dims, attributes=about
+                name,
+                shape,
+                chunks,
+                dtype=np.dtype(variable.dtype),
+                fill=variable.empty,
+                dims=dims,
+                attributes=_described(variable, self.plan.subject.unit),
             )
         if self.arrays[name].shape != shape:
             raise LimitsetsError(
@@ -273,15 +273,13 @@ def _seal(
 
 def _seal_of(array: Any, attributes: Mapping[str, Any]) -> int:
     """Return the checksum of what an array in a store says of itself, with these attributes."""
-    dims = tuple(array.metadata.dimension_names or ())
-    name = array.path.rpartition("/")[2]
     return _seal(
-        name,
+        array.path.rpartition("/")[2],
         array.shape,
         array.chunks,
         dtype=array.dtype,
         fill=array.fill_value,
-        dims=dims,
+        dims=tuple(array.metadata.dimension_names or ()),
         attributes=attributes,
     )
 
@@ -323,11 +321,9 @@ def _short(value: Any) -> str:
 
 def _described(variable: Variable, length: str) -> dict[str, Any]:
     """Return the attributes of a variable; codes as the CF conventions have them."""
-    attributes: dict[str, Any] = {"long_name": variable.about} if variable.about else {}
-    unit = length if variable.unit == "length" else variable.unit
-    if unit:
-        attributes["units"] = unit
-    return attributes | (_flags(variable.codes) if variable.codes else {})
+    about = {"long_name": variable.about} if variable.about else {}
+    unit = _unit(length if variable.unit == "length" else variable.unit)
+    return about | unit | (_flags(variable.codes) if variable.codes else {})
 
 
 def _flags(codes: Mapping[str, int]) -> dict[str, Any]:
@@ -342,7 +338,7 @@ def _attributes(plan: Plan) -> dict[str, Any]:
     """Return the attributes of a store."""
     attributes: dict[str, Any] = {
         "title": f"atlas of {plan.subject.title}",
-        "plan_hash": plan.digest,
+        "plan_hash": digest_of(plan.record),
         "plan": plan.record,
     }
     if isinstance(plan.subject, SceneSubject):

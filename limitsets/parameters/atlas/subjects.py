@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from limitsets.base import AnswerError, LimitsetsError, MapError, SceneError
 from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.quantities import base_unit, find, unit_read
+from limitsets.feeder.scene.quantities import base_unit, find, replaced, unit_read
 from limitsets.feeder.scene.units import Quantity, convert, parse
 from limitsets.systems.cells import Domain
 from limitsets.systems.graph.agreement import require_agreement
@@ -138,8 +138,6 @@ def _taken_apart(word: str, text: object) -> tuple[Fraction, str | None]:
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-# What people read these in, where the scene gives no unit for them.
-
 
 class Points(NamedTuple):
     """Stacked parameters and domains of n points, and which of them can be."""
@@ -209,13 +207,10 @@ class SceneSubject:
 
     def require(self, axes: Mapping[str, Array], *, block: bool) -> None:
         """Refuse axes of which no scene can be made."""
-        one = {name: values[:1] for name, values in axes.items()}
         if block:
-            self.points(one)
+            self.points({name: values[:1] for name, values in axes.items()})
         else:
-            from limitsets.feeder.scene.quantities import replaced
-
-            replaced(self.scene.text, self.scene.unit, self.scene.file, dict.fromkeys(one, 1.0))
+            replaced(self.scene.text, self.scene.unit, self.scene.file, dict.fromkeys(axes, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,13 +224,11 @@ class MapSubject:
     def record(self) -> dict[str, Any]:
         """What a store keeps of it."""
         cls, domain = type(self.params), self.domain
-        fields: dict[str, Any] = {
+        return {
             "map": f"{cls.__module__}:{cls.__qualname__}",
             "parameters": _plain(self.params),
+            **({} if domain is None else {"domain": {"lo": domain.lo.tolist(), "hi": domain.hi.tolist()}}),
         }
-        if domain is not None:
-            fields["domain"] = {"lo": domain.lo.tolist(), "hi": domain.hi.tolist()}
-        return fields
 
     @property
     def title(self) -> str:
@@ -289,12 +282,11 @@ class MapSubject:
         for name, each in values.items():
             stack = _with(stack, _path(name), np.ascontiguousarray(each, dtype=np.float64), name)
         domain = self._domain
-        ends = [domain.lo, domain.hi]
-        if domain.dimension == 1:
-            ends = [corner[:, 0] for corner in ends]
-        lo, hi = (np.repeat(corner[None], count, axis=0) for corner in ends)
-        anchor = domain.anchor
-        anchors = None if anchor is None else np.repeat(anchor[None], count, axis=0)
+        lo, hi = (
+            np.repeat((corner[:, 0] if domain.dimension == 1 else corner)[None], count, axis=0)
+            for corner in (domain.lo, domain.hi)
+        )
+        anchors = None if domain.anchor is None else np.repeat(domain.anchor[None], count, axis=0)
         return Points(stack, lo, hi, anchors, np.ones(count, dtype=np.bool_))
 
     def at(self, values: Mapping[str, float]) -> Any:

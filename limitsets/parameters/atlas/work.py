@@ -185,10 +185,7 @@ def answer(plan: Plan, number: int) -> Answer:
     region = plan.region(number)
     shape = tuple(part.stop - part.start for part in region)
     values, numbers = plan.values(region), plan.numbers(region)
-    if plan.refine is None:
-        arrays = _asked(plan, values, numbers)
-    else:
-        arrays = _refined(plan, shape, values, numbers)
+    arrays = _refined(plan, shape, values, numbers) if plan.refine else _asked(plan, values, numbers)
     return Answer(
         number, {name: (v, each.reshape(*shape, *each.shape[1:])) for name, (v, each) in arrays.items()}
     )
@@ -198,10 +195,9 @@ def _asked(plan: Plan, values: Values, numbers: npt.NDArray[np.int64]) -> Variab
     """Ask the task."""
     function = resolved(plan.task)
     task = registered(function)
-    if task is None:
-        status, arrays = _single(plan, function, values, numbers)
-    else:
-        status, arrays = _block(plan, task, values, numbers)
+    status, arrays = (
+        _single(plan, function, values, numbers) if task is None else _block(plan, task, values, numbers)
+    )
     return {"status": (STATUS, status), **arrays}
 
 
@@ -247,24 +243,16 @@ def _joined(plan: Plan, name: str, batches: list[VariableArrays]) -> tuple[Varia
     return variable, np.concatenate(parts)
 
 
-def seed_of(plan: Plan, number: int) -> int:
-    """Return the seed of a point: by its number alone."""
-    return int(np.random.SeedSequence(plan.seed, spawn_key=(number,)).generate_state(1, np.uint64)[0])
-
-
-def variables_of(plan: Plan, task: BlockTask) -> dict[str, Variable]:
-    """Return the variables that a plan asks of a block task."""
-    known = task.variables(plan.subject, **plan.options)
-    if plan.variables is None:
-        return {name: each for name, each in known.items() if each.default}
-    return {name: each for name, each in known.items() if name in plan.variables}
-
-
 def _block(
     plan: Plan, task: BlockTask, values: Values, numbers: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.int8], VariableArrays]:
     """Answer by a task that takes all possible points at once."""
-    points, variables = plan.subject.points(values), variables_of(plan, task)
+    points, asked = plan.subject.points(values), plan.variables
+    variables = {
+        name: variable
+        for name, variable in task.variables(plan.subject, **plan.options).items()
+        if (variable.default if asked is None else name in asked)
+    }
     good = np.flatnonzero(points.possible)
     kept = points if good.size == numbers.size else type(points)(*(chosen(each, good) for each in points))
     varied = {name: each[good] for name, each in values.items()}
@@ -294,19 +282,21 @@ def _single(
     """Answer point by point; what a task refuses is a point without numbers, any other error ends the sweep."""
     seeded = "seed" in inspect.signature(function).parameters
     status, arrays = np.zeros(numbers.size, dtype=np.int8), {}
-    for k in range(numbers.size):
+    for k, number in enumerate(numbers.tolist()):
         one = plan.subject.at({name: float(each[k]) for name, each in values.items()})
         if one is None:
             status[k] = IMPOSSIBLE
             continue
-        more = {"seed": seed_of(plan, int(numbers[k]))} if seeded else {}
+        # of each point a seed by its number alone
+        drawn = np.random.SeedSequence(plan.seed, spawn_key=(number,)) if seeded else None
+        more = {} if drawn is None else {"seed": int(drawn.generate_state(1, np.uint64)[0])}
         try:
             given = function(one, **plan.options, **more)
         except LimitsetsError:
             status[k] = REFUSED
             continue
         except Exception as error:
-            place = plan.words(plan.point(int(numbers[k])))
+            place = plan.words(plan.point(number))
             raise _wrong(plan, "", f"{type(error).__name__}: {error}", f"an answer at {place}") from error
         for name, each in _numbers(plan, given).items():
             if name not in arrays:

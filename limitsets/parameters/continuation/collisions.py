@@ -13,7 +13,7 @@ end passes them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -179,9 +179,8 @@ class Approach(NamedTuple):
         begin, border = self.point(place), self._border(place, self.target)
         if begin is None or border is None:
             return None
-        change = f"{names[border.below]}->{names[border.above]}"
-        if border.kind != "critical":
-            change = {"domain": "end of the domain"}.get(border.kind, border.kind)
+        kinds = {"critical": f"{names[border.below]}->{names[border.above]}", "domain": "end of the domain"}
+        change = kinds.get(border.kind, border.kind)
         itinerary = tuple(names[branch] for branch in self.tracked.word)
         limit = "cycle" if self.start is None else ("c+" if self.tracked.from_above else "c-")
         start = None if self.start is None else begin[0] * (abs(begin[0]) >= TINY)
@@ -252,28 +251,24 @@ def approaches(path: Path, lo: Snapshot, hi: Snapshot) -> Iterator[Approach]:
                     yield Approach(path, (lo.t, hi.t), point, start, pair)
 
 
-def _solved(gap: Callable[[float], float], lo: float, hi: float) -> float | None:
-    """Root of a gap; None where it ends on the way."""
+def crossing(approach: Approach, lo: Snapshot, hi: Snapshot) -> float | None:
+    """Root t of a gap that changes its sign between two places; None for none, or where the gap ends on the way."""
     from scipy.optimize import brentq
 
+    first, last = approach.gap(lo.place), approach.gap(hi.place)
+    if not (np.isfinite(first) and np.isfinite(last)) or (first > 0.0) == (last > 0.0):
+        return None
+
     def value(t: float) -> float:
-        distance = gap(t)
+        distance = approach.at(t)
         if not np.isfinite(distance):
             raise ValueError
         return distance
 
     try:
-        return float(brentq(value, lo, hi, xtol=1e-14, rtol=4.0 * EPS))
+        return float(brentq(value, lo.t, hi.t, xtol=1e-14, rtol=4.0 * EPS))
     except ValueError:
         return None
-
-
-def crossing(approach: Approach, lo: Snapshot, hi: Snapshot) -> float | None:
-    """Root t of a gap that changes its sign between two places; None for none."""
-    first, last = approach.gap(lo.place), approach.gap(hi.place)
-    if not (np.isfinite(first) and np.isfinite(last)) or (first > 0.0) == (last > 0.0):
-        return None
-    return _solved(approach.at, lo.t, hi.t)
 
 
 def nearest(approach: Approach, middle: float) -> tuple[float, float] | None:
@@ -289,8 +284,7 @@ def nearest(approach: Approach, middle: float) -> tuple[float, float] | None:
     sign = 1.0 if between > 0.0 else -1.0
     if not (0.0 < sign * between <= min(sign * first, sign * last)):
         return None
-    options = {"xatol": 1e-12}
     minimum = minimize_scalar(
-        lambda t: sign * approach.at(t), bounds=(lo, hi), method="bounded", options=options
+        lambda t: sign * approach.at(t), bounds=(lo, hi), method="bounded", options={"xatol": 1e-12}
     )
     return float(minimum.x), sign * float(minimum.fun)

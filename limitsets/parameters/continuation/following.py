@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import pairwise
+from functools import cache
+from itertools import count, pairwise
 from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from limitsets.base import AnswerError, arguments_checked, shown_in_notebooks
+from limitsets.base import AnswerError, Progress, arguments_checked, shown_in_notebooks, silent
 from limitsets.feeder.scene import load
 from limitsets.parameters.continuation.collisions import Approach, approaches, crossing, nearest
 from limitsets.parameters.continuation.path import Curve, Path, between, read_path
@@ -77,8 +77,7 @@ def _directed(one: AttractorAtPlace, other: AttractorAtPlace) -> float:
         there = np.array(other.extents[side])
         # Between two bands of the other set the farthest point is the middle of the gap.
         gaps = 0.5 * (there[1:, 0] + there[:-1, 1])
-        points = [x for lo, hi in parts for x in (lo, hi, *gaps[(gaps > lo) & (gaps < hi)].tolist())]
-        x = np.array(points)
+        x = np.array([x for lo, hi in parts for x in (lo, hi, *gaps[(gaps > lo) & (gaps < hi)].tolist())])
         farthest = max(farthest, float(other.distance(x, np.full(x.size, side)).max()))
     return farthest
 
@@ -86,11 +85,12 @@ def _directed(one: AttractorAtPlace, other: AttractorAtPlace) -> float:
 def _overlap(one: AttractorAtPlace, other: AttractorAtPlace, reach: float) -> bool:
     if one.cells is not None and other.cells is not None:
         return _share(*sorted((one.cells, other.cells), key=lambda each: each.grid.n_cells))
-    for side, parts in one.extents.items():
-        for lo, hi in parts:
-            if any(lo - reach <= top and bottom <= hi + reach for bottom, top in other.extents.get(side, ())):
-                return True
-    return False
+    return any(
+        lo - reach <= top and bottom <= hi + reach
+        for side, parts in one.extents.items()
+        for lo, hi in parts
+        for bottom, top in other.extents.get(side, ())
+    )
 
 
 def _share(coarse: CellSet, fine: CellSet) -> bool:
@@ -115,11 +115,13 @@ def matched(before: Snapshot, after: Snapshot) -> Match:
     pairs.add_nodes_from((1, j) for j in range(len(after.attractors)))
     ahead = [arrivals(each, after, reach) for each in before.attractors]
     back = [arrivals(each, before, reach) for each in after.attractors]
-    for i, one in enumerate(before.attractors):
-        for j, other in enumerate(after.attractors):
-            if (ahead[i] == {j} or back[j] == {i}) and _overlap(one, other, reach):
-                pairs.add_edge((0, i), (1, j))
-    groups = tuple(
+    pairs.add_edges_from(
+        ((0, i), (1, j))
+        for i, one in enumerate(before.attractors)
+        for j, other in enumerate(after.attractors)
+        if (ahead[i] == {j} or back[j] == {i}) and _overlap(one, other, reach)
+    )
+    groups = sorted(
         Group(*(tuple(sorted(k for which, k in part if which == side)) for side in (0, 1)))
         for part in nx.connected_components(pairs)
     )
@@ -128,7 +130,7 @@ def matched(before: Snapshot, after: Snapshot) -> Match:
         and _alike(before.attractors[group.before[0]], after.attractors[group.after[0]], reach)
         for group in groups
     )
-    return Match(tuple(sorted(groups, key=lambda group: (group.before, group.after))), smooth)
+    return Match(tuple(groups), smooth)
 
 
 # ----------------------------------------------------------------
@@ -160,7 +162,7 @@ class Follower:
     def __init__(self, path: Path, cells: int, most: int) -> None:
         self.path, self.cells, self.most = path, cells, most
         self.snapshots: dict[float, Snapshot] = {}
-        self.matches: dict[tuple[Snapshot, Snapshot], Match] = {}
+        self.match = cache(matched)  # of two places, found once
         self.sure: dict[float, bool] = {}
         self.met: list[Met] = []
         self.left = most
@@ -171,12 +173,6 @@ class Follower:
             self.snapshots[t] = snapshot_at(self.path.at(t), self.cells)
             self.left -= 1
         return self.snapshots[t]
-
-    def match(self, lo: Snapshot, hi: Snapshot) -> Match:
-        """Match of two places, found once."""
-        if (lo, hi) not in self.matches:
-            self.matches[lo, hi] = matched(lo, hi)
-        return self.matches[lo, hi]
 
     def is_sure(self, t: float) -> bool:
         """Whether an event may begin or end at a place: where cells decide, finer ones have to agree."""
@@ -235,14 +231,11 @@ class Follower:
         roots = [(crossing(each, lo, hi), each) for each in approaches(self.path, lo, hi)]
         for root, each in sorted(((t, each) for t, each in roots if t is not None), key=lambda pair: pair[0]):
             bracket = max(root - 0.4 * BRACKET, lo.t), min(root + 0.4 * BRACKET, hi.t)
-            if bracket in [met.t for met in self.met]:
-                continue
-            places = [self.path.at(t) for t in bracket]
-            if not all(each.decided(place) for place in places):
-                continue
-            met = self._confirmed("border collision", each, bracket)
-            if met is not None:
-                return met
+            known = bracket in [met.t for met in self.met]
+            if not known and all(each.decided(self.path.at(t)) for t in bracket):
+                met = self._confirmed("border collision", each, bracket)
+                if met is not None:
+                    return met
         return None
 
     def _confirmed(self, kind: str, each: Approach, bracket: tuple[float, float]) -> Met | None:
@@ -259,14 +252,11 @@ class Follower:
             a, b, c = (self.at(t) for t in (before, middle, after))
             if after - before < 4.0 * TOUCH_BRACKET or not b.place.on_line:
                 continue
-            if not (self.match(a, b).smooth and self.match(b, c).smooth):
-                continue
-            for each in approaches(self.path, a, c):
-                touch = nearest(each, middle)
-                if touch is None:
-                    continue
-                t, gap = touch
-                self._touched(each, (before, middle, after), t, gap)
+            if self.match(a, b).smooth and self.match(b, c).smooth:
+                for each in approaches(self.path, a, c):
+                    touch = nearest(each, middle)
+                    if touch is not None:
+                        self._touched(each, (before, middle, after), *touch)
 
     def _touched(self, each: Approach, steps: tuple[float, float, float], t: float, gap: float) -> None:
         place = self.path.at(t)
@@ -308,16 +298,13 @@ def numbered(follower: Follower) -> list[list[int]]:
     """Give every attractor at every step its number."""
     steps = [follower.at(t) for t in sorted(follower.snapshots)]
     numbers = [list(range(len(steps[0].attractors)))]
-    following = len(steps[0].attractors)
+    unused = count(len(steps[0].attractors))
     for before, after in pairwise(steps):
         given = [-1] * len(after.attractors)
         for group in follower.match(before, after).groups:
             old = [numbers[-1][position] for position in group.before]
             for position in group.after:
-                if old:
-                    given[position] = old.pop(0)
-                else:
-                    given[position], following = following, following + 1
+                given[position] = old.pop(0) if old else next(unused)
         numbers.append(given)
     return numbers
 
@@ -346,22 +333,17 @@ class _Between(NamedTuple):
     new: list[int]
 
     def event(self, kind: str, group: Group, change: str, jump: float | None, met: Met | None) -> Event:
-        t = (self.before.t, self.after.t) if met is None else met.t
-        values = self.before.place.values, self.after.place.values
-        before = tuple(self.old[position] for position in group.before)
-        after = tuple(self.new[position] for position in group.after)
-        collision = None if met is None else met.collision
-        words = between(self.before.place, self.after.place)
+        first, last = self.before.place, self.after.place
         return Event(
             kind=kind,
-            t=t,
-            values=values,
-            before=before,
-            after=after,
+            t=(first.t, last.t) if met is None else met.t,
+            values=(first.values, last.values),
+            before=tuple(self.old[position] for position in group.before),
+            after=tuple(self.new[position] for position in group.after),
             change=change,
             jump=jump,
-            collision=collision,
-            words=words,
+            collision=None if met is None else met.collision,
+            words=between(first, last),
         )
 
     def of_group(self, group: Group, met: Met | None) -> Event | None:
@@ -386,8 +368,8 @@ class _Between(NamedTuple):
         if not group.before:
             came = _whereto(one_side[0], self.before, self.old, reach)
             return self.event("birth", group, f"{words}, its states came to {came}", None, met)
-        many = [self.after.attractors[k] for k in group.after]
-        change = f"{words} -> {' and '.join(State.of(each).words() for each in many)}"
+        others = " and ".join(State.of(self.after.attractors[k]).words() for k in group.after)
+        change = f"{words} -> {others}"
         kind = "merge" if len(group.before) >= len(group.after) else "split"
         return self.event(kind, group, change, None, met)
 
@@ -418,9 +400,6 @@ def events_of(follower: Follower, numbers: list[list[int]]) -> tuple[Event, ...]
 
 # ----------------------------------------------------------------
 # Following attractors along a path: the public call.
-
-
-Progress = Callable[[str, int, int], None]
 
 
 @shown_in_notebooks
@@ -492,26 +471,26 @@ def continuation(
     curve = read_path(load(subject) if isinstance(subject, str) else subject, path, domain)
     follower = Follower(curve, cells, most)
     grid = np.linspace(0.0, 1.0, steps + 1).tolist()
+    tell = progress or silent
     for k, (first, last) in enumerate(pairwise(grid)):
-        if progress is not None:
-            progress("steps", k, steps)
+        tell("steps", k, steps)
         follower.step(first, last)
     follower.touches()
     follower.settle()
-    if progress is not None:
-        progress("steps", steps, steps)
+    tell("steps", steps, steps)
     return _answer(curve, follower)
 
 
 def _answer(curve: Path, follower: Follower) -> Continuation:
     numbers = numbered(follower)
     visited = [follower.at(t) for t in sorted(follower.snapshots)]
-    names = visited[0].place.values
     return Continuation(
         name=curve.name,
         unit=curve.unit,
         t=np.array([each.t for each in visited]),
-        values={name: np.array([each.place.values[name] for each in visited]) for name in names},
+        values={
+            name: np.array([each.place.values[name] for each in visited]) for name in visited[0].place.values
+        },
         attractors=tuple(
             {
                 number: State.of(attractor)
@@ -528,8 +507,8 @@ def _answer(curve: Path, follower: Follower) -> Continuation:
 def _critical(snapshot: Snapshot) -> dict[int, tuple[float, ...]]:
     if not snapshot.place.on_line:
         return {}
-    points: dict[int, list[float]] = {side: [] for side in snapshot.place.forward.pieces}
-    for border in snapshot.place.borders:
-        if border.kind == "critical":
-            points[border.side].append(border.x_above)
-    return {side: tuple(x) for side, x in points.items()}
+    critical = [border for border in snapshot.place.borders if border.kind == "critical"]
+    return {
+        side: tuple(border.x_above for border in critical if border.side == side)
+        for side in snapshot.place.forward.pieces
+    }

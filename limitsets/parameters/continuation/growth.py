@@ -7,7 +7,7 @@ Images of a short interval around a point of the attractor never leave the attra
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from limitsets.parameters.continuation.path import Place
 from limitsets.systems.maps import advance, along
 from limitsets.systems.maps.critical import Array, Flags
 from limitsets.systems.sets.closing import Cycle, Ints, stepped
-from limitsets.systems.sets.end_points import BORDER, EPS, IntervalMap, Union, read, same
+from limitsets.systems.sets.end_points import EPS, IntervalMap
 
 # Of the extent: half the length of the first pieces, the length at which their images are kept, what counts as none.
 SHORT, LONG, NONE = 1e-9, 1e-3, 1e-14
@@ -101,44 +101,12 @@ def grown(
     for _ in range(MOST_STEPS):
         after = pieces.joined([*union, *pieces.image(union)])
         if _same(union, after, 1e-13 * extent):
-            extents: dict[int, list[tuple[float, float]]] = {}
-            for s, low, high in after:
-                extents.setdefault(s, []).append((low, high))
-            return extents
+            sides = sorted({s for s, _, _ in after})
+            return {on: [(low, high) for s, low, high in after if s == on] for on in sides}
         if len(after) > MOST_INTERVALS:
             return None
         union = after
     return None
-
-
-def carried(
-    forward: IntervalMap,
-    extents: dict[int, list[tuple[float, float]]],
-    domain: object,
-    extent: float,
-    images: int,
-    *,
-    rest: bool,
-) -> tuple[Union, bool]:
-    """Take images of a set until each end comes from a critical orbit or, with `rest`, until no end moves.
-
-    Returns
-    -------
-    union, bool
-        The set with its ends, empty where part of it leaves the domain: then it is no attractor, however long its
-        orbits stay; and whether its ends came to be so.
-    """
-    union, rested = read(extents, domain), 0  # type: ignore[arg-type]  # a Domain
-    for _ in range(images):
-        image, leaves = forward.image(union)
-        if leaves:
-            return {}, False
-        rested = rested + 1 if same(union, image, 1e-12, extent) else 0
-        union = image
-        known = all(end.kind != BORDER for parts in union.values() for part in parts for end in part)
-        if not union or (rested >= 2 if rest else known):
-            return union, bool(union)
-    return union, False
 
 
 # ----------------------------------------------------------------
@@ -153,15 +121,12 @@ MOST_PERIOD = 128
 RETURN, FAR, ONE = 1e-4, 0.05, 1e-9
 
 
-class Recorded:
+class Recorded(NamedTuple):
     """States of many orbits: x and side of shape (n, m + 1), code of shape (n, m)."""
 
-    def __init__(self, x: Array, side: Ints, code: Ints) -> None:
-        self.x, self.side, self.code = x, side, code
-
-    def rows(self, chosen: Flags) -> Recorded:
-        """Give some of the orbits."""
-        return Recorded(self.x[chosen], self.side[chosen], self.code[chosen])
+    x: Array
+    side: Ints
+    code: Ints
 
 
 def recorded(place: Place, x: Array, side: Ints, steps: int) -> Recorded:
@@ -174,8 +139,8 @@ def recorded(place: Place, x: Array, side: Ints, steps: int) -> Recorded:
         codes.append(code)
     orbits = Recorded(np.stack(xs, axis=1), np.stack(sides, axis=1), np.stack(codes, axis=1))
     lo, hi = place.domain.lo[orbits.side, 0], place.domain.hi[orbits.side, 0]
-    inside = ((orbits.x >= lo) & (orbits.x <= hi)).all(axis=1)
-    return orbits.rows((orbits.code >= 0).all(axis=1) & inside)
+    kept = (orbits.code >= 0).all(axis=1) & ((orbits.x >= lo) & (orbits.x <= hi)).all(axis=1)
+    return Recorded(*(each[kept] for each in orbits))
 
 
 def on_itinerary(place: Place, x: Array, side: Ints, words: Ints) -> tuple[Array, Array, Flags]:
@@ -207,9 +172,7 @@ def _as_cycle(place: Place, x: float, side: int, word: Ints) -> Cycle | None:
         after, to, slope = along(place.params, [x], side, [branch])
         x, side, slopes[j] = float(after[0]), int(to[0]), slope[0]
     multiplier = float(np.prod(slopes))
-    if not abs(multiplier) < 1.0:
-        return None
-    if (stepped(place.params, xs[:, None], sides)[2] != word).any():
+    if not abs(multiplier) < 1.0 or (stepped(place.params, xs[:, None], sides)[2] != word).any():
         return None
     first = int(np.lexsort((xs, sides))[0])
     ahead = (np.arange(sides.size) + first) % sides.size
@@ -220,9 +183,8 @@ def _as_cycle(place: Place, x: float, side: int, word: Ints) -> Cycle | None:
 def _shortest(place: Place, cycle: Cycle) -> Cycle:
     """Return the shorter cycle that a cycle repeats, if the shorter one attracts; else the cycle itself."""
     for period in range(1, cycle.period):
-        if cycle.period % period == 0 and cycle.side[period] == cycle.side[0]:
-            if abs(cycle.x[period] - cycle.x[0]) > 1e-3 * place.extent:
-                continue
+        near = abs(cycle.x[period] - cycle.x[0]) <= 1e-3 * place.extent
+        if near and cycle.period % period == 0 and cycle.side[period] == cycle.side[0]:
             word = cycle.branches[:period]
             x, _, good = on_itinerary(place, cycle.x[:1].copy(), cycle.side[:1], word[None, :])
             shorter = _as_cycle(place, float(x[0]), int(cycle.side[0]), word) if good[0] else None

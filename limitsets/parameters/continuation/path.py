@@ -197,9 +197,11 @@ def _of_map(params: Any, path: Curve, domain: Any) -> Path:
         elif isinstance(given, Mapping) and set(given) <= set(params._fields):
             there = params._replace(**given)
         else:
-            names = ", ".join(params._fields)
             raise AnswerError(
-                "a point of the path", given, f"values of {names}", "name parameters of the map"
+                "a point of the path",
+                given,
+                f"values of {', '.join(params._fields)}",
+                "name parameters of the map",
             )
         there = coerce(there)
         kept = given if isinstance(given, Mapping) else there._asdict()
@@ -219,9 +221,11 @@ def read_path(subject: Any, path: Curve, domain: Any) -> Path:
     def at(t: float) -> Place:
         place = unchecked.at(t)
         if set(place.values) != names:
-            allowed = ", ".join(sorted(names))
             raise AnswerError(
-                "the values of the path", sorted(place.values), allowed, "give the same for all t"
+                "the values of the path",
+                sorted(place.values),
+                ", ".join(sorted(names)),
+                "give the same for all t",
             )
         return place
 

@@ -20,7 +20,6 @@ from limitsets.parameters.continuation.growth import (
     MOST_PERIOD,
     Recorded,
     attracting_cycles,
-    carried,
     grown,
     recorded,
 )
@@ -30,7 +29,7 @@ from limitsets.systems.graph import TransitionGraph, transitions
 from limitsets.systems.maps import advance, kind_of
 from limitsets.systems.maps.critical import Array
 from limitsets.systems.sets.closing import Cycle, Ints
-from limitsets.systems.sets.end_points import End, ends_of
+from limitsets.systems.sets.end_points import BORDER, End, ends_of, read, same
 
 Intervals = dict[int, list[tuple[float, float]]]
 
@@ -38,8 +37,8 @@ Intervals = dict[int, list[tuple[float, float]]]
 TRANSIENT, STARTS, STARTS_PER_SET = 1000, 12, 4
 # Orbits from whose last states sets are grown, and the states taken of each.
 TRIED, STATES = 3, 8
-# Images until the ends of a set are critical orbits.
-MOST_IMAGES = 300
+# States of a band that are sent to another place; images until the ends of a set are critical orbits.
+SAMPLED, MOST_IMAGES = 9, 300
 # On cells: starts all over a side, their steps; how much finer cells are that confirm, and how many there may be.
 SPREAD, RESTED = 256, 3000
 FINER, MOST_CELLS = 1.6, 1_000_000
@@ -139,16 +138,26 @@ def _starts(place: Place, sets: Iterable[CellSet]) -> tuple[Array, Ints]:
 
 
 def _of_cycle(cycle: Cycle) -> AttractorAtPlace:
-    extents: Intervals = {}
-    for x, side in sorted(zip(cycle.x.tolist(), cycle.side.tolist(), strict=True)):
-        extents.setdefault(side, []).append((x, x))
-    return AttractorAtPlace(dict(sorted(extents.items())), (), cycle, None, True)
+    sides = np.unique(cycle.side).tolist()
+    extents = {side: [(x, x) for x in sorted(cycle.x[cycle.side == side].tolist())] for side in sides}
+    return AttractorAtPlace(extents, (), cycle, None, True)
 
 
 def _of_intervals(place: Place, extents: Intervals, *, inside: bool) -> AttractorAtPlace | None:
-    union, known = carried(place.forward, extents, place.domain, place.extent, MOST_IMAGES, rest=not inside)
-    if not union:
-        return None
+    """Take images of a set until each end comes from a critical orbit or, of an enclosure, until no end moves.
+
+    None where part of it leaves the domain: then it is no attractor, however long its orbits stay.
+    """
+    union, rested, known = read(extents, place.domain), 0, False
+    for _ in range(MOST_IMAGES):
+        image, leaves = place.forward.image(union)
+        if leaves or not image:
+            return None
+        rested = rested + 1 if same(union, image, 1e-12, place.extent) else 0
+        union = image
+        known = all(end.kind != BORDER for parts in union.values() for part in parts for end in part)
+        if known if inside else rested >= 2:
+            break
     ends = ends_of(kind_of(place.params).branches, union)
     bands = {side: [(lo.x, hi.x) for lo, hi in parts] for side, parts in union.items()}
     return AttractorAtPlace(bands, ends, None, None, inside and known)
@@ -194,11 +203,6 @@ def _least(attractors: list[AttractorAtPlace], slack: float) -> tuple[AttractorA
     )
 
 
-def _order(attractor: AttractorAtPlace) -> tuple[int, float]:
-    side = min(attractor.extents)
-    return side, attractor.extents[side][0][0]
-
-
 def snapshot_at(place: Place, cells: int) -> Snapshot:
     """Find the attractors at one place; `cells` per axis."""
     if not place.on_line:
@@ -209,8 +213,12 @@ def snapshot_at(place: Place, cells: int) -> Snapshot:
     rows = recorded(place, x[code >= 0], side[code >= 0], MOST_PERIOD)
     cycles, left = attracting_cycles(place, rows)
     attractors = [_of_cycle(cycle) for cycle in cycles]
-    attractors += _grown_sets(place, rows.rows(left), sets)
-    return Snapshot(place, tuple(sorted(_least(attractors, 1e-9 * place.extent), key=_order)), cells)
+    attractors += _grown_sets(place, Recorded(rows.x[left], rows.side[left], rows.code[left]), sets)
+    ordered = sorted(
+        _least(attractors, 1e-9 * place.extent),
+        key=lambda each: min((side, parts[0][0]) for side, parts in each.extents.items()),
+    )
+    return Snapshot(place, tuple(ordered), cells)
 
 
 def _on_cells(place: Place, cells: int) -> Snapshot:
@@ -244,8 +252,7 @@ def _finer(place: Place, cells: int) -> int | None:
 def _rested(snapshot: Snapshot) -> tuple[Array, Ints, Ints]:
     """Last states of orbits from all over the domain that stay, and the attractor that each is at, else -1."""
     domain = snapshot.place.domain
-    per_axis = max(2, round(SPREAD ** (1.0 / domain.dimension)))
-    starts = grid(domain, per_axis)
+    starts = grid(domain, max(2, round(SPREAD ** (1.0 / domain.dimension))))
     x = np.concatenate([starts.centres(side) for side in range(domain.sides)])
     side = starts.side_of(np.arange(len(x)))
     x, side, code, _ = advance(snapshot.place.params, x, side, RESTED)
@@ -262,11 +269,9 @@ def _visited(place: Place, cover: Grid, x: Array, side: Ints, sets: list[CellSet
         rows.append(np.where(code >= 0, cover.index(x, side), -1))
     merged: list[CellSet] = []
     for orbit in np.stack(rows, axis=1):
-        if (orbit < 0).any():
+        if (orbit < 0).any() or any(each.mask[orbit].any() for each in sets):
             continue
         new = CellSet.of(cover, np.unique(orbit))
-        if any(each.mask[orbit].any() for each in sets):
-            continue
         for other in [each for each in merged if (each.mask & new.mask).any()]:
             merged.remove(other)
             new = new | other
@@ -294,16 +299,14 @@ def confirmed(snapshot: Snapshot) -> Snapshot | None:
     return confirmed(finer)
 
 
-def _sampled(attractor: AttractorAtPlace, count: int = 9) -> tuple[Array, Ints]:
+def _sampled(attractor: AttractorAtPlace) -> tuple[Array, Ints]:
     """States of an attractor."""
     if attractor.cells is not None:
-        cover = attractor.cells.grid
         numbers = attractor.cells.numbers()
-        numbers = numbers[:: max(1, numbers.size // 64)]
-        lo, hi, sides = cover.corners(numbers)
+        lo, hi, sides = attractor.cells.grid.corners(numbers[:: max(1, numbers.size // 64)])
         return 0.5 * (lo + hi), sides
     parts = [(side, *pair) for side, pairs in attractor.extents.items() for pair in pairs]
-    width = 1 if attractor.cycle is not None else count
+    width = 1 if attractor.cycle is not None else SAMPLED
     x = np.concatenate([np.linspace(lo, hi, width + 2)[1:-1] for _, lo, hi in parts])
     return x, np.repeat([side for side, _, _ in parts], width).astype(np.int64)
 
@@ -311,12 +314,10 @@ def _sampled(attractor: AttractorAtPlace, count: int = 9) -> tuple[Array, Ints]:
 def _label(snapshot: Snapshot, x: Any, side: Ints, reach: float) -> Ints:
     """Attractor that each state is at, -1 where it is at none."""
     label = np.full(side.size, -1)
-    if not snapshot.attractors:
-        return label
-    if snapshot.attractors[0].cells is not None:
-        for number, each in enumerate(snapshot.attractors):
-            if each.cells is not None:
-                label[each.cells.holds(x, side)] = number
+    sets = [each.cells for each in snapshot.attractors if each.cells is not None]
+    for number, cells in enumerate(sets):
+        label[cells.holds(x, side)] = number
+    if not snapshot.attractors or sets:
         return label
     away = np.stack([each.distance(x, side) for each in snapshot.attractors])
     return np.where(away.min(axis=0) <= reach, away.argmin(axis=0), -1)

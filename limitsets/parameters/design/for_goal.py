@@ -30,7 +30,6 @@ from limitsets.feeder.scene import (
     laid_goal,
     laid_goals,
     load,
-    require_rests,
     unit_of,
 )
 from limitsets.parameters.design.search import (
@@ -42,6 +41,7 @@ from limitsets.parameters.design.search import (
     bounds_of,
     design_name,
     of_the_arm,
+    require_searchable,
     said,
     scene_with,
     validity_slack,
@@ -166,11 +166,10 @@ class GoalDesign(Tabled):
 class _GoalSearch:
     """Rate designs by their room, and count what rules them out."""
 
-    def __init__(
-        self, scene: Scene, bounds: Mapping[str, tuple[float, float]], tell: Progress, of: int
-    ) -> None:
+    def __init__(self, scene: Scene, tell: Progress, of: int) -> None:
         assert isinstance(scene.goal, OrientedBeyond | Reaches)
-        self.scene, self.bounds, self.tell, self.of = scene, dict(bounds), tell, of
+        self.scene, self.tell, self.of = scene, tell, of
+        self.bounds: dict[str, tuple[float, float]] = {}
         self.x, self.side, self.laid = scene.goal.x, scene.goal.side, scene.goal.laid
         self.ruled_out, self.evaluations = Counter[str](), 0
         self.best: tuple[float, float, Scene] = (-math.inf, -math.inf, scene)
@@ -293,12 +292,8 @@ def design_for_goal(
         raise AnswerError(
             "the goal", kind, "oriented_beyond or reaches, with a side and an x", remedy, file=start.file
         )
-    require_rests(start)
-    if start.effects.on():
-        raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
-    if evaluations < 1:
-        raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
-    search = _GoalSearch(start, {}, progress or silent, evaluations)
+    require_searchable(start, evaluations)
+    search = _GoalSearch(start, progress or silent, evaluations)
     rating, room_before, why = search.rated(start)
     search.best = rating, room_before, start
     # arm and throw are set in minutes, another part is made: it varies only where they do not meet the goal
@@ -308,9 +303,8 @@ def design_for_goal(
         search.run(bounds_of(start, vary, bounds), evaluations - search.evaluations, seed)
     _, room, made = search.best
     design = load(made.as_dict() | {"name": design_name(start)})
-    reaches = Reaches(start.goal.x, start.goal.side)
-    asked = (start.goal, reaches) if isinstance(start.goal, OrientedBeyond) else (start.goal,)
-    goals = tuple(laid_goal(goal, start.goal.laid) for goal in asked)
+    fed = (Reaches(start.goal.x, start.goal.side),) if isinstance(start.goal, OrientedBeyond) else ()
+    goals = tuple(laid_goal(goal, start.goal.laid) for goal in (start.goal, *fed))
     return GoalDesign(
         scene=design,
         before=start,

@@ -7,7 +7,6 @@ an X that no orbit reaches does not count.  Search by floats (`search`), round t
 
 from __future__ import annotations
 
-import copy
 import math
 import time
 from collections import Counter
@@ -22,7 +21,7 @@ from limitsets.base import AnswerError, Progress, arguments_checked, shown_in_no
 from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import triangle
 from limitsets.feeder.goals import Goal, Laid, OrientedBeyond, Reaches
-from limitsets.feeder.scene import LaidLike, Scene, load, read_laid, require_rests
+from limitsets.feeder.scene import LaidLike, Scene, load, read_laid
 from limitsets.parameters.design.design_result import Option, RobustDesign, front_of, throws_to_feed
 from limitsets.parameters.design.search import (
     POINT,
@@ -32,6 +31,7 @@ from limitsets.parameters.design.search import (
     Ends,
     bounds_of,
     counterweight_of,
+    require_searchable,
     said,
 )
 from limitsets.parameters.margins.deviations import Signs, Tolerance
@@ -58,8 +58,8 @@ class _Best:
         self.search, self.made, self.tell, self.of = search, made, tell, of
         self.hard: list[Signs] = list(search.hard)
         self.unknowns: list[float] = []
-        self.scene: Scene | None = None
-        self.estimate: Estimate | None = None
+        self.design: tuple[Scene, Estimate] | None = None
+        self.margin = 0.0
         self.tried = 0
 
     def rate(self, unknowns: Sequence[float]) -> float:
@@ -69,15 +69,16 @@ class _Best:
         drawn = self.search.scene_of(unknowns)
         scene = None if drawn is None else self.made(drawn)
         rating, estimate = self.search.rated(scene, self._estimate)
-        if estimate is not None and (self.estimate is None or estimate.margin > self.estimate.margin):
-            self.unknowns, self.scene, self.estimate = [float(u) for u in unknowns], scene, estimate
+        if scene is not None and estimate is not None and estimate.margin > self.margin:
+            self.unknowns, self.margin = [float(u) for u in unknowns], estimate.margin
+            self.design = scene, estimate
         return rating
 
     def _estimate(self, scene: Scene) -> Estimate | None:
         """Estimate a margin; where it may be the best, on all corners."""
         about = scene, self.search.tolerance, self.search.side
         estimate = estimated(*about, hard=self.hard, steps=FINE, close=FINELY)
-        if estimate is None or not estimate.margin > (0.0 if self.estimate is None else self.estimate.margin):
+        if estimate is None or not estimate.margin > self.margin:
             return estimate
         new = [signs for signs in failing(*about, estimate, estimate.margin) if signs not in self.hard]
         self.hard[:0] = new
@@ -118,7 +119,7 @@ def polished(
         best.rate(row)
     for number, edge in enumerate(EDGES):
         share = (evaluations - best.tried) // (len(EDGES) - number)
-        if best.estimate is None or share < 1:
+        if best.design is None or share < 1:
             break
         minimize(
             lambda row: -best.rate(row),
@@ -128,9 +129,7 @@ def polished(
             options={"initial_simplex": _simplex(best.unknowns, edge), "maxfev": share, "adaptive": True},
         )
     search.evaluations += best.tried
-    if best.scene is None or best.estimate is None:
-        return None
-    return best.scene, best.estimate
+    return best.design
 
 
 def _simplex(corner: Sequence[float], edge: float) -> Array:
@@ -239,7 +238,7 @@ def _searched(
 
 
 def _with_purpose(scene: Scene, x: float, side: int, tolerance: Mapping[str, str], name: str) -> Scene:
-    tree = copy.deepcopy(scene.as_dict())
+    tree = scene.as_dict()
     tree["name"] = name
     place = f"{x:.{DECIMALS_OF_X}f} {scene.unit}"
     tree["goal"] = {"oriented_beyond": {"x": place, "side": side}}
@@ -348,9 +347,8 @@ def robust_design(
     ('paper-designed-robust', 2)
     """
     start = load(scene)
+    require_searchable(start, evaluations)
     on = _side(start, side)
-    if evaluations < 1:
-        raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
     ranges = read_laid(start, laid)
     orders, everywhere = orders and not ranges, everywhere and not ranges
     tell = progress or silent
@@ -382,8 +380,8 @@ def robust_design(
         for one in searches:
             one.better = better
     search, population = _searched(searches, evaluations, seed, tell)
-    polish = max(evaluations // POLISH, 1)
-    best = polished(search, population[:POLISHED], partial(search.rounded, decimals=DECIMALS), polish, tell)
+    made_so = partial(search.rounded, decimals=DECIMALS)
+    best = polished(search, population[:POLISHED], made_so, max(evaluations // POLISH, 1), tell)
     if best is None:
         raise _none_feeds(searches, search, population[0], f"{start.name}-robust")
     made, estimate = best
@@ -442,9 +440,6 @@ def _proved(
 
 
 def _side(scene: Scene, side: int | None) -> int:
-    require_rests(scene)
-    if scene.effects.on():
-        raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
     asked = side if side is not None else getattr(scene.goal, "side", len(scene.sides) - 1)
     if not 0 <= asked < len(scene.sides):
         raise AnswerError("the side", asked, f"0 to {len(scene.sides) - 1}", "name a side of this part")

@@ -21,7 +21,7 @@ from limitsets.base import AnswerError, Progress, SceneError
 from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import plate_with_points, side_ends
 from limitsets.feeder.geometry.polygon import above_side
-from limitsets.feeder.scene import Scene, in_units_of
+from limitsets.feeder.scene import Scene, in_units_of, require_rests
 from limitsets.feeder.scene.quantities import find
 from limitsets.feeder.thrower.assumed_box import assumed
 from limitsets.parameters.margins.deviations import Signs, Tolerance
@@ -244,15 +244,15 @@ def _own(scene: Scene, name: str) -> tuple[float, float]:
     dimension, value = find(name).dimension, scene.value(name)
     corners, size = scene.vertices, float(scene.sides.length.mean())
     half, twice = sorted((0.5 * value, 2.0 * value))
-    if name == "throw.speed" and scene.gravity is not None:
-        lo, hi = (math.sqrt(scene.gravity / (end * size)) for end in reversed(USUAL["throw.kappa"]))
+    if name == "throw.kappa" or (name == "throw.speed" and scene.gravity is not None):
+        lo, hi = (end * size for end in USUAL["throw.kappa"])
+        if name == "throw.speed" and scene.gravity is not None:
+            lo, hi = math.sqrt(scene.gravity / hi), math.sqrt(scene.gravity / lo)
         return lo if lo <= value else half, hi if value <= hi else twice
     if name in USUAL:
         on = int(scene.text["part"]["mass"].get("center", {}).get("side", 0))
         own = float(scene.sides.length[on]) if name.endswith("along") else size
         lo, hi = (end * own for end in USUAL[name])
-        if name == "throw.kappa":
-            return lo if lo <= value else half, hi if value <= hi else twice
         return min(lo, value), max(hi, value)
     if name.startswith("part.mass.points") and name[-1] in "xy":
         axis = "xy".index(name[-1])
@@ -413,9 +413,8 @@ class DesignSearch:
         """Move a population for so many evaluations; the population and its ratings, the best first."""
         from scipy.optimize import differential_evolution
 
-        end, step = self.evaluations + max(evaluations, 1), 0
-        begin = self.evaluations
-        while self.evaluations < end:
+        begin, step = self.evaluations, 0
+        while self.evaluations < begin + max(evaluations, 1):
             evolution = differential_evolution(
                 lambda unknowns: -self.rate(unknowns),
                 [(0.0, 1.0)] * len(self.bounds),
@@ -433,6 +432,15 @@ class DesignSearch:
             self.harden(population[0])
             tell("designs", self.evaluations - begin, evaluations)
         return population, ratings
+
+
+def require_searchable(scene: Scene, evaluations: int) -> None:
+    """Refuse a part that does not rest, a scene with effects, and a search that looks at nothing."""
+    require_rests(scene)
+    if scene.effects.on():
+        raise AnswerError("the scene", "with effects on", "the minimal model", "switch its effects off")
+    if evaluations < 1:
+        raise AnswerError("the evaluations", evaluations, "1 or more", "allow for some designs")
 
 
 def design_name(start: Scene) -> str:

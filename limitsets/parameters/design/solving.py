@@ -407,24 +407,23 @@ class _Model:
         self.search, self.base = search, base
         self.kept = KEPT * float(np.ptp(search.scene.vertices, axis=0).max())
 
-    def look(self, seen: Array) -> tuple[Trial, bool]:
-        trial = self.search.at(seen)
-        self.base = trial or self.base
-        return self.base, trial is not None
+    def look(self, seen: Array) -> Trial:
+        self.base = self.search.at(seen) or self.base
+        return self.base
 
     def x(self, seen: Array) -> Array:
-        base, _ = self.look(seen)
+        base = self.look(seen)
         return np.asarray(base.x + base.slope @ (seen - base.at) - self.search.wanted)
 
     def x_slope(self, seen: Array) -> Array:
-        return self.look(seen)[0].slope
+        return self.look(seen).slope
 
     def slack(self, seen: Array) -> Array:
-        base, _ = self.look(seen)
+        base = self.look(seen)
         return np.asarray(base.jacobian.slack + self.slack_slope(seen) @ (seen - base.at) - self.kept)
 
     def slack_slope(self, seen: Array) -> Array:
-        base, _ = self.look(seen)
+        base = self.look(seen)
         return np.asarray(base.jacobian.slack_matrix * self.search.rates(base.jacobian))
 
 
@@ -449,8 +448,7 @@ def nearest_to_targets(search: TrialLog, start: Trial) -> Trial:
     worst = 10.0 * start.square_from(search.wanted)
 
     def cost(seen: Array) -> float:
-        _, there = model.look(seen)
-        return float((model.x(seen) ** 2).sum()) if there else worst
+        return worst if search.at(seen) is None else float((model.x(seen) ** 2).sum())
 
     def slope(seen: Array) -> Array:
         return np.asarray(2.0 * model.x(seen) @ model.x_slope(seen))

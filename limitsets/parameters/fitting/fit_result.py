@@ -165,12 +165,17 @@ class Fit(Tabled):
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        rows = [(each.name, each.value, (each.lo, each.hi), each.unit) for each in self.quantities]
-        for name, each, factor, unit in (
+        scatters = (
             ("scatter of throw.speed", self.speed, 100.0, "%"),
             ("scatter of landing.x", self.landing, 1.0, self.scene.unit),
-        ):
-            rows.append((name, factor * each.value, (factor * each.lo, factor * each.hi), unit))
+        )
+        rows = [
+            *((each.name, each.value, (each.lo, each.hi), each.unit) for each in self.quantities),
+            *(
+                (name, factor * each.value, (factor * each.lo, factor * each.hi), unit)
+                for name, each, factor, unit in scatters
+            ),
+        ]
         columns = (
             "quantity",
             Column("value", show=_number),
@@ -252,8 +257,8 @@ def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: Scatter, l
     length, rate = (each.value or each.hi for each in (landing, speed))
     scatter = {}
     if math.isfinite(length):
-        of_places = unit_of(given, "landing.x")
-        scatter["landing"] = f"{rounded_up(in_unit_of(given, 'landing.x', length))} {of_places}"
+        size, unit = in_unit_of(given, "landing.x", length), unit_of(given, "landing.x")
+        scatter["landing"] = f"{rounded_up(size)} {unit}"
     if rate < MOST:
         scatter["speed"] = f"{rounded_up(100.0 * rate)} %"
     tree["world"] = {**tree.get("world", {}), "scatter": scatter}
@@ -345,12 +350,14 @@ def enough(found: Fit, *, width: float = 0.02, progress: Progress | None = None)
         "landing.x": (SIGMAS * found.landing.value, SIGMAS * found.landing.hi),
     }
     units = {"throw.speed": "%", "landing.x": unit}
-    margins, sentences, verdicts = [], [], []
-    for name, sizes in repeats.items():
-        (one,) = margin(scene, name, reading="per-throw", width=width, progress=progress)
-        margins.append(one)
-        verdicts.append(_judged(one, *sizes))
-        sentences.append(_sentence(name, one, sizes, units[name], verdicts[-1]))
+    margins = [
+        margin(scene, name, reading="per-throw", width=width, progress=progress)[0] for name in repeats
+    ]
+    verdicts = [_judged(one, *sizes) for one, sizes in zip(margins, repeats.values(), strict=True)]
+    sentences = [
+        _sentence(name, one, sizes, units[name], verdict)
+        for (name, sizes), one, verdict in zip(repeats.items(), margins, verdicts, strict=True)
+    ]
     if all(each.refuted == 0 for each in margins):
         sentences = ["Without any scatter an orbit of the fitted machine violates the goal: not enough."]
     noise = {

@@ -142,9 +142,12 @@ def _errors(film: Throws, error: float | str | None, scene: Scene) -> tuple[bool
     column = bool(np.isfinite(film.error).all())
     if error is not None:
         if column:
-            remedy = "leave --error or the column out"
             raise DataError(
-                "the error", "given twice", "an option or a column", remedy, file=film.file or None
+                "the error",
+                "given twice",
+                "an option or a column",
+                "leave --error or the column out",
+                file=film.file or None,
             )
         return True, np.full(len(film), length_of(error, scene, "the error"))
     if column:
@@ -196,7 +199,6 @@ def _answer(
     # where no error is known the gain of further throws is computed with all scatter as one
     error = own.rows.error if own.rows.known else np.full(len(throws), landing.value / math.sqrt(2.0))
     units = dict(zip(names, units_of_change(new, names).tolist(), strict=True))
-    scatter = (speed.value, landing.value)
     misread, misread_rate = _misread(own.rows, len(scene.sides))
     return Fit(
         scene=new,
@@ -214,7 +216,9 @@ def _answer(
         explained=remark,
         residuals=throws.x_after - told.after[0],
         deviations=np.sqrt(told.variance(own.rows.error, values[-2], loose)[0]),
-        further=further_throws(throws, own.rows.side, error, scene=new, units=units, scatter=scatter),
+        further=further_throws(
+            throws, own.rows.side, error, scene=new, units=units, scatter=(speed.value, landing.value)
+        ),
         seconds=time.perf_counter() - begin,
         likelihood=own,
         best=best,

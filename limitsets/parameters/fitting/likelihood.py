@@ -230,16 +230,9 @@ SHARPEST = 1e-7
 SCATTERS = 2
 
 
-class Whitened(NamedTuple):
-    """Landings less what is predicted, as independent numbers of variance 1, and the logarithms of their variances."""
-
-    residual: Array
-    log_variance: Array
-
-
 def whitened(
     rows: Rows, told: Predicted, speed: Array, landing: Array, miss: Array | None = None
-) -> Whitened:
+) -> tuple[Array, Array]:
     """Take the landings apart into independent numbers; `miss` stands in for the residuals where it is given.
 
     Parameters
@@ -252,6 +245,11 @@ def whitened(
         Scatter of the speed [share] and of landings [length].
     miss : ndarray, shape (m, n), optional
         Instead of what was measured less what is predicted [length].
+
+    Returns
+    -------
+    residual, log_variance : ndarray, shape (m, n)
+        Independent numbers of variance 1, and the logarithms of the variances that they had.
     """
     variance = told.variance(rows.error, speed, landing)
     # with the landing of the row before
@@ -264,7 +262,7 @@ def whitened(
             share = covariance[:, k] / variance[:, k - 1]
             variance[:, k] -= share * covariance[:, k]
             residual[:, k] -= share * residual[:, k - 1]
-    return Whitened(residual / np.sqrt(variance), np.log(variance))
+    return residual / np.sqrt(variance), np.log(variance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,10 +293,6 @@ class Likelihood:
         numbers[:, -SCATTERS:] = np.abs(numbers[:, -SCATTERS:])
         return numbers
 
-    def at(self, values: Array) -> Array:
-        """Return the numbers at which quantities and scatters have these values."""
-        return (np.asarray(values) - self.centre) / self.scale
-
     def told(self, values: Array) -> Predicted:
         """Return what is predicted at m points."""
         points = dict(zip(self.names, values.T[: len(self.names)], strict=True))
@@ -323,9 +317,9 @@ class Likelihood:
         speed, landing = values[:, -2:-1], values[:, -1:]
         landing = np.sqrt(landing**2 + (SHARPEST * self.scene.arm_length) ** 2)
         with np.errstate(all="ignore"):  # where the part does not fly; those points are refused
-            white = whitened(self.rows, told, speed, landing)
+            residual, log_variance = whitened(self.rows, told, speed, landing)
             decided = log_ndtr(self.decision(told, speed, landing))
-            rows = decided - 0.5 * (white.residual**2 + white.log_variance + np.log(2.0 * np.pi))
+            rows = decided - 0.5 * (residual**2 + log_variance + np.log(2.0 * np.pi))
             total = np.where(told.possible[:, 0], rows.sum(axis=1), -np.inf)
         return np.where(np.isfinite(total), total, -np.inf)
 

@@ -8,9 +8,11 @@ beyond what the fitted quantities can take up (F test)?
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
+from operator import attrgetter, mul
 from typing import NamedTuple
 
 import numpy as np
@@ -84,12 +86,12 @@ def misfit_of(scene: Scene, start: Start) -> Misfit:
     per_share = max(float(np.median(np.abs(told.per_log_speed))), 1e-12)
     speed, landing = (each.reshape(-1, 1) for each in np.meshgrid(sizes / per_share, sizes))
     landing = np.hypot(landing, 1e-7 * scene.arm_length)
-    tried = whitened(rows, told, speed, landing)
-    loss = np.minimum(tried.residual**2, NAMED**2) + tried.log_variance
+    residual, log_variance = whitened(rows, told, speed, landing)
+    loss = np.minimum(residual**2, NAMED**2) + log_variance
     k = [int(np.argmin(loss.sum(axis=1)))]
 
     def white(miss: Array | None) -> Array:
-        return np.asarray(whitened(rows, told, speed[k], landing[k], miss).residual[0])
+        return np.asarray(whitened(rows, told, speed[k], landing[k], miss)[0][0])
 
     columns = np.stack([white(column[None]) for column in slopes.T], axis=1)
     throws = rows.throws
@@ -192,32 +194,31 @@ CLOSE = 0.05
 WORST = 1e12
 
 
-class Explanation(NamedTuple):
-    """How a film has to be read.
+class Reading(NamedTuple):
+    """Throws read in another way.
 
     Attributes
     ----------
     said : str
-        What explains it, and what to do.
+        What that way explains, and what to do.
+    throws : Throws
+        The same numbers, read so.
+    scale : float
+        By how much places were scaled.
     fitted : bool
         Whether it is an origin or a scale, which was fitted; else a plain mistake.
     """
 
     said: str
-    fitted: bool
-
-
-class _Reading(NamedTuple):
-    """Throws read in another way, what that means, and by how much places were scaled."""
-
-    said: str
     throws: Throws
     scale: float = 1.0
+    fitted: bool = False
 
 
 class _Judged(NamedTuple):
-    """Minus the logarithm of the likelihood of landings and sides, and the robust fit; infinite without a fit."""
+    """A reading, minus the logarithm of its likelihood (landings and sides), its robust fit; infinite without a fit."""
 
+    reading: Reading
     cost: float
     start: Start | None
 
@@ -270,7 +271,7 @@ def explained(
 
 def explanation(
     scene: Scene, throws: Throws, error: Array, known: bool, start: Start | None
-) -> Explanation | None:
+) -> Reading | None:
     """Find the other reading that explains a film.
 
     Parameters
@@ -285,7 +286,7 @@ def explanation(
         The robust fit of the film as it stands; None where there is none.
     """
 
-    def suits(reading: _Reading) -> float:
+    def suits(reading: Reading) -> float:
         """Return the cost of a reading with the scene as it is."""
         rows = _rows(scene, reading, error, known)
         if rows is None:
@@ -293,121 +294,135 @@ def explanation(
         values = {name: scene.value(name) for name in quantities_of(scene)}
         return _cost(scene, assigned(rows, scene, values, _rough(scene)), values, reading.scale)
 
-    def fitted(reading: _Reading) -> _Judged:
+    def fitted(reading: Reading) -> _Judged:
         """Return the cost of a reading at its best."""
-        rows, own = _rows(scene, reading, error, known), None
+        rows = _rows(scene, reading, error, known)
         with suppress(DataError):
             own = None if rows is None else robust_start(scene, rows)
-        if own is None or doubtful(scene, own):
-            return _Judged(math.inf, None)
-        return _Judged(_cost(scene, own.rows, own.known, reading.scale), own)
+            if own is not None and not doubtful(scene, own):
+                return _Judged(reading, _cost(scene, own.rows, own.known, reading.scale), own)
+        return _Judged(reading, math.inf, None)
 
     now = math.inf if start is None else _cost(scene, start.rows, start.known, 1.0)
-    judged = [(reading, fitted(reading)) for reading in sorted(_readings(scene, throws), key=suits)[:FITTED]]
-    plain, best = min(judged, key=lambda pair: pair[1].cost)
-    gained = best.start is not None and now - best.cost > EACH * len(throws)
-    if gained and _holds(scene, best):
-        return Explanation(plain.said, False)
-    judged = [_closest(suits, fitted, make, grid) for make, grid in _families(scene, throws)]
-    reading, least = min(judged, key=lambda pair: pair[1].cost)
-    if now - least.cost > IN_ALL and _holds(scene, least):
-        return Explanation(reading.said, True)
-    return Explanation(plain.said, False) if gained and best.cost < least.cost else None
+    suited = sorted(_readings(scene, throws), key=suits)[:FITTED]
+    plain = min(map(fitted, suited), key=attrgetter("cost"))
+    gained = plain.start is not None and now - plain.cost > EACH * len(throws)
+    if gained and _holds(scene, plain):
+        return plain.reading
+    closest = (_closest(suits, fitted, make, grid) for make, grid in _families(scene, throws))
+    moved = min(closest, key=attrgetter("cost"))
+    if now - moved.cost > IN_ALL and _holds(scene, moved):
+        return moved.reading
+    return plain.reading if gained and plain.cost < moved.cost else None
 
 
-def _readings(scene: Scene, throws: Throws) -> Iterator[_Reading]:
+def _placed(said: str, throws: Throws, place: Callable[[Array], Array], scale: float = 1.0) -> Reading:
+    """Read each place as another one."""
+    return Reading(
+        said, replace(throws, x_before=place(throws.x_before), x_after=place(throws.x_after)), scale
+    )
+
+
+def _readings(scene: Scene, throws: Throws) -> list[Reading]:
     """Read the same numbers in other ways, none of which has a number to be fitted."""
-    x, y, i, j = throws.x_before, throws.x_after, throws.side_before, throws.side_after
-    swapped = replace(throws, x_before=y, x_after=x)
-    names = "corner" if throws.corner else "x"
-    yield _Reading(
-        "before and after are exchanged: exchange the names of these columns",
-        replace(swapped, side_before=j, side_after=i),
-    )
-    yield _Reading(
-        f"the columns {names}_before and {names}_after are exchanged: exchange their names",
-        swapped,
-    )
-    yield _Reading(
-        "the columns side_before and side_after are exchanged: exchange their names",
-        replace(throws, side_before=j, side_after=i),
-    )
-    yield from _other_sides(len(scene.sides), throws)
-    unit = throws.unit or scene.unit
-    for other in UNITS["length"]:
-        if other != unit:
-            factor = float(exact_factor(other, unit))
-            yield _Reading(
+    unit, arm, length = throws.unit or scene.unit, scene.arm_length, scene.sides.length
+    factors = {other: float(exact_factor(other, unit)) for other in UNITS["length"] if other != unit}
+    sides = throws.side_before, throws.side_after
+    name = "corner" if throws.corner else "x"
+    what, columns = ("the centre of mass", "x") if throws.corner else ("the left corner", "corner")
+    swapped = replace(throws, x_before=throws.x_after, x_after=throws.x_before)
+    readings = [
+        Reading(
+            "before and after are exchanged: exchange the names of these columns",
+            replace(swapped, side_before=sides[1], side_after=sides[0]),
+        ),
+        Reading(
+            f"the columns {name}_before and {name}_after are exchanged: exchange their names",
+            swapped,
+        ),
+        Reading(
+            "the columns side_before and side_after are exchanged: exchange their names",
+            replace(throws, side_before=sides[1], side_after=sides[0]),
+        ),
+        *_other_sides(len(scene.sides), throws),
+        *(
+            _placed(
                 f"the places are in {other}: write [{other}] for [{unit}] in the header",
-                replace(throws, x_before=x * factor, x_after=y * factor),
+                throws,
+                partial(mul, factor),
                 factor,
             )
-    what, columns = ("the centre of mass", "x") if throws.corner else ("the left corner", "corner")
-    yield _Reading(
-        f"the places are those of {what}: name their columns {columns}_before and {columns}_after",
-        replace(throws, corner=not throws.corner),
-    )
-    arm = scene.arm_length
-    yield _Reading(
-        "the places are measured from the arm's end: subtract them from the arm's length",
-        replace(throws, x_before=arm - x, x_after=arm - y),
-    )
-    if max(i.max(), j.max()) < len(scene.sides):
-        length = scene.sides.length
-        yield _Reading(
+            for other, factor in factors.items()
+        ),
+        Reading(
+            f"the places are those of {what}: name their columns {columns}_before and {columns}_after",
+            replace(throws, corner=not throws.corner),
+        ),
+        _placed(
+            "the places are measured from the arm's end: subtract them from the arm's length",
+            throws,
+            lambda place: arm - place,
+        ),
+    ]
+    if max(map(np.max, sides)) < len(scene.sides):
+        said = (
             "the places are those of the right corner: subtract the length of the side that the part rests on, and"
-            " name their columns corner_before and corner_after",
-            replace(throws, x_before=x - length[i], x_after=y - length[j], corner=True),
+            " name their columns corner_before and corner_after"
         )
+        places = (throws.x_before - length[sides[0]], throws.x_after - length[sides[1]])
+        readings.append(Reading(said, replace(throws, x_before=places[0], x_after=places[1], corner=True)))
+    return readings
 
 
-def _other_sides(count: int, throws: Throws) -> Iterator[_Reading]:
+def _other_sides(count: int, throws: Throws) -> list[Reading]:
     """Count the sides from another one, or the other way round."""
     both = np.stack([throws.side_before, throws.side_after])
-
-    def counted(sides: Ints, said: str) -> _Reading:
-        return _Reading(said, replace(throws, side_before=sides[0], side_after=sides[1]))
-
+    ways = []
     if both.max() < count or (both.min() >= 1 and both.max() == count):
-        yield counted(
-            (both - 1) % count,
-            "the sides are counted from 1: subtract 1, the scene has them from 0",
-        )
+        ways.append(("the sides are counted from 1: subtract 1, the scene has them from 0", both - 1))
     if both.max() < count:
-        for first in range(2, count):
-            said = f"the side that the scene calls 0 is called {first}: count the sides as the scene does"
-            yield counted((both - first) % count, said)
-        for first in range(count):
-            said = f"the sides are counted against the flip order, from side {first}: count them as the scene does"
-            yield counted((first - both) % count, said)
+        ways += [
+            (f"the side that the scene calls 0 is called {k}: count the sides as the scene does", both - k)
+            for k in range(2, count)
+        ]
+        ways += [
+            (
+                f"the sides are counted against the flip order, from side {k}: count them as the scene does",
+                k - both,
+            )
+            for k in range(count)
+        ]
+    return [
+        Reading(said, replace(throws, side_before=sides[0] % count, side_after=sides[1] % count))
+        for said, sides in ways
+    ]
 
 
-Family = tuple[Callable[[float], _Reading], Array]
+Family = tuple[Callable[[float], Reading], Array]
 
 
 def _families(scene: Scene, throws: Throws) -> tuple[Family, Family]:
     """Move the origin of places, and scale them."""
-    x, y, unit = throws.x_before, throws.x_after, scene.unit
 
-    def moved(by: float) -> _Reading:
-        size = f"{abs(by):.2g} {unit} too {'small' if by > 0 else 'large'}"
+    def moved(by: float) -> Reading:
+        size = f"{abs(by):.2g} {scene.unit} too {'small' if by > 0 else 'large'}"
         said = f"places seem to be {size}: measure them from the joint"
-        return _Reading(said, replace(throws, x_before=x + by, x_after=y + by))
+        return _placed(said, throws, lambda place: place + by)._replace(fitted=True)
 
-    def scaled(log: float) -> _Reading:
+    def scaled(log: float) -> Reading:
         factor = math.exp(log)
         said = f"the scale of places seems to be wrong: multiply each place by {factor:.4g}"
-        return _Reading(said, replace(throws, x_before=x * factor, x_after=y * factor), factor)
+        return _placed(said, throws, lambda place: place * factor, factor)._replace(fitted=True)
 
     return (moved, ORIGINS * scene.arm_length), (scaled, np.log(SCALES))
 
 
 def _closest(
-    suits: Callable[[_Reading], float],
-    fitted: Callable[[_Reading], _Judged],
-    make: Callable[[float], _Reading],
+    suits: Callable[[Reading], float],
+    fitted: Callable[[Reading], _Judged],
+    make: Callable[[float], Reading],
     grid: Array,
-) -> tuple[_Reading, _Judged]:
+) -> _Judged:
     """Look for the best of a family of readings: on a grid by the scene as it is, then by fits near the best."""
     from scipy.optimize import minimize_scalar
 
@@ -419,8 +434,7 @@ def _closest(
         method="bounded",
         options={"maxiter": STEPS},
     )
-    reading = make(float(best.x))
-    return reading, fitted(reading)
+    return fitted(make(float(best.x)))
 
 
 def _holds(scene: Scene, judged: _Judged) -> bool:
@@ -432,7 +446,7 @@ def _rough(scene: Scene) -> float:
     return CLOSE * float(np.mean(scene.sides.length))
 
 
-def _rows(scene: Scene, reading: _Reading, error: Array, known: bool) -> Rows | None:
+def _rows(scene: Scene, reading: Reading, error: Array, known: bool) -> Rows | None:
     """Return the rows of a reading; None where it has sides that the part does not have, or places off the arm."""
     if impossible(scene, reading.throws).any():
         return None

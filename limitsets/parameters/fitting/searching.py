@@ -193,15 +193,18 @@ def _require_flight(scene: Scene, rows: Rows) -> None:
     strange = np.flatnonzero(np.maximum(throws.side_before, throws.side_after) >= count)
     if strange.size:
         k = int(strange[0])
-        sides = f"{throws.side_before[k]} and {throws.side_after[k]}"
-        allowed = f"sides of this part, 0 to {count - 1}"
-        raise DataError("the sides", sides, allowed, "count them in flip order", key=f"row {throws.row[k]}")
+        raise DataError(
+            "the sides",
+            f"{throws.side_before[k]} and {throws.side_after[k]}",
+            f"sides of this part, 0 to {count - 1}",
+            "count them in flip order",
+            key=f"row {throws.row[k]}",
+        )
     least = np.zeros(len(throws)) if throws.corner else scene.sides.a[throws.side_before]
     short = np.flatnonzero(throws.x_before <= least)
     if short.size:
         k, unit = int(short[0]), scene.unit
-        side = int(throws.side_before[k])
-        beyond = f"beyond the left vertex of side {side}, above {least[k]:.4g} {unit}"
+        beyond = f"beyond the left vertex of side {throws.side_before[k]}, above {least[k]:.4g} {unit}"
         raise DataError(
             "the place before", f"{throws.x_before[k]:g} {unit}",
             "beyond the joint, above 0" if throws.corner else beyond,

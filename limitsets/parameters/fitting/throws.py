@@ -28,6 +28,10 @@ SLACK = 0.05
 # With fewer throws nothing is left to judge the fit by.
 LEAST_ROWS = 8
 
+_HEADER = (
+    "x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run; corner_before, "
+    "corner_after for x_before, x_after where the left corner was read"
+)
 _HEAD = re.compile(r"\s*([A-Za-z_]+)\s*(?:\[\s*([^\]]*?)\s*\])?\s*")
 
 
@@ -125,18 +129,23 @@ def throws_in(file: str | Path, scene: Scene, *, anywhere: bool = False) -> Thro
     """Read throws; `anywhere` takes places off the arm and sides that the part does not have, too."""
     name = str(file).encode("utf-8", "backslashreplace").decode()  # what no terminal can print
     rows = _rows(Path(file), name)
-    heads = _heads(rows[0][1], name) if rows else {}
     if not rows:
-        raise DataError("the file", "empty", _header(), "write a header and a row for each throw", file=name)
+        raise DataError("the file", "empty", _HEADER, "write a header and a row for each throw", file=name)
+    heads = _heads(rows[0][1], name)
     values: dict[str, list[float | str]] = {column: [] for column in heads}
     lines = []
     for line, cells in rows[1:]:
         if not any(cell.strip() for cell in cells):
             continue
         if len(cells) != len(heads):
-            allowed = f"{len(heads)}, one for each column"
-            remedy = "correct the row; decimals have a point"
-            raise DataError("the number of cells", len(cells), allowed, remedy, key=f"row {line}", file=name)
+            raise DataError(
+                "the number of cells",
+                len(cells),
+                f"{len(heads)}, one for each column",
+                "correct the row; decimals have a point",
+                key=f"row {line}",
+                file=name,
+            )
         lines.append(line)
         for (column, (head, unit)), cell in zip(heads.items(), cells, strict=True):
             key = f"row {line}, column {head}"
@@ -147,33 +156,24 @@ def throws_in(file: str | Path, scene: Scene, *, anywhere: bool = False) -> Thro
                 )
     if len(lines) < LEAST_ROWS:
         raise DataError("the number of throws", len(lines), f"{LEAST_ROWS} at least", "film more", file=name)
-    error = values.get("error", [np.nan] * len(lines))
-    units = {unit for column, (_, unit) in heads.items() if column in (*PLACES, *CORNERS)}
-    return _throws(
-        values, [float(each) for each in error], lines, name, units.pop() if len(units) == 1 else ""
-    )
-
-
-def _throws(
-    values: dict[str, list[float | str]], error: list[float], lines: list[int], name: str, unit: str
-) -> Throws:
     run = np.array(values.get("run", lines), dtype=object)
     follows = np.zeros(len(lines), dtype=bool)
     follows[1:] = (run[1:] == run[:-1]) & (run[1:] != "")
     corner = CORNERS[0] in values
     before, after = (np.array(values[each], dtype=np.float64) for each in (CORNERS if corner else PLACES))
     start, end = (np.array(values[each], dtype=np.int64) for each in SIDES)
+    units = {unit for column, (_, unit) in heads.items() if column in (*PLACES, *CORNERS)}
     return Throws(
         x_before=before,
         side_before=start,
         x_after=after,
         side_after=end,
-        error=np.array(error),
+        error=np.array(values.get("error", [np.nan] * len(lines)), dtype=np.float64),
         follows=follows,
         row=np.array(lines),
         file=name,
         corner=corner,
-        unit=unit,
+        unit=units.pop() if len(units) == 1 else "",
     )
 
 
@@ -198,13 +198,6 @@ def _rows(path: Path, name: str) -> list[tuple[int, list[str]]]:
         ) from None
 
 
-def _header() -> str:
-    return (
-        "x_before [mm], side_before, x_after [mm], side_after, and, if known, error [mm], run; corner_before, "
-        "corner_after for x_before, x_after where the left corner was read"
-    )
-
-
 def _heads(cells: Sequence[str], name: str) -> dict[str, tuple[str, str]]:
     """Read the header: column, its text, its unit."""
     heads: dict[str, tuple[str, str]] = {}
@@ -217,14 +210,13 @@ def _heads(cells: Sequence[str], name: str) -> dict[str, tuple[str, str]]:
             remedy = "name it so, or leave it out; commas separate columns"
             if near:
                 remedy = f"did you mean '{near[0]}{' [mm]' if near[0] in WITH_UNIT else ''}'?"
-            raise DataError("the column", shown(cell), _header(), remedy, key="row 1", file=name)
+            raise DataError("the column", shown(cell), _HEADER, remedy, key="row 1", file=name)
         if column in heads:
             raise DataError("the column", column, "each column once", "leave one out", key=key, file=name)
         if column in WITH_UNIT:
-            units = ", ".join(UNITS["length"])
             if unit is None or unit not in UNITS["length"]:
-                remedy = f'write it like "{column} [mm]"'
-                raise DataError("the unit", unit, f"one of {units}", remedy, key=key, file=name)
+                allowed, remedy = f"one of {', '.join(UNITS['length'])}", f'write it like "{column} [mm]"'
+                raise DataError("the unit", unit, allowed, remedy, key=key, file=name)
         elif unit is not None:
             raise DataError("the unit", unit, "none in this column", "leave it out", key=key, file=name)
         heads[column] = (cell.strip(), unit or "")
@@ -236,7 +228,7 @@ def _heads(cells: Sequence[str], name: str) -> dict[str, tuple[str, str]]:
         )
     for column in (*(CORNERS if corners else PLACES), *SIDES):
         if column not in heads:
-            raise DataError("the column", f"{column} missing", _header(), "add it", key="row 1", file=name)
+            raise DataError("the column", f"{column} missing", _HEADER, "add it", key="row 1", file=name)
     return heads
 
 
@@ -260,8 +252,14 @@ def _cell(cell: str, column: str, unit: str, key: str, scene: Scene, name: str) 
     try:
         value = convert(parse(f"{text} {unit}", "length"), scene.unit)
     except SceneError:
-        allowed = "a decimal number, its unit in the header"
-        raise DataError("the number", shown(text), allowed, "correct it", key=key, file=name) from None
+        raise DataError(
+            "the number",
+            shown(text),
+            "a decimal number, its unit in the header",
+            "correct it",
+            key=key,
+            file=name,
+        ) from None
     if column == "error" and value <= 0:
         raise DataError("the error", shown(text), "above 0", "give a standard deviation", key=key, file=name)
     return value
