@@ -16,7 +16,7 @@ from limitsets.feeder.thrower import Energy, Exact, Signed, SmallAngle
 from limitsets.systems.cells import Domain, as_domain
 from limitsets.systems.maps import along, critical_points, monotone_pieces, turning_points
 from limitsets.systems.maps.critical import margins
-from limitsets.systems.maps.drivers import CHUNK, orbit_with_exponent
+from limitsets.systems.maps.growth import CHUNK, orbit_with_exponent
 from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 # ----------------------------------------------------------------
