@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, overload
 
 import numba
+from numba import extending
 from numba.core import codegen, config
 from numba.core.errors import NumbaError
 from numba.core.registry import cpu_target
@@ -48,7 +49,15 @@ _use_widest_vectors()
 _COMMON = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 ESTIMATE = {**_COMMON, "fastmath": {"contract"}}
 PROOF = {**_COMMON, "fastmath": False}
-OVERLOAD = ("error_model", "fastmath", "no_cfunc_wrapper")  # what an overload takes of these
+
+
+def overloaded(
+    stub: Callable[..., Any], choose: Callable[..., Any], *, proof: bool = False, inlined: bool = True
+) -> None:
+    """Let compiled code run, in place of a function, what `choose` gives for the types of its arguments."""
+    given = PROOF if proof else ESTIMATE
+    options = {key: given[key] for key in ("error_model", "fastmath", "no_cfunc_wrapper")}
+    extending.overload(stub, jit_options={**options, "forceinline": inlined}, strict=False)(choose)
 
 
 # ----------------------------------------------------------------
