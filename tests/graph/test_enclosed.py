@@ -226,16 +226,6 @@ def test_images_hold_for_every_parameter_of_a_box(low, high, domain, cells):
         assert holds(graph, params, points if len(domain) > 1 else points[:, 0])
 
 
-def test_the_attractor_continues_over_a_box_of_parameters():
-    low, high = ls.maps.Logistic(3.19), ls.maps.Logistic(3.21)
-    graph = ls.transitions(low, ls.grid([(0, 1)], cells=4096), method="boxes", upper=high)
-    (block,) = attracting(graph)
-    assert is_forward_invariant(graph, block)
-    for r in (3.19, 3.2, 3.21):
-        last = ls.orbit(ls.maps.Logistic(r), 0.3, 0, 999).x[-2:]
-        assert np.isin(graph.grid.index(last, 0), block.numbers()).all()
-
-
 @pytest.mark.parametrize("upper", [ls.maps.Logistic(3.0), ls.maps.Cubic(4.0)])
 def test_an_upper_corner_that_is_none_is_refused(upper):
     with pytest.raises(AnswerError, match="upper corner"):
