@@ -24,51 +24,46 @@ from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState
 
 
 TURN = math.sqrt(3.0) / 2.0
+LONG = 2 * CHUNK + 8  # even, for the cycle of period 2; the exponent alone goes on in parts of `CHUNK` steps
 EXPONENTS = {
-    "doubling": (maps.Doubling(), 0.3, 10_000, math.log(2.0), 1e-12),
-    "beta": (maps.Doubling(1.7), 0.3, 10_000, math.log(1.7), 1e-12),
-    "rotation": (maps.Rotation(), 0.3, 10_000, 0.0, 0.0),
+    "doubling": (maps.Doubling(), 0.3, LONG, math.log(2.0), 1e-12),
+    "beta": (maps.Doubling(1.7), 0.3, LONG, math.log(1.7), 1e-12),
+    "rotation": (maps.Rotation(), 0.3, LONG, 0.0, 0.0),
     # Locked: the slope at the attracting fixed point.
     "circle": (
         maps.Circle(0.05, 0.8),
         0.3,
-        10_000,
+        LONG,
         math.log(1 - math.sqrt(0.64 - (0.1 * math.pi) ** 2)),
         1e-9,
     ),
-    "contraction": (Contraction(-0.7, 0.1), 0.3, 10_000, math.log(0.7), 1e-12),
+    "contraction": (Contraction(-0.7, 0.1), 0.3, LONG, math.log(0.7), 1e-12),
     # sin^2 turns it into the doubling map.
     "logistic": (maps.Logistic(4.0), 0.3, 1_000_000, math.log(2.0), 1e-3),
     # The slope over a period is r^2 (1 - 2 x)(1 - 2 y) = 4 + 2 r - r^2.
-    "logistic, period 2": (maps.Logistic(3.2), 0.3, 10_000, 0.5 * math.log(4.0 + 2 * 3.2 - 3.2**2), 1e-9),
-    "baker": (Baker(), (0.3, 0.4), 10_000, math.log(2.0), 1e-9),
+    "logistic, period 2": (maps.Logistic(3.2), 0.3, LONG, 0.5 * math.log(4.0 + 2 * 3.2 - 3.2**2), 1e-9),
+    "baker": (Baker(), (0.3, 0.4), LONG, math.log(2.0), 1e-9),
     "henon": (maps.Henon(), (0.1, 0.1), 1_000_000, 0.4192, 1e-3),
     # Fixed point (0, 0), slope 1/2.
-    "product": (Product(), (0.3, 0.5), 10_000, -math.log(2.0), 1e-9),
+    "product": (Product(), (0.3, 0.5), LONG, -math.log(2.0), 1e-9),
     # Rotation by 30 degrees, times 0.9.
-    "spiral": (Linear2(0.9 * TURN, -0.45, 0.45, 0.9 * TURN), (1.0, 0.0), 10_000, math.log(0.9), 1e-3),
+    "spiral": (Linear2(0.9 * TURN, -0.45, 0.45, 0.9 * TURN), (1.0, 0.0), LONG, math.log(0.9), 1e-3),
 }
 
 
 @pytest.mark.parametrize("name", EXPONENTS)
-def test_lyapunov_exponent(name: str) -> None:
+def test_lyapunov_exponent_alone_and_with_its_orbit(name: str) -> None:
+    """To the bit: the orbit is recorded whole, the exponent alone goes on in parts."""
     params, x, count, expected, within = EXPONENTS[name]
-    found = maps.lyapunov(params, x, 0, count)
+    found = maps.lyapunov(params, x, 0, count, skip=1000)
     assert found.exponent == pytest.approx(expected, abs=within)
     assert (found.steps, found.stopped) == (count, None)
-
-
-@pytest.mark.parametrize("name", EXPONENTS)
-def test_an_orbit_with_its_exponent_is_the_orbit_and_the_exponent(name: str) -> None:
-    """To the bit: the one is recorded whole, the other goes on in parts of `CHUNK` steps."""
-    params, x, count, _, _ = EXPONENTS[name]
-    count = max(count, 2 * CHUNK + 7)
     path, growth = orbit_with_exponent(params, x, 0, 1000, count)
     alone = maps.orbit(params, x, 0, 1000 + count)
     assert np.array_equal(path.x, alone.x)
     assert np.array_equal(path.code, alone.code)
     assert path.stopped == alone.stopped
-    assert growth == maps.lyapunov(params, x, 0, count, skip=1000)
+    assert growth == found
 
 
 def test_an_orbit_that_leaves_early_ends_both() -> None:
