@@ -242,11 +242,11 @@ def branches_of_side(params: Any, domain: Sides, side: int, samples: int) -> tup
     """Sample one side and its branches, with every change of branch between adjacent floats; none without states."""
     if not domain.lo[side, 0] < domain.hi[side, 0]:
         return np.empty(0), np.empty(0, np.int64)
-    x, code = located(_code_of(params, side), _sampled(domain, side, samples))
-    if not kind_of(params).has_margin:
-        return x, code
-    x = inserted(x, hidden(_margins_of(params, side), x))
-    return located(_code_of(params, side), x)
+    code_of = _code_of(params, side)
+    x, code = located(code_of, _sampled(domain, side, samples))
+    if kind_of(params).has_margin:
+        x, code = located(code_of, inserted(x, hidden(_margins_of(params, side), x)))
+    return x, code
 
 
 def require_one_dimension(params: Any) -> None:
