@@ -16,9 +16,9 @@ from limitsets.systems.graph import building as memory
 # Kernels of a map of one's own that contradict each other: one line each, of the package's family of errors.
 
 
-def made(name, *fields, **kernels):
+def made(name, **kernels):
     """Register a class of its own."""
-    return ls.register(NamedTuple(name, [(field, float) for field in fields or ("slope",)]), **kernels)
+    return ls.register(NamedTuple(name, [("slope", float)]), **kernels)
 
 
 def tent(params, x, side):
@@ -381,6 +381,23 @@ def test_what_is_free_is_a_number_of_bytes():
 # What a user reads of a kernel that gives or does what compiled code does not take: plain words, and what to write.
 
 
+class Arrayed(NamedTuple):
+    a: float
+    b: float
+
+
+class Listed(NamedTuple):
+    a: float
+
+
+class ArrayedLine(NamedTuple):
+    r: float
+
+
+class Polynomial(NamedTuple):
+    c: tuple[float, float]
+
+
 def _arrayed(params, x, side):
     return np.array([1.0 - params.a * x[0] ** 2 + x[1], params.b * x[0]]), side, 0
 
@@ -397,10 +414,10 @@ def _polynomial(params, x, side):
     return params.c * x, side, 0
 
 
-Arrayed = made("Arrayed", "a", "b", image=_arrayed, dimension=2)
-Listed = made("Listed", "a", image=_listed, dimension=2)
-ArrayedLine = made("ArrayedLine", "r", image=_arrayed_line)
-Polynomial = made("Polynomial", "c", image=_polynomial)
+ls.register(Arrayed, image=_arrayed, dimension=2)
+ls.register(Listed, image=_listed, dimension=2)
+ls.register(ArrayedLine, image=_arrayed_line)
+ls.register(Polynomial, image=_polynomial)
 
 PLANE, LINE = [(-1.5, 1.5), (-0.5, 0.5)], [(0.0, 1.0)]
 
@@ -416,6 +433,12 @@ def test_an_array_in_place_of_a_state_is_named(params, domain, start):
         ls.transitions(params, ls.grid(domain, cells=8))
     with pytest.raises(MapError, match=said):
         ls.orbit(params, start, 0, 3)
+
+
+# Classes of one parameter each.
+Entries, Unpacked, TwoOfOne, OneOfTwo, Compared = (
+    NamedTuple(name, [("r", float)]) for name in ("Entries", "Unpacked", "TwoOfOne", "OneOfTwo", "Compared")
+)
 
 
 def _entries(params, x, side):
@@ -439,11 +462,11 @@ def _compared(params, x, side):
     return (params.r * (1.0 - x), side, 1) if x > 0.5 else (params.r * x, side, 0)
 
 
-Entries = made("Entries", "r", image=_entries)
-Unpacked = made("Unpacked", "r", image=_unpacked)
-TwoOfOne = made("TwoOfOne", "r", image=_two_of_one)
-OneOfTwo = made("OneOfTwo", "r", image=_one_of_two, dimension=2)
-Compared = made("Compared", "r", image=_compared, branches=TWO)
+ls.register(Entries, image=_entries)
+ls.register(Unpacked, image=_unpacked)
+ls.register(TwoOfOne, image=_two_of_one)
+ls.register(OneOfTwo, image=_one_of_two, dimension=2)
+ls.register(Compared, image=_compared, branches=("left", "right"))
 
 
 def test_a_kernel_of_another_dimension_is_told_so():

@@ -1,6 +1,7 @@
 """Attractors, limit sets, their measure and entropy."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -230,19 +231,36 @@ def test_wrong_questions():
 # Ulam's method where the stationary distribution is known on paper.
 
 
-def swapped(x):
+class Swap(NamedTuple):
     """[0, 1) and [1, 2) are swapped by the doubling map: period 2, uniform."""
+
+    factor: float
+
+
+def _swap(params, x, side):
     base = 0.0 if x < 1.0 else 1.0
-    after = 2.0 * (x - base)
+    after = params.factor * (x - base)
     after = after if after < 1.0 else after - 1.0
-    return after + (1.0 - base)
+    return after + (1.0 - base), side, 0 if x < 1.0 else 1
 
 
-def tents(x, slope):
+ls.register(Swap, image=_swap, branches=("up", "down"))
+
+
+class Tents(NamedTuple):
     """A tent map on each of [0, 1] and [2, 3], and a rest that falls to the first."""
+
+    slope: float
+
+
+def _tents(params, x, side):
     base = 2.0 if x >= 2.0 else 0.0
     y = x - base if x >= 2.0 or x <= 1.0 else 0.5 * (x - 1.0)
-    return base + (slope * y if y < 0.5 else slope * (1.0 - y))
+    after = params.slope * y if y < 0.5 else params.slope * (1.0 - y)
+    return base + after, side, 0 if y < 0.5 else 1
+
+
+ls.register(Tents, image=_tents, branches=("left", "right"))
 
 
 def measures(params, domain, cells, **options):
@@ -281,12 +299,12 @@ def test_logistic_map_comes_near_the_arcsine_density():
 
 
 def test_period_two_does_not_keep_the_chain_from_resting():
-    (found,) = measures(ls.map(swapped), [(0.0, 2.0)], 32)
+    (found,) = measures(Swap(2.0), [(0.0, 2.0)], 32)
     np.testing.assert_allclose(found.density, 0.5, rtol=0, atol=1e-11)
 
 
 def test_two_attractors_have_a_measure_each():
-    low, high = measures(ls.map(tents, slope=1.9), [(0.0, 3.0)], 300)
+    low, high = measures(Tents(1.9), [(0.0, 3.0)], 300)
     np.testing.assert_allclose(low.weight[:100], high.weight[200:], rtol=0, atol=1e-10)  # the same map twice
     assert low.weight[100:].sum() == high.weight[:200].sum() == 0.0
     assert low.weight[:100].sum() == pytest.approx(1.0, abs=1e-12)
