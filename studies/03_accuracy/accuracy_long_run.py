@@ -16,7 +16,7 @@ import numpy as np
 from accuracy_points import Point, timed
 
 import limitsets as ls
-from limitsets.systems.maps.drivers import lyapunov
+from limitsets.systems.maps.growth import lyapunov
 from limitsets.systems.sets import invariant_measures
 from limitsets.systems.sets.measure import sample_points
 

@@ -12,7 +12,7 @@ from limitsets import interval as iv
 from limitsets.base.errors import AnswerError
 from limitsets.systems.cells import CellSet, Domain
 from limitsets.systems.graph.target import Target, place
-from tests.maps_of_tests import Baker, Product, TwoState
+from tests.maps_of_tests import Product, TwoState
 
 # The name of the module is hidden by that of its function.
 enclosed = importlib.import_module("limitsets.systems.graph.images.enclosed")
@@ -45,26 +45,6 @@ def spiral_box(low, high, lo, hi, side):
     return 1, slot, slot, (0.0, 0.0)
 
 
-class Tent(NamedTuple):
-    """Two sides: beyond the kink the state goes to the other side."""
-
-    slope: float
-    sides: float = 2.0
-
-
-def tent(params, x, side):
-    return (params.slope * x, side, 0) if x < 0.5 else (params.slope * (1.0 - x), 1 - side, 1)
-
-
-def tent_box(low, high, lo, hi, side):
-    slope = (low.slope, high.slope)
-    up = iv.mul(slope, (lo, min(hi, 0.5)))
-    down = iv.mul(slope, iv.sub((1.0, 1.0), (max(lo, 0.5), hi)))
-    first, second = lo <= 0.5, hi >= 0.5
-    one, two = (up[0], up[1], side, 0), (down[0], down[1], 1 - side, 1)
-    return 2 if first and second else 1, one if first else two, two, (0.0, 0.0)
-
-
 class Broken(NamedTuple):
     """Answers that prove nothing, in each of the ways a kernel may go wrong."""
 
@@ -88,7 +68,6 @@ def broken_box(low, high, lo, hi, side):
 
 
 ls.register(Spiral, image=spiral, image_box=spiral_box, dimension=3)
-ls.register(Tent, image=tent, image_box=tent_box, branches=("up", "down"))
 ls.register(Broken, image=broken, image_box=broken_box)
 
 
@@ -96,10 +75,10 @@ def attracting(graph):
     return [data["members"] for _, data in ls.morse_graph(graph).nodes(data=True) if data["attracting"]]
 
 
-def holds(graph, params, points, side=0):
+def holds(graph, params, points):
     """Whether the graph's images of the cells of points hold the cells of their images."""
-    got = ls.maps.images(params, points, side)
-    cells = graph.grid.index(points, side)
+    got = ls.maps.images(params, points, 0)
+    cells = graph.grid.index(points, 0)
     for k in range(len(cells)):
         where = graph.grid.index(got.x[k : k + 1], int(got.side[k]))[0]
         if where >= 0 and where not in graph.successors(int(cells[k])):
@@ -162,18 +141,6 @@ def test_leslie_images_hold_sampled_ones_and_are_no_looser_than_padded_corners()
     assert is_forward_invariant(graph, block)
 
 
-def test_two_states_and_the_baker_have_both_images_on_the_break():
-    graph = ls.transitions(TwoState(1.0), ls.grid([(-2, 2), (-2, 2)], cells=32), method="boxes")
-    assert len(attracting(graph)) == 2
-    beside = graph.grid.index([[0.01, 0.5], [-0.01, 0.5]], 0)
-    targets = graph.grid.index([[1.01, 1.01], [-1.01, -1.01]], 0)
-    for cell in beside.tolist():  # each meets x = 0
-        assert set(targets.tolist()) <= set(graph.successors(cell).tolist())
-    params = Baker(0.4)
-    graph = ls.transitions(params, ls.grid([(0, 1), (0, 1)], cells=33), method="boxes")
-    assert holds(graph, params, np.random.default_rng(3).uniform(0, 1, (2000, 2)))
-
-
 def test_a_map_of_space_proves_its_attractor():
     params = Spiral(0.5, 0.6)
     graph = ls.transitions(params, ls.grid([(-1, 1)] * 3, cells=17), method="boxes")
@@ -183,16 +150,6 @@ def test_a_map_of_space_proves_its_attractor():
     lo, hi = graph.grid.boxes(block.numbers(), 0)
     assert np.abs([lo, hi]).max() < 0.6
     assert holds(graph, params, np.random.default_rng(4).uniform(-1, 1, (1000, 3)))
-
-
-def test_a_map_on_two_sides_goes_to_both():
-    params = Tent(1.8)
-    domain = Domain([[0.0], [0.0]], [[1.0], [1.0]])
-    graph = ls.transitions(params, ls.grid(domain, cells=65), method="boxes")
-    for side in (0, 1):
-        assert holds(graph, params, np.random.default_rng(5).uniform(0, 1, 2000), side)
-        (middle,) = graph.grid.index([0.5], side)  # no border of a cell
-        assert set(graph.grid.side_of(graph.successors(int(middle))).tolist()) >= {0, 1}
 
 
 # ---------------------------------------------------------------- parameters in a box
@@ -224,16 +181,6 @@ def test_images_hold_for_every_parameter_of_a_box(low, high, domain, cells):
         params = type(low)(*(rng.uniform(a, b) for a, b in zip(low, high, strict=True)))
         points = rng.uniform(lo, hi, (300, len(domain)))
         assert holds(graph, params, points if len(domain) > 1 else points[:, 0])
-
-
-def test_the_attractor_continues_over_a_box_of_parameters():
-    low, high = ls.maps.Logistic(3.19), ls.maps.Logistic(3.21)
-    graph = ls.transitions(low, ls.grid([(0, 1)], cells=4096), method="boxes", upper=high)
-    (block,) = attracting(graph)
-    assert is_forward_invariant(graph, block)
-    for r in (3.19, 3.2, 3.21):
-        last = ls.orbit(ls.maps.Logistic(r), 0.3, 0, 999).x[-2:]
-        assert np.isin(graph.grid.index(last, 0), block.numbers()).all()
 
 
 @pytest.mark.parametrize("upper", [ls.maps.Logistic(3.0), ls.maps.Cubic(4.0)])

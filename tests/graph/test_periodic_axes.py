@@ -264,12 +264,6 @@ def test_orbit_of_a_function_of_arrays_is_turned_too() -> None:
     assert len(ls.attractors(ls.transitions(params, grid), throws=100)) == 1
 
 
-def test_exponent_of_the_cat_map() -> None:
-    domain = ls.grid(TORUS, cells=4, periodic=True).domain
-    found = ls.maps.lyapunov(ls.map(cat), (0.1, 0.2), 0, 5000, domain=domain)
-    assert found.exponent == pytest.approx(math.log((3 + math.sqrt(5)) / 2), rel=1e-12)
-
-
 @pytest.mark.parametrize("lo", [0.0, 0.55])  # the attractor away from the seam, and on it
 def test_resilience_on_a_circle(lo: float) -> None:
     graph = ls.transitions(ls.map(circle, omega=0.05, k=0.9), line(lo, 256), "boxes")

@@ -25,7 +25,6 @@ ENDS = [-INF, -LARGEST, -1.0, -TINY, -0.0, 0.0, TINY, 1.0, LARGEST, INF, NAN]
 PAIRS = list(itertools.product(ENDS, ENDS))
 # Twice the same infinity holds no real number.
 INTERVALS = [(a, b) for a, b in PAIRS if a <= b and not (math.isinf(a) and a == b)]
-NO_INTERVALS = [pair for pair in PAIRS if pair not in INTERVALS]
 BROKEN = [pair for pair in PAIRS if math.isnan(pair[0]) or math.isnan(pair[1])]
 BEYOND = Fraction(LARGEST) ** 4
 

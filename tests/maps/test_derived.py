@@ -22,11 +22,6 @@ from tests.maps_of_tests import Tent
 # Boxes and slopes of users' maps, derived from their plain kernels: against exact arithmetic, and what is refused.
 
 
-class Wave(NamedTuple):
-    r: float
-    s: float
-
-
 # One map for each function that boxes can follow, spelt by math or by numpy, and the same in Arb.
 def _ricker(p, x, side):
     return x * math.exp(p.r * (1.0 - x)), side, 0

@@ -16,74 +16,54 @@ from limitsets.feeder.thrower import Energy, Exact, Signed, SmallAngle
 from limitsets.systems.cells import Domain, as_domain
 from limitsets.systems.maps import along, critical_points, monotone_pieces, turning_points
 from limitsets.systems.maps.critical import margins
-from limitsets.systems.maps.drivers import CHUNK, orbit_with_exponent
+from limitsets.systems.maps.growth import CHUNK, orbit_with_exponent
 from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
 # ----------------------------------------------------------------
-# Long orbits of the textbook maps: attractors, periods, Lyapunov exponents that books and papers state.
+# Lyapunov exponents that books and papers state; images and orbits of the textbook maps: test_textbook.py.
 
-
-def end_of_orbit(params: Any, x: Any, skip: int, count: int) -> np.ndarray:
-    """States number skip to skip + count."""
-    return maps.orbit(params, x, 0, skip + count).x[skip:]
-
-
-def period(x: np.ndarray, within: float = 1e-6) -> int | None:
-    """Smallest shift after which all states repeat."""
-    for p in range(1, 65):
-        if np.abs(x[p:] - x[:-p]).max() < within:
-            return p
-    return None
-
-
-# ---------------------------------------------------------------- Lyapunov exponents
 
 TURN = math.sqrt(3.0) / 2.0
+LONG = 2 * CHUNK + 8  # even, for the cycle of period 2; the exponent alone goes on in parts of `CHUNK` steps
 EXPONENTS = {
-    "doubling": (maps.Doubling(), 0.3, 10_000, math.log(2.0), 1e-12),
-    "beta": (maps.Doubling(1.7), 0.3, 10_000, math.log(1.7), 1e-12),
-    "rotation": (maps.Rotation(), 0.3, 10_000, 0.0, 0.0),
+    "doubling": (maps.Doubling(), 0.3, LONG, math.log(2.0), 1e-12),
+    "beta": (maps.Doubling(1.7), 0.3, LONG, math.log(1.7), 1e-12),
+    "rotation": (maps.Rotation(), 0.3, LONG, 0.0, 0.0),
     # Locked: the slope at the attracting fixed point.
     "circle": (
         maps.Circle(0.05, 0.8),
         0.3,
-        10_000,
+        LONG,
         math.log(1 - math.sqrt(0.64 - (0.1 * math.pi) ** 2)),
         1e-9,
     ),
-    "contraction": (Contraction(-0.7, 0.1), 0.3, 10_000, math.log(0.7), 1e-12),
+    "contraction": (Contraction(-0.7, 0.1), 0.3, LONG, math.log(0.7), 1e-12),
     # sin^2 turns it into the doubling map.
     "logistic": (maps.Logistic(4.0), 0.3, 1_000_000, math.log(2.0), 1e-3),
     # The slope over a period is r^2 (1 - 2 x)(1 - 2 y) = 4 + 2 r - r^2.
-    "logistic, period 2": (maps.Logistic(3.2), 0.3, 10_000, 0.5 * math.log(4.0 + 2 * 3.2 - 3.2**2), 1e-9),
-    "baker": (Baker(), (0.3, 0.4), 10_000, math.log(2.0), 1e-9),
+    "logistic, period 2": (maps.Logistic(3.2), 0.3, LONG, 0.5 * math.log(4.0 + 2 * 3.2 - 3.2**2), 1e-9),
+    "baker": (Baker(), (0.3, 0.4), LONG, math.log(2.0), 1e-9),
     "henon": (maps.Henon(), (0.1, 0.1), 1_000_000, 0.4192, 1e-3),
     # Fixed point (0, 0), slope 1/2.
-    "product": (Product(), (0.3, 0.5), 10_000, -math.log(2.0), 1e-9),
+    "product": (Product(), (0.3, 0.5), LONG, -math.log(2.0), 1e-9),
     # Rotation by 30 degrees, times 0.9.
-    "spiral": (Linear2(0.9 * TURN, -0.45, 0.45, 0.9 * TURN), (1.0, 0.0), 10_000, math.log(0.9), 1e-3),
+    "spiral": (Linear2(0.9 * TURN, -0.45, 0.45, 0.9 * TURN), (1.0, 0.0), LONG, math.log(0.9), 1e-3),
 }
 
 
 @pytest.mark.parametrize("name", EXPONENTS)
-def test_lyapunov_exponent(name: str) -> None:
+def test_lyapunov_exponent_alone_and_with_its_orbit(name: str) -> None:
+    """To the bit: the orbit is recorded whole, the exponent alone goes on in parts."""
     params, x, count, expected, within = EXPONENTS[name]
-    found = maps.lyapunov(params, x, 0, count)
+    found = maps.lyapunov(params, x, 0, count, skip=1000)
     assert found.exponent == pytest.approx(expected, abs=within)
     assert (found.steps, found.stopped) == (count, None)
-
-
-@pytest.mark.parametrize("name", EXPONENTS)
-def test_an_orbit_with_its_exponent_is_the_orbit_and_the_exponent(name: str) -> None:
-    """To the bit: the one is recorded whole, the other goes on in parts of `CHUNK` steps."""
-    params, x, count, _, _ = EXPONENTS[name]
-    count = max(count, 2 * CHUNK + 7)
     path, growth = orbit_with_exponent(params, x, 0, 1000, count)
     alone = maps.orbit(params, x, 0, 1000 + count)
     assert np.array_equal(path.x, alone.x)
     assert np.array_equal(path.code, alone.code)
     assert path.stopped == alone.stopped
-    assert growth == maps.lyapunov(params, x, 0, count, skip=1000)
+    assert growth == found
 
 
 def test_an_orbit_that_leaves_early_ends_both() -> None:
@@ -165,109 +145,12 @@ def test_wrong_questions_are_refused() -> None:
             maps.lyapunov(*arguments)
 
 
-# ---------------------------------------------------------------- attractors and periods
-
-
-def test_logistic_orbits() -> None:
-    two = end_of_orbit(maps.Logistic(3.2), 0.3, 2000, 100)
-    assert period(two) == 2
-    # The two states are the roots of r^2 x^2 - r (r + 1) x + r + 1.
-    root = math.sqrt((3.2 + 1.0) * (3.2 - 3.0))
-    assert np.unique(two.round(12)) == pytest.approx([(4.2 - root) / 6.4, (4.2 + root) / 6.4], abs=1e-12)
-    assert period(end_of_orbit(maps.Logistic(3.83), 0.3, 5000, 100)) == 3
-
-
-def test_cubic_attractors_and_edge() -> None:
-    starts = np.linspace(-1.2, 1.2, 24)
-    x, _, _, steps = maps.advance(maps.Cubic(1.5), starts, 0, 500)
-    # Beyond sqrt(1.5) the sign would change; the first image of these starts keeps to one side.
-    assert (steps == 500).all()
-    assert np.abs(x) == pytest.approx(math.sqrt(0.5), abs=1e-12)
-    assert (np.sign(x) == np.sign(starts)).all()
-    assert maps.orbit(maps.Cubic(1.5), 0.0, 0, 5).x.tolist() == [0.0] * 6
-
-
-def test_share_of_henon_starts_that_stay() -> None:
-    # 1000 x 1000 midpoints: the edge of the set moves the share by less than 1e-3.
-    axis = -2.0 + (np.arange(1000) + 0.5) * 4e-3
-    starts = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    _, _, _, steps = maps.advance(maps.Henon(), starts, 0, 500)
-    assert (steps == 500).mean() == pytest.approx(0.432, abs=0.002)
-
-
-def test_henon_chaos_and_its_window() -> None:
-    chaos = maps.lyapunov(maps.Henon(1.2266, 0.3), (0.1, 0.1), 0, 500_000, skip=20_000)
-    assert (chaos.exponent or 0.0) > 0.05
-    for a in (1.2267, 1.23, 1.24, 1.25):
-        assert period(end_of_orbit(maps.Henon(a, 0.3), (0.1, 0.1), 100_000, 200)) == 7
-        assert (maps.lyapunov(maps.Henon(a, 0.3), (0.1, 0.1), 0, 10_000, skip=100_000).exponent or 1.0) < 0.0
-
-
-def rotation_number(params: Any, x: float, count: int = 20_000) -> float:
-    """Whole turns per step, within 1 / count of the limit: the lift of an orbit grows by its wraps."""
-    return int(maps.orbit(params, x, 0, count).code.sum()) / count
-
-
 def test_a_circle_map_without_coupling_is_the_rotation() -> None:
     x = np.linspace(0.0, 1.0, 1001)
     for omega in (0.0, 0.25, 0.6180339887498949, 1.0 - 2.0**-53):
         turned, plain = maps.images(maps.Circle(omega, 0.0), x, 0), maps.images(maps.Rotation(omega), x, 0)
         assert turned.x.tolist() == plain.x.tolist()
         assert turned.code.tolist() == plain.code.tolist()
-        assert rotation_number(maps.Circle(omega, 0.0), 0.1) == pytest.approx(omega, abs=1e-4)
-
-
-@pytest.mark.parametrize("coupling", [0.3, 1.0])
-def test_a_circle_map_is_locked_just_where_it_has_a_fixed_point(coupling: float) -> None:
-    edge = coupling / math.tau
-    for x in (0.05, 0.4, 0.9):
-        assert rotation_number(maps.Circle(0.999 * edge, coupling), x) == pytest.approx(0.0, abs=1e-4)
-        assert rotation_number(maps.Circle(1.0 - 0.999 * edge, coupling), x) == pytest.approx(1.0, abs=1e-4)
-        assert 1e-3 < rotation_number(maps.Circle(1.01 * edge, coupling), x) < 0.1
-        # x -> -x turns omega into -omega: at 1/2 the number is its own mirror image.
-        assert rotation_number(maps.Circle(0.5, coupling), x) == pytest.approx(0.5, abs=1e-4)
-
-
-def test_a_circle_map_has_one_rotation_number_that_grows_with_omega() -> None:
-    circles = [maps.Circle(omega, 0.9) for omega in np.linspace(0, 0.9, 46)]
-    numbers = [[rotation_number(circle, x) for x in (0.1, 0.7)] for circle in circles]
-    assert all(one == pytest.approx(other, abs=1.5e-4) for one, other in numbers)
-    assert all(before[0] <= after[0] + 1e-4 for before, after in itertools.pairwise(numbers))
-
-
-def test_leslie_attractor_has_period_three() -> None:
-    assert period(end_of_orbit(maps.Leslie(), (10.0, 10.0), 5000, 60)) == 3
-
-
-@pytest.mark.parametrize(("r", "states"), [(1.0, {-1.0, 1.0}), (0.5, {-0.5, 0.5}), (0.49, {0.0})])
-def test_two_states(r: float, states: set[float]) -> None:
-    rng = np.random.default_rng(5)
-    x, *_ = maps.advance(TwoState(r), rng.uniform(-2.0, 2.0, (2000, 2)), 0, 3)
-    assert {abs(v) * math.copysign(1.0, v) if v else 0.0 for v in x[:, 0].tolist()} == states
-    assert (x[:, 0] == x[:, 1]).all()
-    if r == 1.0:
-        assert (x[:, 0] > 0.0).mean() == pytest.approx(0.5, abs=0.05)
-
-
-def test_three_states() -> None:
-    x = [-3.0, -1.0 - 1e-12, -1.0, 0.3, 1.0, 1.0 + 1e-12, 3.0]
-    assert maps.advance(ThreeState(), x, 0, 5)[0].tolist() == [-2.0, -2.0, 0.0, 0.0, 0.0, 2.0, 2.0]
-
-
-def test_product_orbits_run_to_the_corner() -> None:
-    starts = [(0.99, 0.5), (1.0, 0.5), (0.5, 1.0), (1.0, 1.0)]
-    x, *_ = maps.advance(Product(), starts, 0, 200)
-    assert x == pytest.approx(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]), abs=1e-12)
-    assert maps.orbit(Product(), (1.1, 0.5), 0, 50).stopped == "outside"
-
-
-def test_the_baker_map_keeps_areas() -> None:
-    # Each of 16 x 16 equal cells gets as many of the images of a fine lattice.
-    axis = (np.arange(256) + 0.5) / 256
-    lattice = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    after = maps.images(Baker(), lattice, 0).x
-    counts, *_ = np.histogram2d(after[:, 0], after[:, 1], bins=16, range=[[0, 1], [0, 1]])
-    assert (counts == 256).all()
 
 
 # ----------------------------------------------------------------
@@ -404,27 +287,15 @@ def test_changes_of_code_with_and_without_a_margin(params, pair, expected):
     assert [p.x for p in critical_points(params, domain)[0]] == pytest.approx(expected, abs=1e-15)
 
 
-class Wave(NamedTuple):
-    """sin(k x) on one branch."""
-
-    k: float
-
-
-def _wave_image(params, x, side):
-    return math.sin(params.k * x), side, 0
-
-
-def _wave_on(params, x, side, branch):
-    return math.sin(params.k * x), side, params.k * math.cos(params.k * x)
-
-
-maps.register(Wave, image=_wave_image, image_on=_wave_on)
+def wave(x, k):
+    return math.sin(k * x)
 
 
 def test_turning_points_inside_a_branch():
-    points = turning_points(Wave(20.0), UNIT)[0]
+    params = ls.map(wave, k=20.0)
+    points = turning_points(params, UNIT)[0]
     assert [p.x for p in points] == pytest.approx([math.pi * (k + 0.5) / 20.0 for k in range(6)], abs=1e-15)
-    pieces = monotone_pieces(Wave(20.0), UNIT)[0]
+    pieces = monotone_pieces(params, UNIT)[0]
     assert all(np.nextafter(one.hi, 2.0) == two.lo for one, two in itertools.pairwise(pieces))
     assert (pieces[0].lo, pieces[-1].hi) == (0.0, 1.0)
 

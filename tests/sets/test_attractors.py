@@ -10,7 +10,7 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.base.errors import AnswerError
 from limitsets.systems.cells import Domain, as_domain
-from limitsets.systems.maps import INWARD, UNDECIDED
+from limitsets.systems.maps import INWARD
 from limitsets.systems.sets import invariant_measures, limit_set_of
 from limitsets.systems.sets.attracting import _visits
 from limitsets.systems.sets.measure import topological_entropy
@@ -68,16 +68,6 @@ def test_an_orbit_may_leave_what_the_cells_promise_and_says_so():
     graph = ls.transitions(ls.maps.Henon(1.4, 0.3), ls.grid([(-2, 2), (-2, 2)], cells=64), method="middles")
     found = ls.attractors(graph, throws=5000)
     assert found == () or min(a.in_cells for a in found) < 1.0
-
-
-def test_undecided_cells_are_a_state_of_their_own():
-    domain = Domain([[-1.3]], [[1.3]])
-    graph = ls.transitions(ls.maps.Cubic(1.5), ls.grid(domain, cells=101))
-    share = ls.basins(graph, ls.attractors(graph, throws=1000))
-    (middle,) = graph.grid.index([0.0], 0)
-    assert share.labels[middle] == UNDECIDED
-    assert share.undecided_between > 0.0
-    assert share.attractors[0] == pytest.approx(share.attractors[1], rel=1e-9)
 
 
 def test_extents_in_the_plane_are_a_box_for_each_piece():
@@ -370,11 +360,6 @@ def of_logistic(r):
 )
 def test_entropies_of_the_logistic_map(r, entropy, within):
     assert of_logistic(r) == pytest.approx(entropy, rel=within, abs=0.0)
-
-
-def test_the_full_logistic_map_has_ln_2():
-    found = topological_entropy(maps.Logistic(4.0), {0: [(0.0, 1.0)]}, UNIT)
-    assert found == pytest.approx(math.log(2), rel=1e-10)
 
 
 @pytest.mark.parametrize("slope", [1.3, 1.6180339887498949, 1.9])

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, overload
 
 import numba
+from numba import extending
 from numba.core import codegen, config
 from numba.core.compiler import Compiler
 from numba.core.errors import NumbaError
@@ -84,9 +85,12 @@ class _Within(Compiler):  # type: ignore[misc]  # numba has no types
         self.state.library = _Part(target_context.codegen(), "part of callers")
 
 
-def overload_options(*, proof: bool, inlined: bool = True) -> dict[str, Any]:
-    """Give the options under which numba compiles a method of a function of many."""
-    return {**(PROOF if proof else ESTIMATE), "forceinline": inlined, "pipeline_class": _Within}
+def overloaded(
+    stub: Callable[..., Any], choose: Callable[..., Any], *, proof: bool = False, inlined: bool = True
+) -> None:
+    """Let compiled code run, in place of a function, what `choose` gives for the types of its arguments."""
+    options = {**(PROOF if proof else ESTIMATE), "forceinline": inlined, "pipeline_class": _Within}
+    extending.overload(stub, jit_options=options, strict=False)(choose)
 
 
 # ----------------------------------------------------------------

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any, ParamSpec, Protocol, TypeVar, overload
 
 import numpy as np
-from numba import extending, types
+from numba import types
 
 from limitsets.base import MapError
-from limitsets.numbers.jit.compiling import overload_options, with_helpers
+from limitsets.numbers.jit.compiling import overloaded, with_helpers
 
 P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
@@ -61,8 +61,8 @@ def _choose_with(entries: Any, entry: Any) -> Callable[..., Any] | None:
     return lambda entries, entry: entries[:at] + (entry,) + entries[after:]  # noqa: RUF005 - numba has no unpacking
 
 
-for _stub, _choose in ((entry_of, _choose_entry), (with_entry, _choose_with)):
-    extending.overload(_stub, jit_options={"forceinline": True}, strict=False)(_choose)
+overloaded(entry_of, _choose_entry)
+overloaded(with_entry, _choose_with)
 
 
 def _handed_on(entry: Any, value: Any, *rest: Any) -> Any:
@@ -119,7 +119,6 @@ def generic(
         return functools.partial(generic, proof=proof, inlined=inlined, default=default, chained=chained)
     default = _handed_on if chained else default
     methods: dict[Any, Callable[..., Any]] = {}
-    options = overload_options(proof=proof, inlined=inlined)
 
     def one_after_another(entries: Any, value: Any, *rest: Any) -> Any:
         return chosen(entries[1:], chosen(entries[0], value, *rest), *rest)
@@ -144,7 +143,7 @@ def generic(
             raise MapError("the argument", type(first).__name__, "a class with a method", "add one")
         return method(first, *rest)
 
-    extending.overload(chosen, jit_options=options, strict=False)(choose)
+    overloaded(chosen, choose, proof=proof, inlined=inlined)
 
     def on(key: type | int, method: Callable[..., Any]) -> None:
         methods[key] = with_helpers(getattr(method, "py_func", method), proof)
@@ -180,4 +179,4 @@ def _choose_row(stack: Any, k: Any) -> Any:
     return scope["method"]
 
 
-extending.overload(row_of, jit_options=overload_options(proof=False), strict=False)(_choose_row)
+overloaded(row_of, _choose_row)

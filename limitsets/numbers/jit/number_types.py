@@ -12,7 +12,7 @@ from llvmlite import ir
 from numba import extending, types
 from numba.core import cgutils
 
-from limitsets.numbers.jit.compiling import PROOF, compiled, overload_options
+from limitsets.numbers.jit.compiling import PROOF, compiled, overloaded
 
 # ----------------------------------------------------------------
 # A mark that compiled code leaves where a function was asked beyond where it is defined.
@@ -95,16 +95,12 @@ def number(*, twice: bool) -> Callable[[type[T]], type[T]]:
     twice : bool
         Whether a plainer number has both entries equal to itself; else the second is 0.
     """
-
-    def made(cls: type[T]) -> type[T]:
-        if twice:
-            _TWICE.add(cls)
-        return _number(cls)
-
-    return made
+    return lambda cls: _number(cls, twice)
 
 
-def _number(cls: type[T]) -> type[T]:
+def _number(cls: type[T], twice: bool) -> type[T]:
+    if twice:
+        _TWICE.add(cls)
     first, _ = _FIELDS[cls] = tuple(cls.__annotations__)
 
     def typer(context: Any) -> Any:
@@ -233,7 +229,7 @@ def operation(
             return whole
         return (left or method) if not mine[-1] else (right or method) if not mine[0] else method
 
-    extending.overload(stub, jit_options=overload_options(proof=cls is not float), strict=False)(choose)
+    overloaded(stub, choose, proof=cls is not float)
 
 
 def corners_as_numbers(number: type, array: type) -> Callable[[Any, Any], Any]:
@@ -298,7 +294,7 @@ def of_entries(function: Callable[..., Any]) -> Callable[..., Any]:
         exec(f"def method(entries, *more):\n    return ({calls})", scope)  # noqa: S102  # our own text
         return scope["method"]  # type: ignore[no-any-return]  # made by exec
 
-    extending.overload(each, jit_options=overload_options(proof=True), strict=False)(choose)
+    overloaded(each, choose, proof=True)
     return each
 
 
@@ -307,9 +303,7 @@ def formula(function: F) -> F:
 
     Operations on floats may be contracted; those of other numbers are their own.
     """
-    extending.overload(function, jit_options=overload_options(proof=False), strict=False)(
-        lambda *args: function
-    )
+    overloaded(function, lambda *args: function)
     return function
 
 

@@ -4,6 +4,7 @@ Cells are closed, so neighbours share their border, and are numbered side by sid
 last axis runs fastest): the numbers are the nodes of the transition graph.
 """
 
-from limitsets.systems.cells.grids import CellSet, Domain, Grid, as_domain, grid
+from limitsets.systems.cells.domain import Domain, as_domain
+from limitsets.systems.cells.grids import CellSet, Grid, grid
 
 __all__ = ["CellSet", "Domain", "Grid", "as_domain", "grid"]

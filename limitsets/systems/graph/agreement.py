@@ -109,21 +109,16 @@ def _around_changes(code_of: Callable[[Floats], Any], starts: Floats, domain: Do
 def _points(params: Any, domain: Domain, side: int) -> tuple[Floats, int]:
     """Where the kernels are compared: the starts, then those around changes of branch; how many starts there are."""
     starts, near_changes = _starts(domain, side), []
-
-    def code_of(x: Floats) -> Any:
-        return images(params, x, side).code
-
-    def sign_of(x: Floats) -> Any:
-        return sign_code(margins(params, x, side))
-
     if len(kind_of(params).branches) == 1:
         return starts, len(starts)
     if kind_of(params).has_margin:
         if domain.dimension == 1:  # two changes of sign between a pair of starts
             more = hidden(lambda x: margins(params, x, side), starts[:, 0])
             starts = np.unique(np.append(starts, more))[:, None]
-        near_changes.append(_around_changes(sign_of, starts, domain, side))
-    near_changes.append(_around_changes(code_of, starts, domain, side))
+        near_changes.append(
+            _around_changes(lambda x: sign_code(margins(params, x, side)), starts, domain, side)
+        )
+    near_changes.append(_around_changes(lambda x: images(params, x, side).code, starts, domain, side))
     return np.concatenate([starts, *near_changes]), len(starts)
 
 

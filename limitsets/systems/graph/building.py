@@ -137,8 +137,9 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     require_agreement(map, grid.domain, chosen == "boxes", options.get("upper"))
     target = Target.of(grid, kind.exits)
     inhabited = grid.domain.inhabited.tolist()
+    none = no_boxes(grid.dimension, np.empty(0, np.uint8))
     parts = [
-        METHODS[chosen](map, grid, side, target, **options) if some else no_boxes(grid.dimension)
+        METHODS[chosen](map, grid, side, target, **options) if some else none
         for side, some in enumerate(inhabited)
     ]
     if grid.domain.closes:

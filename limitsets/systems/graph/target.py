@@ -223,10 +223,10 @@ def cut_at_seams(boxes: TargetBoxes, shape: NDArray[np.int64]) -> TargetBoxes:
     return boxes
 
 
-def no_boxes(dimension: int) -> TargetBoxes:
-    """Boxes of a side without cells."""
+def no_boxes(dimension: int, exits: NDArray[np.uint8]) -> TargetBoxes:
+    """Return no boxes, and exits of cells."""
     none, corner = np.empty(0, np.int64), np.empty((0, dimension), np.int32)
-    return TargetBoxes(none, none.astype(np.int32), corner, corner.copy(), np.empty(0, np.uint8), 0.0)
+    return TargetBoxes(none, none.astype(np.int32), corner, corner.copy(), exits, 0.0)
 
 
 @kernel(entry=True, counting=False)
@@ -266,8 +266,7 @@ def _per_cell(cell: NDArray[np.int64], exits: NDArray[np.uint8]) -> NDArray[np.u
 def leaving(target: Target, cell: NDArray[np.int64], code: NDArray[np.int64], dimension: int) -> TargetBoxes:
     """Mark the exits that codes name, without boxes."""
     bits = (1 << target.sink_of_code[-code]).astype(np.uint8)
-    nothing, none = np.empty(0, np.int64), np.empty((0, dimension), np.int32)
-    return TargetBoxes(nothing, nothing.astype(np.int32), none, none, _per_cell(cell, bits), 0.0)
+    return no_boxes(dimension, _per_cell(cell, bits))
 
 
 def merged(parts: list[TargetBoxes], n: int, second: float) -> TargetBoxes:

@@ -18,14 +18,13 @@ from limitsets.systems.maps.contract import MapKind, coerce, has_slope, kind_of,
 from limitsets.systems.maps.critical import CriticalPoint, critical_points
 from limitsets.systems.maps.drivers import (
     Images,
-    Lyapunov,
     Orbit,
     advance,
     images,
     images_on,
-    lyapunov,
     orbit,
 )
+from limitsets.systems.maps.growth import Lyapunov, lyapunov
 from limitsets.systems.maps.pieces import Piece, TurningPoint, along, monotone_pieces, turning_points
 from limitsets.systems.maps.textbook.circle import Circle as Circle
 from limitsets.systems.maps.textbook.cubic import Cubic as Cubic

@@ -8,13 +8,14 @@ samples are found (docs/model.md, decision).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from limitsets.base import AnswerError, arguments_checked, shown
 from limitsets.numbers.jit import kernel
+from limitsets.systems.cells import Domain
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.contract import compiled_kind_of, kind_of, require_sides
 from limitsets.systems.maps.drivers import columns, images
@@ -151,33 +152,14 @@ SAMPLES = 4096
 TINY = float(np.finfo(np.float64).tiny)
 
 
-class Sides(Protocol):
-    """What is asked of a domain: a box of x for each side (`limitsets.cells.Domain`)."""
-
-    @property
-    def lo(self) -> Array:
-        """Lower ends of x."""
-
-    @property
-    def hi(self) -> Array:
-        """Upper ends of x."""
-
-    @property
-    def anchor(self) -> Array | None:
-        """Ends of x that images approach and never reach."""
-
-    @property
-    def sides(self) -> int:
-        """Number of sides."""
-
-    def require_ends(self, door: str) -> None:
-        """Refuse axes that close, for `door`."""
+# Under this name `arguments_checked` lets everything pass: `require_domain` says more of what is no domain.
+Sides: TypeAlias = Domain
 
 
 def require_domain(params: Any, domain: Any, samples: int) -> None:
     """Refuse a map of more dimensions, where branches have no order, a domain that is none, and too few samples."""
     require_one_dimension(params)
-    if not all(hasattr(domain, name) for name in ("lo", "hi", "anchor", "sides")):
+    if not isinstance(domain, Domain):
         remedy = "pass scene.domain, or limitsets.grid([(0.0, 1.0)]).domain"
         raise AnswerError("the domain", shown(domain), "a Domain", remedy)
     if samples < 2:
@@ -260,11 +242,11 @@ def branches_of_side(params: Any, domain: Sides, side: int, samples: int) -> tup
     """Sample one side and its branches, with every change of branch between adjacent floats; none without states."""
     if not domain.lo[side, 0] < domain.hi[side, 0]:
         return np.empty(0), np.empty(0, np.int64)
-    x, code = located(_code_of(params, side), _sampled(domain, side, samples))
-    if not kind_of(params).has_margin:
-        return x, code
-    x = inserted(x, hidden(_margins_of(params, side), x))
-    return located(_code_of(params, side), x)
+    code_of = _code_of(params, side)
+    x, code = located(code_of, _sampled(domain, side, samples))
+    if kind_of(params).has_margin:
+        x, code = located(code_of, inserted(x, hidden(_margins_of(params, side), x)))
+    return x, code
 
 
 def require_one_dimension(params: Any) -> None:

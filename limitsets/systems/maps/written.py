@@ -108,10 +108,7 @@ def map(  # noqa: A001  # limitsets.map, as limitsets.maps
     coordinates = _coordinates_of(functions, takes, values)
     fields = tuple(dict.fromkeys(name for names in takes.values() for name in names if name in values))
     numbers = {name: _number(name, values[name]) for name in fields}
-    unknown = next((name for name in values if name not in fields), None)
-    if unknown is not None:
-        taken = ", ".join(fields) or "no parameter"
-        raise MapError("a value", f"{unknown}=...", f"values of {taken}", "correct the name")
+    _require_known(values, fields)
     for name, f in functions.items():
         arguments = [name for name in takes[name] if name not in coordinates]
         wanted = 1 if name == "margin" else len(coordinates)
@@ -220,6 +217,14 @@ def _coordinates_of(
     return coordinates
 
 
+def _require_known(values: dict[str, float], fields: tuple[str, ...]) -> None:
+    """Refuse the value of a name that is no parameter."""
+    for name in values:
+        if name not in fields:
+            allowed = f"values of {', '.join(fields) or 'no parameter'}"
+            raise MapError("a value", f"{name}=...", allowed, "correct the name")
+
+
 def _number(name: str, value: Any) -> float:
     """Return the value of a parameter as a float."""
     known = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
@@ -304,11 +309,7 @@ def _of_arrays(formula: Any, alone: bool, values: dict[str, float]) -> Any:
     values = _defaults_of({"first": formula}, values) | values
     coordinates = _coordinates_of({"first": formula}, {"first": takes}, values)
     fields = tuple(each for each in takes if each in values)
-    unknown = next((each for each in values if each not in fields), None)
-    if unknown is not None:
-        taken = ", ".join(fields) or "no parameter"
-        raise MapError("a value", f"{unknown}=...", f"values of {taken}", "correct the name")
-
+    _require_known(values, fields)
     on_arrays = _called(formula, name)
     key = ("vectorised", fields, id(formula))
     if key not in _CLASSES:
@@ -418,10 +419,7 @@ def _with_values(self: Any, **values: float) -> Any:
     MapError
         For a name that is no parameter, or a value that is no number.
     """
-    for name in values:
-        if name not in self._fields:
-            allowed = f"values of {', '.join(self._fields) or 'no parameter'}"
-            raise MapError("a value", f"{name}=...", allowed, "correct the name")
+    _require_known(values, self._fields)
     return self._replace(**{name: _number(name, value) for name, value in values.items()})
 
 

@@ -147,9 +147,8 @@ def _gathered(grid: Grid, values: Floats, box: int) -> Floats:
     """Sum values of cells over boxes, side after side."""
     parts = []
     for side in range(grid.sides):
-        shape = tuple(int(n) for n in grid.shape[side])
-        block = values[grid.of_side(side)].reshape(shape)
-        for axis, n in enumerate(shape):
+        block = grid.block(values, side)
+        for axis, n in enumerate(block.shape):
             block = np.add.reduceat(block, _begins(n, box), axis=axis)
         parts.append(block.ravel())
     return np.concatenate(parts)

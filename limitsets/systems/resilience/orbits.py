@@ -151,15 +151,10 @@ def starts_in(grid: Grid, cells: Integers, rng: np.random.Generator) -> tuple[Fl
     return lo + rng.random(lo.shape) * (hi - lo), side
 
 
-def random_starts(grid: Grid, count: int, rng: np.random.Generator) -> tuple[Floats, Integers]:
-    """Draw starts evenly by length (area, volume) over all sides."""
-    return random_cells(grid, count, rng)[1]
-
-
 def random_cells(
     grid: Grid, count: int, rng: np.random.Generator
 ) -> tuple[Integers, tuple[Floats, Integers]]:
-    """Draw starts evenly over all sides, with their cells; AnswerError for a number below 1."""
+    """Draw starts evenly by length (area, volume) over all sides, with their cells; AnswerError for less than 1."""
     if count < 1:
         raise AnswerError("the number of starts", count, "an integer from 1", "pass 1000")
     measure = grid.measure

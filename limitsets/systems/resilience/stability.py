@@ -29,7 +29,7 @@ from limitsets.systems.resilience.orbits import (
     follow,
     full_caption,
     leaves_by_the_border,
-    random_starts,
+    random_cells,
 )
 from limitsets.systems.sets import Attractor
 from limitsets.systems.sets.basin import longest_stays
@@ -171,7 +171,7 @@ def convergence_times(
     """
     parted = colours(graph, found)
     bounds = _bounds(parted)
-    x, side = random_starts(graph.grid, starts, np.random.default_rng(seed))
+    _, (x, side) = random_cells(graph.grid, starts, np.random.default_rng(seed))
     end, made = follow(graph, parted.blocks, x, side, steps, returning=True)
     undecided = float((end == codes.UNDECIDED).mean())
     times = []
@@ -370,7 +370,7 @@ def _counted(
 def _sampled(parted: Colours, starts: int, steps: int, seed: int) -> tuple[list[Share], float]:
     from scipy.special import betaincinv
 
-    x, side = random_starts(parted.grid, starts, np.random.default_rng(seed))
+    _, (x, side) = random_cells(parted.grid, starts, np.random.default_rng(seed))
     end, _ = follow(parted.graph, parted.blocks, x, side, steps, returning=True)
     undecided = int((end == codes.UNDECIDED).sum())
     shares = []

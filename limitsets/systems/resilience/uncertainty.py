@@ -263,8 +263,7 @@ def _uncertain(grid: Grid, label: NDArray[np.int64], apart: int) -> tuple[float,
     """
     uncertain, total = np.zeros((2, grid.dimension))
     for side in range(grid.sides):
-        shape = tuple(int(n) for n in grid.shape[side])
-        block, weight = (values[grid.of_side(side)].reshape(shape) for values in (label, grid.measure))
+        block, weight = (grid.block(values, side) for values in (label, grid.measure))
         for axis in range(grid.dimension):
             one, of = np.moveaxis(block, axis, 0), np.moveaxis(weight, axis, 0)
             differs, known = np.zeros(one.shape, dtype=bool), one != codes.UNDECIDED
@@ -443,14 +442,10 @@ def wada(
     seen = np.zeros((parted.codes.size, graph.n_cells), dtype=bool)
     seen[number[number >= 0], cell[number >= 0]] = True
     met = np.flatnonzero(seen.any(axis=1))
-    chosen = []
-    for side in range(graph.grid.sides):
-        shape = tuple(int(n) for n in graph.grid.shape[side])
-        several = np.zeros(shape, dtype=np.int64)
-        for colour in met:
-            several += _around(seen[colour, graph.grid.of_side(side)].reshape(shape))
-        chosen.append(graph.grid.offset[side] + np.flatnonzero(several > 1))
-    middle = np.concatenate(chosen)
+    several = np.zeros(graph.n_cells, dtype=np.int64)
+    for colour, side in product(met, range(graph.grid.sides)):
+        several[graph.grid.of_side(side)] += _around(graph.grid.block(seen[colour], side)).ravel()
+    middle = np.flatnonzero(several > 1)
     of = middle.size
     if of > boxes:
         middle = np.sort(rng.choice(middle, boxes, replace=False))
@@ -488,13 +483,9 @@ def _numbers(parted: Colours, label: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _around(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Cells in whose box some cell of the mask lies."""
-    for axis in range(mask.ndim):
-        spread = mask.copy()
-        for ends in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
-            to, of = ((slice(None),) * axis + (end,) for end in ends)
-            spread[to] |= mask[of]
-        mask = spread
-    return mask
+    from scipy.ndimage import binary_dilation
+
+    return np.asarray(binary_dilation(mask, np.ones((2 * AROUND + 1,) * mask.ndim)))
 
 
 def _neighbours(

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from limitsets.base import AnswerError, Column, Table, Tabled, arguments_checked, facts, how_found
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph, transitions
-from limitsets.systems.maps import has_slope, orbit
-from limitsets.systems.maps.drivers import lyapunov, orbit_with_exponent
+from limitsets.systems.maps import has_slope, lyapunov, orbit
+from limitsets.systems.maps.growth import orbit_with_exponent
 from limitsets.systems.maps.kernels import scattered
 
 # ----------------------------------------------------------------

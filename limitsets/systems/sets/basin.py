@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
-from itertools import product
+from itertools import compress, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -376,7 +375,7 @@ def basins(graph: TransitionGraph, found: tuple[Attractor, ...]) -> Basins:
         tuple(by_code[k] for k in range(len(found))),
         undecided_between=by_code[codes.UNDECIDED],
         exits={name: by_code[code] for name, code in graph.exits.items()},
-        advice=_advice(graph, list(itertools.compress(sets, ~(attracting | through)))),
+        advice=_advice(graph, list(compress(sets, ~(attracting | through)))),
         how=graph.how,
     )
 

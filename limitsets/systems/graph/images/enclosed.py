@@ -22,6 +22,7 @@ from limitsets.numbers.jit import proof_kernel, take_mark
 from limitsets.systems.cells import Grid
 from limitsets.systems.graph.target import Target, TargetBoxes, merged, placed
 from limitsets.systems.maps import kind_of
+from limitsets.systems.maps.contract import with_number
 from limitsets.systems.maps.kernels import fallback_box, image_box, on_side_box, pick, put
 
 # ----------------------------------------------------------------
@@ -188,21 +189,16 @@ PIECES_OF_X = {1: 4, 2: 4, 3: 2}
 PIECES_OF_PARAMETER = {1: 256, 2: 16, 3: 8}
 
 
-def _numbers(lo_map: Any, hi_map: Any) -> Iterator[tuple[tuple[str, ...], float, float]]:
-    """Scalar parameters by the names on the way to them, and both corners' values."""
+def _numbers(lo_map: Any, hi_map: Any) -> Iterator[tuple[str, float, float]]:
+    """Scalar parameters by their names, in others by a point, and both corners' values."""
     for name, low, high in zip(lo_map._fields, lo_map, hi_map, strict=True):
         if isinstance(low, float):
-            yield (name,), low, high
+            yield name, low, high
         elif hasattr(low, "_fields"):
-            yield from (((name, *rest), a, b) for rest, a, b in _numbers(low, high))
+            yield from ((f"{name}.{inner}", a, b) for inner, a, b in _numbers(low, high))
 
 
-def _with(params: Any, names: tuple[str, ...], value: float) -> Any:
-    name, *rest = names
-    return params._replace(**{name: _with(getattr(params, name), tuple(rest), value) if rest else value})
-
-
-def _least_known(lo_map: Any, hi_map: Any) -> tuple[tuple[str, ...], float, float] | None:
+def _least_known(lo_map: Any, hi_map: Any) -> tuple[str, float, float] | None:
     """Scalar parameter of largest relative width, None where all are known to some ulp."""
     widths = {
         number: (number[2] - number[1]) / max(abs(number[1]), abs(number[2]), 1e-300)
@@ -217,9 +213,9 @@ def _parameter_pieces(lo_map: Any, hi_map: Any, pieces: int) -> list[tuple[Any, 
     widest = _least_known(lo_map, hi_map)
     if widest is None:
         return [(lo_map, hi_map)]
-    names, low, high = widest
+    name, low, high = widest
     cuts = np.linspace(low, high, pieces + 1).tolist()
-    return [(_with(lo_map, names, a), _with(hi_map, names, b)) for a, b in pairwise(cuts)]
+    return [(with_number(lo_map, name, a), with_number(hi_map, name, b)) for a, b in pairwise(cuts)]
 
 
 def _cut(lo: Columns, hi: Columns, pieces: int) -> tuple[Columns, Columns]:

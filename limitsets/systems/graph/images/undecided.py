@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from limitsets.base import AnswerError
 from limitsets.numbers.jit import kernel
-from limitsets.systems.graph.target import Target, TargetBoxes, leaving, place, placed
+from limitsets.systems.graph.target import Target, TargetBoxes, leaving, no_boxes, place, placed
 from limitsets.systems.maps import codes, images, images_on, kind_of
 from limitsets.systems.maps.drivers import step
 from limitsets.systems.maps.kernels import on_side
@@ -284,8 +284,8 @@ def every_branch(
     flat = landed.ravel()
     points = real.reshape(-1, real.shape[-1])[flat]
     alone = placed(target, owner[flat], to.ravel()[flat], points, points, 0, inside=False)
-    beyond = TargetBoxes(alone.cell[:0], alone.side[:0], alone.lo[:0], alone.hi[:0], alone.exits, 0.0)
-    boxes = [leaving(target, owner[gone], named[gone], real.shape[-1]), beyond]
+    dimension = real.shape[-1]
+    boxes = [leaving(target, owner[gone], named[gone], dimension), no_boxes(dimension, alone.exits)]
     if kind.has_image_on:
         for branch in range(len(kind.branches)):
             forced, forced_to = images_on(params, _states(starts), side, branch)
