@@ -174,8 +174,8 @@ def test_a_certificate_of_other_formulas_is_denied_and_kept(tmp_path, monkeypatc
 
 
 def test_cells_of_which_nothing_is_claimed_have_no_rank():
-    lower = ls.map(logistic, r=3.2)
-    arrays = certificate_of_map.cells_of(lower, lower, ls.grid([(-0.1, 0.9)], cells=500))
+    lower, grid = ls.map(logistic, r=3.2), ls.grid([(-0.1, 0.9)], cells=500)
+    arrays = certificate_of_map.cells_of(certificate_of_map.targets_of(lower, lower, grid), grid)
     middle = np.linspace(-0.1, 0.9, 501)[:-1] + 0.001
     rank, component = arrays["rank"], arrays["component"]
     assert (rank[middle < -0.01] == -1).all()  # they leave

@@ -93,18 +93,14 @@ def targets_of(lower: Any, upper: Any, grid: Grid) -> Targets:
 
 
 def cells_of(
-    lower: Any,
-    upper: Any,
-    grid: Grid,
-    ends: NDArray[np.bool_] | None = None,
-    final: Numbers | None = None,
+    images: Targets, grid: Grid, ends: NDArray[np.bool_] | None = None, final: Numbers | None = None
 ) -> Arrays:
     """Find the arrays of one box of parameters.
 
     Parameters
     ----------
-    lower, upper : NamedTuple
-        Corners of the parameters.
+    images : Targets
+        Of all maps of the box.
     grid : Grid
         The cells.
     ends : ndarray of bool, shape (n_cells,), optional
@@ -120,7 +116,6 @@ def cells_of(
         ``edges.S.A``, ``target.B``, `rank` and `component`.  A cell from which an image may leave the domain, is not
         enclosed, or may come to recurrent cells that do not attract, has rank -1.
     """
-    images = targets_of(lower, upper, grid)
     target, lost = np.where(images.beyond[..., None], IMPOSSIBLE, images.cells), images.lost
     if final is not None:
         target[:, final >= 0], lost[final >= 0] = IMPOSSIBLE, False

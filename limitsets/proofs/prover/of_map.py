@@ -45,7 +45,6 @@ from limitsets.proofs.prover.cycles_of_map import (
     refuted_by_cycle,
 )
 from limitsets.proofs.prover.goal_of_map import missing, read_goal
-from limitsets.proofs.prover.leaving_of_map import with_weights
 from limitsets.proofs.prover.proof import Claim
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.systems.cells import CellSet, Grid
@@ -147,8 +146,7 @@ def _almost_every(proof: ProofOfMap) -> Claim:
     if proof.graph.grid.dimension != 1:
         reason = "that starts thin out is proved in one dimension only"
         return Claim("almost-every", "undecided", reason, {}, final=True)
-    weighted = with_weights(proof.arrays, proof.map, proof.upper, proof.graph.grid)
-    reason = weighted if isinstance(weighted, str) else ""
+    reason = proof.weights if isinstance(proof.weights, str) else ""
     return Claim("almost-every", "undecided" if reason else "proved", reason, {})
 
 
