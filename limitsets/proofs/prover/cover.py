@@ -449,6 +449,13 @@ def met(ends: NDArray[np.int32], cells: Mask) -> Mask:
     return reached
 
 
+def leading_to(ends: NDArray[np.int32], cells: Mask) -> Mask:
+    """Return the cells whose images meet some cells; `ends` as in `met`."""
+    number = np.concatenate([[0], np.cumsum(cells)])
+    leads: Mask = (ends[:, 0] >= 0) & (number[ends[:, 1] + 1] > number[ends[:, 0]])
+    return leads
+
+
 def everywhere(covered: Cover) -> list[NDArray[np.int32]]:
     """First and last target cells, as `targets`, of every branch and every number of sides that it turns."""
     sides = covered.grid.sides

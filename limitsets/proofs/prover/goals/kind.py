@@ -18,7 +18,7 @@ import numpy as np
 from limitsets.base.arrays import Ints, Mask
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import BELOW, Attraction
-from limitsets.proofs.prover.cover import everywhere, targets
+from limitsets.proofs.prover.cover import everywhere, leading_to, targets
 from limitsets.proofs.prover.goals.recurrent_orbits import Refutation
 from limitsets.proofs.prover.goals.violating_orbits import State
 from limitsets.systems.graph.components import ranks, reach, strong_components
@@ -108,13 +108,8 @@ def begins(section: Mapping[str, Any]) -> str:
 
 def thrown_into(attraction: Attraction, bad: Mask) -> str:
     """Name a cell from which a throw may land in one of some cells; empty if there is none."""
-    number = np.concatenate([[0], np.cumsum(bad)])
-    for ends in everywhere(attraction.cover):
-        cells = np.flatnonzero(ends[:, 0] >= 0)
-        hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
-        if hit.size:
-            return attraction.cover.place(int(hit[0]))
-    return ""
+    leading = (leading_to(ends, bad) for ends in everywhere(attraction.cover))
+    return next((attraction.cover.place(int(cells.argmax())) for cells in leading if cells.any()), "")
 
 
 def place_text(goal: Any, scene: Scene) -> str:
