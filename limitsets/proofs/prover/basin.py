@@ -201,6 +201,14 @@ def near_hinge(cover: Cover) -> tuple[NearHinge, ...]:
     return tuple(answers)
 
 
+def missing_near(joint: Sequence[NearHinge]) -> str:
+    """Say on which side what is missing near the joint; empty if nothing is."""
+    missing = (
+        f"near the joint on side {side}: {near.reason}" for side, near in enumerate(joint) if near.reason
+    )
+    return next(missing, "")
+
+
 def _rolled(cover: Cover, side: int, x: float, reach: float) -> tuple[float, bool, str]:
     """Prove that what is thrown from (a_i, x] rests as in the minimal model, or rolls into the cells.
 
@@ -403,14 +411,7 @@ def basin(cover: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
         (text.format(cover.place(int(np.argmax(mask)))) for mask, text in reasons if mask.any()), ""
     )
     if not missing and not near:
-        missing = next(
-            (
-                f"near the joint on side {side}: {each.reason}"
-                for side, each in enumerate(joint)
-                if each.reason
-            ),
-            "",
-        )
+        missing = missing_near(joint)
     # a little more, so that other arithmetic can confirm it
     throws = throws + throws // 8 + 1 if thin.any() else 0
     return Basin(

@@ -199,42 +199,6 @@ def widened(lo: Array, hi: Array) -> tuple[Array, Array]:
     return lo - wide, hi + wide
 
 
-def cycle_in_file(
-    lo: Array,
-    hi: Array,
-    side: Ints,
-    branches: Ints,
-    chosen: Array | None,
-    *,
-    radius: float | None = None,
-    unstable: bool = False,
-) -> dict[str, Any]:
-    """Write a periodic orbit.
-
-    Parameters
-    ----------
-    lo, hi : ndarray, shape (p, d)
-        Boxes of its points.
-    side, branches : ndarray of int, shape (p,)
-        Of its points.
-    chosen : ndarray, shape (p, d, d), or None
-        Frames in which it is contracted, if it attracts.
-    radius : float, optional
-        Of the balls in these frames that are contracted, if cells lie there.
-    unstable : bool
-        Whether the checker shall prove that it is.
-    """
-    listed = {
-        "boxes": hexed(np.stack(widened(lo, hi), axis=-1)),
-        "side": side.tolist(),
-        "branch": branches.tolist(),
-        "attracts": chosen is not None,
-        "frames": None if chosen is None else hexed(chosen),
-        "radius": None if radius is None else radius.hex(),
-    }
-    return listed | ({"unstable": True} if unstable else {})
-
-
 def frames_to_try(slopes: Array) -> list[Array]:
     """Choose S_k so that S_(k+1)^-1 A_k S_k contracts, from the derivatives A_k of the steps of an attracting orbit.
 

@@ -342,6 +342,12 @@ class Cover:
         lo, hi = self.grid.boxes([cell], side)
         return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
 
+    @property
+    def leaving(self) -> str:
+        """A cell whose image may leave the cells, for people; empty if there is none."""
+        leaving = np.flatnonzero(self.graph.ranges.exits)
+        return f"the image of {self.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
+
 
 def _widened(enclosed: Enclosures, edges: Array, landing: float) -> Enclosures:
     """Widen the images by the slack and by the scatter of the landing place, which no decision depends on."""

@@ -26,7 +26,7 @@ from limitsets.proofs.prover.certificate_of_map import (
     Part,
     Targets,
     cells_of,
-    cycle_in_file,
+    hexed,
     targets_of,
     widened,
     write_map,
@@ -269,13 +269,20 @@ def frames_of(corners: tuple[Any, Any], cycle: CycleOfMap) -> Array | None:
 
 def _cycle_section(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
     """Write a proved orbit as a certificate has it."""
+    corners, ball = (proof.map, proof.upper), cycle.ball
     # branches that are names alone are one in the file
     branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
-    boxes = cycle.lo, cycle.hi, cycle.side, branches
-    corners = proof.map, proof.upper
-    turns = {} if cycle.turns is None else {"turns": cycle.turns.tolist()}
-    if cycle.ball is not None:
-        return cycle_in_file(*boxes, cycle.ball.frames, radius=cycle.ball.radius) | turns
-    unstable = cycle.attracts is False and is_unstable_in_file(corners, cycle)
-    frames = frames_of(corners, cycle) if cycle.attracts else None
-    return cycle_in_file(*boxes, frames, unstable=unstable) | turns
+    frames = None if ball is None else ball.frames
+    if ball is None and cycle.attracts:
+        frames = frames_of(corners, cycle)
+    unstable = ball is None and cycle.attracts is False and is_unstable_in_file(corners, cycle)
+    listed: dict[str, Any] = {
+        "boxes": hexed(np.stack(widened(cycle.lo, cycle.hi), axis=-1)),
+        "side": cycle.side.tolist(),
+        "branch": branches.tolist(),
+        "attracts": frames is not None,
+        "frames": None if frames is None else hexed(frames),
+        "radius": None if ball is None else ball.radius.hex(),
+    }
+    listed |= {"unstable": True} if unstable else {}
+    return listed | ({} if cycle.turns is None else {"turns": cycle.turns.tolist()})

@@ -17,7 +17,8 @@ import numpy as np
 
 from limitsets.base.arrays import Ints, Mask
 from limitsets.feeder.scene import Scene
-from limitsets.proofs.prover.attraction import BELOW, Attraction
+from limitsets.proofs.prover.attraction import BELOW, Attraction, no_cells
+from limitsets.proofs.prover.basin import missing_near
 from limitsets.proofs.prover.cover import everywhere, leading_to, targets
 from limitsets.proofs.prover.goals.recurrent_orbits import Refutation
 from limitsets.proofs.prover.goals.violating_orbits import State
@@ -88,16 +89,8 @@ def once(orbit: tuple[State, ...], reason: str = "") -> Answer:
 def common(attraction: Attraction, *, anywhere: bool) -> str:
     """Say which need of every goal is not proved: attracting cells, or that no start leaves; empty if all are."""
     if not anywhere:
-        return "" if (attraction.component >= 0).any() else "there are no attracting cells"
-    if attraction.cover.points:
-        return BELOW
-    for side, near in enumerate(attraction.joint):
-        if not near.proved:
-            return f"near the joint on side {side}: {near.reason}"
-    leaving = np.flatnonzero(attraction.cover.graph.ranges.exits)
-    return (
-        f"the image of {attraction.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
-    )
+        return no_cells(attraction.component)
+    return BELOW if attraction.cover.points else missing_near(attraction.joint) or attraction.cover.leaving
 
 
 def begins(section: Mapping[str, Any]) -> str:
