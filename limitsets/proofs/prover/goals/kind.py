@@ -73,6 +73,11 @@ def undecided(reason: str, *, final: bool = False) -> Answer:
     return Answer("undecided", reason, final=final)
 
 
+def proved_unless(missing: str, section: Mapping[str, Any], *, final: bool = False) -> Answer:
+    """Answer that the goal is proved, by the numbers of its section; undecided where something is missing."""
+    return undecided(missing, final=final) if missing else Answer("proved", "", section)
+
+
 def against(refutation: Refutation, reason: str = "") -> Answer:
     """Answer by a refutation, with the starts for which the goal fails; undecided if the refutation is empty."""
     if not refutation.of:
