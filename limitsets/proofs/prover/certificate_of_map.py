@@ -151,14 +151,12 @@ def ranges_of(grid: Grid, target: Numbers, to: Numbers, lost: NDArray[np.bool_])
     """Make the graph of the targets; `to` has the side that each branch leads to."""
     cell, branch = np.nonzero(target[:, :, 0].T != IMPOSSIBLE)
     boxes, sides = target[branch, cell], to[branch, cell]
-    begin = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=grid.n_cells))])
     first, last = (np.ascontiguousarray(part) for part in np.hsplit(boxes, 2))
+    parts = TargetBoxes(cell, sides, first, last, np.zeros(grid.n_cells, np.uint8), 0.0)
     if grid.domain.closes:
-        whole = TargetBoxes(cell, sides, first, last, np.zeros(grid.n_cells, np.uint8), 0.0)
-        parts = cut_at_seams(whole, grid.shape)
-        begin = np.concatenate([[0], np.cumsum(np.bincount(parts.cell, minlength=grid.n_cells))])
-        sides, first, last = parts.side, parts.lo, parts.hi
-    return build(grid, begin, sides, first, last, lost.astype(np.uint8))
+        parts = cut_at_seams(parts, grid.shape)
+    begin = np.concatenate([[0], np.cumsum(np.bincount(parts.cell, minlength=grid.n_cells))])
+    return build(grid, begin, parts.side, parts.lo, parts.hi, lost.astype(np.uint8))
 
 
 def _labels(

@@ -338,8 +338,10 @@ class Query:
         return any(goal.from_anywhere or goal.of_every_start for goal in self.goals)
 
     def unjoined(self, pieces: Sequence[Outcome]) -> str:
-        """Say why pieces do not prove the goals together; empty if they do."""
-        return unjoined(pieces)
+        """Say why pieces do not prove the goals together, in one certificate; empty if they do."""
+        missing = [piece.reason for piece in pieces if piece.verdict != "proved"]
+        missing = missing or [claim.reason for claim in joined_claims(pieces) if claim.verdict != "proved"]
+        return missing[0] if missing else ""
 
     def box(self, piece: SceneBox | None, noise: Mapping[str, str]) -> ParameterBox:
         """Enclose the parameters."""
@@ -501,13 +503,6 @@ def joined_claims(pieces: Sequence[Outcome]) -> tuple[Claim, ...]:
         for piece in pieces
     ]
     return tuple(weakest_of(of_goal, attractions) for of_goal in zip(*claims, strict=True))
-
-
-def unjoined(pieces: Sequence[Outcome]) -> str:
-    """Say why pieces do not prove the goals together, in one certificate; empty if they do."""
-    missing = [piece.reason for piece in pieces if piece.verdict != "proved"]
-    missing = missing or [claim.reason for claim in joined_claims(pieces) if claim.verdict != "proved"]
-    return missing[0] if missing else ""
 
 
 def _said(error: AnswerError) -> str:

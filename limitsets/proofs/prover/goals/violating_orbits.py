@@ -229,14 +229,6 @@ def sample_passage(attraction: Attraction, cells: Ints) -> tuple[State, ...]:
     return replayed(box, Path(path.x.tolist(), path.side.tolist(), [choice] * path.code.size))
 
 
-def proved_wrong(box: ParameterBox, path: Path, wrong: Wrong) -> tuple[State, ...]:
-    """Prove an orbit as `replayed`, and that its last state violates the goal; empty if it cannot be."""
-    states = replayed(box, path)
-    if not states:
-        return ()
-    return states if wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all() else ()
-
-
 def replayed(box: ParameterBox, path: Path) -> tuple[State, ...]:
     """Prove an orbit: its states enclosed, all but the last proved to be on the arm; empty if it cannot be.
 
@@ -283,8 +275,10 @@ def one_throw(
         return ()
     reached = ReachedStates.of(x, side)
     reached.add(thrown, bad)
-    states = proved_wrong(box, reached.path(0, options), wrong)
-    return states if states and states[-1].hi <= box.lo.arm_length else ()
+    states = replayed(box, reached.path(0, options))
+    if not states or not wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all():
+        return ()
+    return states if states[-1].hi <= box.lo.arm_length else ()
 
 
 def start_that_leaves(attraction: Attraction, laid: Laid = ()) -> tuple[State, ...]:
@@ -306,7 +300,9 @@ def start_that_leaves(attraction: Attraction, laid: Laid = ()) -> tuple[State, .
     for option in throw_choices(box, 3):
         for path in _first_to_leave(attraction, option, laid):
             states = replayed(box, path)
-            if states and _is_off(box, states[-1]):
+            last = states[-1] if states else None
+            # proved to be at x <= a or beyond the arm's end
+            if last and (last.hi <= box.lo.a[last.side] or last.lo > box.hi.arm_length):
                 return states
     return ()
 
@@ -350,8 +346,3 @@ def _first_to_leave(attraction: Attraction, option: ThrowChoice, laid: Laid) -> 
         if keep.size < thrown.stays.size or not keep.size:
             return
         reached.add(thrown, keep)
-
-
-def _is_off(box: ParameterBox, state: State) -> bool:
-    """Whether a landing is proved to be at x <= a or beyond the arm's end."""
-    return bool(state.hi <= box.lo.a[state.side] or state.lo > box.hi.arm_length)
