@@ -15,6 +15,7 @@ from limitsets.proofs.prover.cycles_of_map import MOST_WORDS
 from limitsets.proofs.prover.orbits_of_map import prove_orbit
 from limitsets.systems.sets import Cycle, cycles
 from tests.maps_of_tests import Tent
+from tests.proofs.test_certify import verdicts
 
 CLAIMS = ["invariant", "trapping", "attracts-all", "expanding", "cycles"]
 
@@ -68,10 +69,6 @@ ls.register(Odd, image=_odd)
 ls.register(Jump, image=_jump, image_on=_jump_on, margin=_jump_margin, branches=("below", "above"))
 ls.register(Ricker, image=_ricker)
 ls.register(Spiral, image=_spiral, dimension=2)
-
-
-def verdicts(proof):
-    return {claim.claim: claim.verdict for claim in proof.claims}
 
 
 def test_a_fixed_point_attracts_all():
