@@ -4,8 +4,6 @@ An orbit refutes because it comes back: periodic without noise, closed within th
 refutes only what is asked of every throw from every start.
 """
 
-import json
-import zipfile
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +22,7 @@ from tests.attack import facts
 from tests.attack.throws import Orbits
 from tests.plates import left_by_some
 from tests.proofs import forge
+from tests.proofs.test_certificates_of_maps import header_of
 from tests.thrower import reference
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
@@ -72,11 +71,6 @@ def files(claims, tmp_path_factory):
         scene, within = (nominal, CASES[name][2]) if CASES[name][2] else (proof.scene, {})
         write_refutation(found[name], proof.attractions[0], proof.scene.goal, states, recurs, within, scene)
     return found
-
-
-def header_of(path):
-    with zipfile.ZipFile(path) as file:
-        return json.loads(file.read("header.json"))
 
 
 def section(header):

@@ -6,20 +6,24 @@ import math
 import tomllib
 import zipfile
 from fractions import Fraction
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
-from limitsets.feeder.scene.units import parse
 from limitsets.proofs.prover.attraction import attraction
 from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.parameters import parameter_box
 from tests.plates import LEAD_QUAD
 from tests.proofs import forge
-from tests.proofs.test_certify import landed_where_the_cells_say, require_rechecked, verdicts
+from tests.proofs.test_certify import (
+    landed_where_the_cells_say,
+    require_rechecked,
+    table_of,
+    thrown_again,
+    verdicts,
+)
 from tests.proofs.test_recheck import checker, verdict
 from tests.thrower import reference
 
@@ -242,10 +246,6 @@ GOAL_AT, SHARP_LANDING = 20.0, 0.10595  # beyond 20 in only side 2
 EVERYWHERE_INSIDE = ["goal", "invariant", "trapping", "expanding"]
 
 
-def counterexample(proof, word="goal"):
-    return next(record for record in proof.to_json() if record["claim"] == word)["counterexample"]
-
-
 def number(text):
     return float(text.split()[0])
 
@@ -261,17 +261,8 @@ def tilted_scene(throw=None):
 
 def require_thrown(proof, word="goal"):
     """Throw a counterexample again at 50 digits, each throw as it says, and return its states."""
-    facts = reference.paper("designed")
-    states = counterexample(proof, word)
-    for before, after in pairwise(states):
-        said = before["parameters"]
-        kappa = float(parse(said["throw.kappa"], "length").number)
-        own = reference.Facts({**facts.numbers, "kappa": kappa})
-        thrown = reference.throw(own, before["side"], before["x"])
-        shift = number(said["landing.x"]) if "landing.x" in said else 0.0
-        width = 1e-11 + 4 * (before["between"][1] - before["between"][0])
-        assert thrown.side == after["side"]
-        assert after["between"][0] - width <= thrown.x + shift <= after["between"][1] + width
+    states = table_of(proof, word)["counterexample"]
+    assert len([*thrown_again(states, reference.paper("designed"), 1e-11)]) == len(states) - 1
     return states
 
 
