@@ -163,14 +163,12 @@ def not_attracting(cover: Cover, recurring: CellSet) -> str:
 
 def near_section(attractors: Attraction) -> dict[str, dict[str, Any]]:
     """Write what a recheck needs of the starts below the cells: by side the factor, the bracket of a fixed point."""
-    section: dict[str, dict[str, Any]] = {}
-    for side, near in enumerate(attractors.joint):
-        if near.empty:
-            continue
-        section[str(side)] = {"q": near.q.hex()}
-        if near.fixed_point is not None:
-            section[str(side)]["fixed_point"] = [end.hex() for end in near.fixed_point]
-    return section
+    return {
+        str(side): {"q": near.q.hex()}
+        | ({"fixed_point": [end.hex() for end in near.fixed_point]} if near.fixed_point else {})
+        for side, near in enumerate(attractors.joint)
+        if not near.empty
+    }
 
 
 # ----------------------------------------------------------------

@@ -184,7 +184,7 @@ def _ball(proof: ProofOfMap, cycle: CycleOfMap) -> tuple[Ball | None, str]:
 
     def slopes(lo: Array, hi: Array) -> Intervals | None:
         beyond = (lo < domain.lo[cycle.side]).any() or (hi > domain.hi[cycle.side]).any()
-        if beyond or (proof.goal is not None and not proof.goal.holds(lo, hi, cycle.side)):
+        if beyond or (proof.goal is not None and not proof.goal.within(lo, hi, cycle.side).all()):
             return None
         return slopes_on((proof.map, proof.upper), lo, hi, cycle)
 

@@ -32,7 +32,7 @@ from limitsets.proofs.prover.certificate_of_map import (
     write_map,
 )
 from limitsets.proofs.prover.converging import attracting_frames
-from limitsets.proofs.prover.goal_of_map import GoalOfMap, within_ends
+from limitsets.proofs.prover.goal_of_map import GoalOfMap
 from limitsets.proofs.prover.leaving_of_map import exits_of, targets_beyond, weights_of
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, is_unstable_in_file, slopes_of, slopes_on
 from limitsets.proofs.prover.programs import begins_of
@@ -108,7 +108,7 @@ class ProofOfMap(Saved):
     def arrays(self) -> Arrays:
         """The arrays of a certificate: target cells, ranks, components (docs/certificates.md)."""
         grid = self.graph.grid
-        ends = None if self.goal is None else within_ends(self.goal, grid)
+        ends = None if self.goal is None else self.goal.within(*grid.corners(np.arange(grid.n_cells)))
         return cells_of(self._images, grid, ends, self.final)
 
     @functools.cached_property

@@ -60,18 +60,12 @@ class _Raster:
         extents = attractors.cells.extents()
         total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
         self.step = total / PLACES
-        self.low, self.first = {}, {}
-        x, side, count = [], [], 0
-        for s, parts in extents.items():
-            if not parts:
-                continue
-            lo, hi = parts[0][0], parts[-1][1]
-            some = np.arange(lo, hi + self.step, self.step)
-            self.low[s], self.first[s] = lo, count
-            x.append(some)
-            side.append(np.full(some.size, s))
-            count += some.size
-        self.x, self.side = np.concatenate(x), np.concatenate(side)
+        spans = {side: (parts[0][0], parts[-1][1]) for side, parts in extents.items() if parts}
+        rows = [np.arange(lo, hi + self.step, self.step) for lo, hi in spans.values()]
+        sizes = [row.size for row in rows]
+        self.low = {side: lo for side, (lo, _) in spans.items()}
+        self.first = dict(zip(spans, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
+        self.x, self.side = np.concatenate(rows), np.repeat([*spans], sizes)
 
     def nearest(self, x: Array, side: Ints) -> Ints:
         """Return the number of the nearest place; -1 where there is none."""
