@@ -402,10 +402,10 @@ def cover(
 
 def cut_at(plain: Grid, cuts: Mapping[int, Sequence[float]]) -> Grid:
     """Cut the cells of a grid at more places, by side."""
-    sides = []
-    for side, (edges,) in enumerate(plain.edges):
-        wanted = [x for x in cuts.get(side, ()) if edges[0] < x < edges[-1]]
-        sides.append((np.union1d(edges, wanted),))
+    sides = (
+        (np.union1d(edges, [x for x in cuts.get(side, ()) if edges[0] < x < edges[-1]]),)
+        for side, (edges,) in enumerate(plain.edges)
+    )
     return Grid(plain.domain, tuple(sides))
 
 

@@ -474,10 +474,7 @@ def _kappa_to(box: ParameterBox, x: float, side: int, to: float, on: int) -> flo
         return low if abs(first) <= abs(last) else high
     for _ in range(60):
         middle = 0.5 * (low + high)
-        if (beyond(middle) > 0.0) == (first > 0.0):
-            low = middle
-        else:
-            high = middle
+        low, high = (middle, high) if (beyond(middle) > 0.0) == (first > 0.0) else (low, middle)
     return 0.5 * (low + high)
 
 
