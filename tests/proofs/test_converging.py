@@ -190,11 +190,8 @@ ENDS, STARTS = [[(0.35, 1.65)]], [[(0.02, 2.6)]]
         (2.5, {"ends": ENDS}, "undecided"),  # of which starts is not said
         (2.5, {"ends": ENDS, "starts": [[(2.0, 2.6)]]}, "undecided"),  # the cycle begins elsewhere
         (2.5, {"ends": [[(0.2, 1.9)]], "starts": STARTS}, "proved"),
-        (
-            2.5,
-            {"ends": [[(0.2, 0.8)], [(1.2, 1.9)]], "starts": STARTS},
-            "undecided",
-        ),  # by a cycle that repels alone
+        # by a cycle that repels alone
+        (2.5, {"ends": [[(0.2, 0.8)], [(1.2, 1.9)]], "starts": STARTS}, "undecided"),
     ],
 )
 def test_a_goal_is_refuted_by_a_cycle_that_attracts(upper, how, verdict, tmp_path):

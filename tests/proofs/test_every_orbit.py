@@ -98,11 +98,8 @@ def test_the_orbits_are_as_many_as_theory_says_and_the_checker_finds_no_other(na
     ("make", "box", "reason"),
     [
         (lambda: ls.map(steep), [(0, 1)], "border"),  # the fixed point 0
-        (
-            lambda: ls.map(logistic, r=3.0),
-            [(0.1, 0.9)],
-            "multiplier",
-        ),  # slope -1 at 2/3, where a 2-cycle is born
+        # slope -1 at 2/3, where a 2-cycle is born
+        (lambda: ls.map(logistic, r=3.0), [(0.1, 0.9)], "multiplier"),
         (lambda: ls.map(logistic, r=1.0), [(-0.5, 0.5)], "multiplier"),  # a double fixed point
     ],
 )

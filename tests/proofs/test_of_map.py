@@ -278,16 +278,8 @@ def test_branches_that_are_names_alone_need_no_margin():
     assert np.sort(0.5 * (cycle.lo + cycle.hi).ravel()) == pytest.approx(points, rel=1e-12)
     every = ls.certify(maps.Logistic(4.0), ls.grid([(-0.1, 1.1)], cells=16), ["all-cycles"], period=4)
     assert every.claims[0].verdict == "proved"
-    assert sorted(orbit.period for orbit in every.cycles) == [
-        1,
-        1,
-        2,
-        3,
-        3,
-        4,
-        4,
-        4,
-    ]  # of the full shift of two
+    # of the full shift of two
+    assert sorted(orbit.period for orbit in every.cycles) == [1, 1, 2, 3, 3, 4, 4, 4]
 
 
 class Rooted(NamedTuple):

@@ -95,12 +95,8 @@ ORBITS: dict[str, tuple[Any, Any, int, list[list[bool | None]]]] = {
         1,
         [[False, None]],  # traces 2 + k and 2 - k, determinant 1: hyperbolic, elliptic
     ),
-    "rotation": (
-        ls.map(turn, by=0.5),
-        line(-0.3, 16),
-        2,
-        [[], []],
-    ),  # each point is of period 2: none is alone
+    # each point is of period 2: none is alone
+    "rotation": (ls.map(turn, by=0.5), line(-0.3, 16), 2, [[], []]),
     # 0 and 1/2 attract: the slopes are 1.9 and 0.1; the other orbit of period 2 repels, outside the attracting cells
     "tongue": (ls.map(circle, omega=0.5, k=0.9), line(-0.3, 64), 2, [[], [True]]),
 }

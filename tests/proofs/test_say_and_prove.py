@@ -307,9 +307,8 @@ def test_a_dropped_attractor_leaves_the_goal_proved_on_cells_at_most(two, tmp_pa
     assert left == 0
     assert (report.verdict, report.starts) == ("proved-on-cells", "cells")
     assert 0.01 < report.share < 1
-    assert report.open == pytest.approx(
-        1 - report.share, abs=1e-12
-    )  # both are rounded to 1e-6, against the claim
+    # both are rounded to 1e-6, against the claim
+    assert report.open == pytest.approx(1 - report.share, abs=1e-12)
     near = near_section(two)
     for starts, more in (
         ("every", {"near_joint": near}),
