@@ -18,7 +18,6 @@ from limitsets.proofs.prover.numbers import RationalInterval, angle
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.systems.maps import images
 from limitsets.systems.maps.drivers import advance
-from tests.proofs.test_certify import claim_of, verdicts
 from tests.scene.test_load import BOTH as BOTH_CHAMFER, CHAMFER, chamfered
 
 # ----------------------------------------------------------------
@@ -34,6 +33,14 @@ SCATTER = {"speed": "0.3 %", "landing": "0.02 in"}
 
 def scene(name, effects, **tables):
     return ls.load(ls.load(name).as_dict() | {"effects": effects} | tables)
+
+
+def verdicts(proof):
+    return {claim.claim: claim.verdict for claim in proof.claims}
+
+
+def claim_of(proof, word):
+    return next(claim for claim in proof.claims if claim.claim == word)
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +122,9 @@ def test_a_bounded_spread_is_noise_and_is_rechecked(tmp_path):
     as_noise = ls.certify("paper-designed", ["goal", "invariant"], noise=proof.noise)
     assert verdicts(proof) == verdicts(as_noise) == {"goal": "proved", "invariant": "proved"}
     assert proof.attractions[0].cells.extents() == as_noise.attractions[0].cells.extents()
-    proof.save(tmp_path / "x.proof.zip")
+    report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
+    assert (report.verdict, report.reason) == ("proved", "")
+    assert {claim for claim, state, _ in report.claims if state == "proved"} == {"goal", "invariant"}
     assert ls.certify(case, ["invariant"], noise={"throw.speed": "0.3 %"}).noise == proof.noise
     with pytest.raises(AnswerError, match=r"throw\.speed"):
         ls.certify(case, noise={"throw.speed": "0.2 %"})

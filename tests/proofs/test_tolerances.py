@@ -6,24 +6,20 @@ import math
 import tomllib
 import zipfile
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
+from limitsets.feeder.scene.units import parse
 from limitsets.proofs.prover.attraction import attraction
 from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.parameters import parameter_box
 from tests.plates import LEAD_QUAD
 from tests.proofs import forge
-from tests.proofs.test_certify import (
-    landed_where_the_cells_say,
-    require_rechecked,
-    table_of,
-    thrown_again,
-    verdicts,
-)
+from tests.proofs.test_certify import landed_where_the_cells_say
 from tests.proofs.test_recheck import checker, verdict
 from tests.thrower import reference
 
@@ -62,7 +58,9 @@ def designed(name):
 def test_each_quantity_is_proved_and_rechecked(tmp_path, name, width):
     proof = ls.certify(designed(name), tolerance={name: width})
     assert proof.proved
-    require_rechecked(proof, tmp_path)
+    report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
+    assert report.reason == ""
+    assert report.claims == [("attracts-all", "proved", ""), ("goal", "proved", "")]
 
 
 # ---------------------------------------------------------------- the checker's halves
@@ -165,6 +163,8 @@ def test_a_scene_in_the_units_of_other_workshops_is_rechecked(tmp_path, toleranc
     proof = ls.certify(scene, ["invariant"], tolerance=tolerance, noise=noise)
     assert proof.proved
     path = proof.save(tmp_path / "quad.proof.zip")
+    report = ls.recheck(path)
+    assert (report.verdict, report.reason) == ("proved", "")
     with zipfile.ZipFile(path) as file:
         header = json.loads(file.read("header.json"))
     assert (header["version"], header["scene"]) == (3, {"flight": "exact", "flip": "signed"})
@@ -182,6 +182,7 @@ def test_a_scene_that_leaves_its_model_to_the_defaults_is_rechecked(tmp_path, mo
     (claim,) = proof.claims
     assert claim.verdict == "proved-on-cells"  # 22 % of the starts leave the arm
     report = ls.recheck(proof.save(tmp_path / "quad.proof.zip"))
+    assert report.verdict == "proved-on-cells"
     assert report.share == pytest.approx(claim.shares["share"], abs=1e-3)
     rng = np.random.default_rng(4)
     one, left = proof.scene, []
@@ -200,6 +201,7 @@ def test_corners_and_masses_with_a_tolerance_are_rechecked(tmp_path):
     proof = ls.certify(ls.load(LEAD_QUAD), ["goal"], tolerance=tolerance)
     assert [claim.verdict for claim in proof.claims] == ["proved-on-cells"]  # some starts leave, as above
     report = ls.recheck(proof.save(tmp_path / "quad.proof.zip"))
+    assert report.verdict == "proved-on-cells"
     assert report.share == pytest.approx(proof.claims[0].shares["share"], abs=1e-3)
 
 
@@ -232,7 +234,7 @@ def test_a_mass_known_to_a_tolerance_widens_the_part_by_what_it_moves(tmp_path):
     assert (wide <= 1.05 * moved + 0.05 * moved.max()).all()
     proof = ls.certify(scenes[20], ["invariant"], tolerance={"part.mass.points[0].mass": "0.000001 kg"})
     assert proof.proved
-    proof.save(tmp_path / "x.proof.zip")
+    assert ls.recheck(proof.save(tmp_path / "x.proof.zip", recheck=False)).verdict == "proved"
 
 
 # ----------------------------------------------------------------
@@ -244,6 +246,14 @@ def test_a_mass_known_to_a_tolerance_widens_the_part_by_what_it_moves(tmp_path):
 GOAL_AT, SHARP_LANDING = 20.0, 0.10595  # beyond 20 in only side 2
 
 EVERYWHERE_INSIDE = ["goal", "invariant", "trapping", "expanding"]
+
+
+def verdicts(proof):
+    return {claim.claim: claim.verdict for claim in proof.claims}
+
+
+def counterexample(proof, word="goal"):
+    return next(record for record in proof.to_json() if record["claim"] == word)["counterexample"]
 
 
 def number(text):
@@ -259,10 +269,26 @@ def tilted_scene(throw=None):
     return ls.load(tree)
 
 
+def require_rechecked(proof, tmp_path):
+    report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
+    written = {claim.claim: claim.verdict for claim in proof.claims if claim.written}
+    assert {claim: state for claim, state, _ in report.claims} == written
+    assert report.verdict == max(written.values(), key=("proved", "proved-on-cells").index), report.reason
+
+
 def require_thrown(proof, word="goal"):
     """Throw a counterexample again at 50 digits, each throw as it says, and return its states."""
-    states = table_of(proof, word)["counterexample"]
-    assert len([*thrown_again(states, reference.paper("designed"), 1e-11)]) == len(states) - 1
+    facts = reference.paper("designed")
+    states = counterexample(proof, word)
+    for before, after in pairwise(states):
+        said = before["parameters"]
+        kappa = float(parse(said["throw.kappa"], "length").number)
+        own = reference.Facts({**facts.numbers, "kappa": kappa})
+        thrown = reference.throw(own, before["side"], before["x"])
+        shift = number(said["landing.x"]) if "landing.x" in said else 0.0
+        width = 1e-11 + 4 * (before["between"][1] - before["between"][0])
+        assert thrown.side == after["side"]
+        assert after["between"][0] - width <= thrown.x + shift <= after["between"][1] + width
     return states
 
 
