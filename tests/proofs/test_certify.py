@@ -52,11 +52,11 @@ def numbers(scene):
 
 
 def require_rechecked(proof, tmp_path):
+    """Save it, which the checker has to confirm, and see that each claim that may be written was."""
     report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
-    assert report.reason == ""
-    assert report.verdict == "proved"
-    proved = {claim.claim for claim in proof.claims if claim.verdict == "proved"}
-    assert {claim for claim, state, _ in report.claims if state == "proved"} == proved
+    written = {claim.claim: claim.verdict for claim in proof.claims if claim.written}
+    assert {claim: state for claim, state, _ in report.claims} == written
+    assert report.verdict == max(written.values(), key=("proved", "proved-on-cells").index), report.reason
 
 
 @pytest.fixture(scope="module", params=LIMIT_SETS)
@@ -133,6 +133,21 @@ def test_the_goal_is_proved_where_it_holds_and_refuted_where_not(paper):
     assert claim_of(paper, "goal").shares == {"share": 1.0, "leaves": 0.0, "creeps": 0.0, "open": 0.0}
 
 
+def thrown_again(states, facts, room):
+    """Throw an orbit again at 50 digits, each throw as it says, and see that it does so: kappa and throw of each."""
+    for before, after in pairwise(states):
+        said = before["parameters"]
+        kappa = float(parse(said["throw.kappa"], "length").number)
+        own = reference.Facts({**facts.numbers, "kappa": kappa})
+        thrown = reference.throw(own, before["side"], before["x"])
+        shift = float(said["landing.x"].split()[0]) if "landing.x" in said else 0.0
+        # each throw is begun at the middle of an interval of width w: it ends within a few w of the next one's
+        width = room + 4 * (before["between"][1] - before["between"][0])
+        assert thrown.side == after["side"]
+        assert after["between"][0] - width <= thrown.x + shift <= after["between"][1] + width
+        yield kappa, thrown
+
+
 def require_refuting_orbit(proof, share=0.0):
     """Throw the orbit again with the plain formulas, and see that it does what is said."""
     goal, facts = proof.scene.goal, numbers(proof.scene)
@@ -140,17 +155,10 @@ def require_refuting_orbit(proof, share=0.0):
     first, last = states[0], states[-1]
     cells = table_of_extents(proof) if verdicts(proof).get("attracts-all") == "proved" else {}
     assert not cells or any(lo <= first["x"] <= hi for lo, hi in cells[str(first["side"])])
-    for before, after in pairwise(states):
-        kappa = float(parse(before["parameters"]["throw.kappa"], "length").number)
-        least, most = (facts.kappa / (1 + by) ** 2 for by in (share, -share))
+    least, most = (facts.kappa / (1 + by) ** 2 for by in (share, -share))
+    for kappa, thrown in thrown_again(states, facts, 1e-12):
         assert least * (1 - 1e-12) <= kappa <= most * (1 + 1e-12)
-        own = reference.Facts({**facts.numbers, "kappa": kappa})
-        thrown = reference.throw(own, before["side"], before["x"])
         assert thrown.code in (0, 1)
-        assert thrown.side == after["side"]
-        # each throw is begun at the middle of an interval of width w: it ends within a few w of the next one's
-        width = 1e-12 + 4 * (before["between"][1] - before["between"][0])
-        assert after["between"][0] - width <= thrown.x <= after["between"][1] + width
     assert last["parameters"] is None
     assert last["between"][0] > goal.x
     assert last["side"] != goal.side

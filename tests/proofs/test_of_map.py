@@ -15,6 +15,7 @@ from limitsets.proofs.prover.cycles_of_map import MOST_WORDS
 from limitsets.proofs.prover.orbits_of_map import prove_orbit
 from limitsets.systems.sets import Cycle, cycles
 from tests.maps_of_tests import Tent
+from tests.proofs.test_certify import verdicts
 
 CLAIMS = ["invariant", "trapping", "attracts-all", "expanding", "cycles"]
 
@@ -68,10 +69,6 @@ ls.register(Odd, image=_odd)
 ls.register(Jump, image=_jump, image_on=_jump_on, margin=_jump_margin, branches=("below", "above"))
 ls.register(Ricker, image=_ricker)
 ls.register(Spiral, image=_spiral, dimension=2)
-
-
-def verdicts(proof):
-    return {claim.claim: claim.verdict for claim in proof.claims}
 
 
 def test_a_fixed_point_attracts_all():
@@ -281,16 +278,8 @@ def test_branches_that_are_names_alone_need_no_margin():
     assert np.sort(0.5 * (cycle.lo + cycle.hi).ravel()) == pytest.approx(points, rel=1e-12)
     every = ls.certify(maps.Logistic(4.0), ls.grid([(-0.1, 1.1)], cells=16), ["all-cycles"], period=4)
     assert every.claims[0].verdict == "proved"
-    assert sorted(orbit.period for orbit in every.cycles) == [
-        1,
-        1,
-        2,
-        3,
-        3,
-        4,
-        4,
-        4,
-    ]  # of the full shift of two
+    # of the full shift of two
+    assert sorted(orbit.period for orbit in every.cycles) == [1, 1, 2, 3, 3, 4, 4, 4]
 
 
 class Rooted(NamedTuple):

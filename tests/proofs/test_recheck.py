@@ -318,9 +318,6 @@ class Spoiler:
     def another_goal(self):
         self.sections["goal"]["kind"] = "reaches"
 
-    def no_claims(self):
-        del self.f.header["claims"][:]
-
     def sides_swapped(self):
         i = self.rng.randrange(3)
         names = [f"0.edges.{i}", f"0.edges.{(i + 1) % 3}"]
@@ -516,7 +513,6 @@ SPOILED = {  # texts of a header, and what is written for each
     '"flip": "signed"': ['"flip": "__import__"'],
     '"flight": "exact"': ['"flight": ["exact"]'],
     '"prefix": "0."': ['"prefix": "../"', '"prefix": {}'],
-    '"scene": {"flight"': ['"scene": {"name": "logistic", "flight"'],
     '"format": "limitsets-proof"': ['"format": []'],
     '"noise": null': ['"noise": 3', *(f'"noise": {{"{name}": "{share} %"}}' for name, share in NO_NOISE)],
     '"tolerance": null': ['"tolerance": {"throw.speed": 1}', '"tolerance": {"a.b": "1 %"}'],
@@ -525,7 +521,6 @@ SPOILED = {  # texts of a header, and what is written for each
     '"q": "0x1': ['"q": "0x9'],
     "p+0": ["p+9999"],
     '"invariant", "section": {}': [f'"invariant", "section": {other}' for other in ('{"x": 1}', "1")],
-    '"claim": "invariant"': ['"claim": "trapping"'],
     '"producer"': ['"effects": {}, "producer"'],
     '"throw": {': [f'{more}, "throw": {{' for more in ('"effects": {"landing": true}', '"effects": [1]')],
     '"kappa": "25': ['"speed": "1 rad/s", "kappa": "25'],

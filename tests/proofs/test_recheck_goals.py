@@ -71,14 +71,6 @@ def test_almost_every_orbit_is_no_matter_of_every_start(good, tmp_path):
         assert report.verdict == "bad file"
 
 
-def test_version_1_is_refused_with_what_to_do(good, tmp_path):
-    f = with_goal(good, TRUE[0])
-    f.header["version"] = 1
-    report = verdict(f.seal(), tmp_path)
-    assert report.verdict == "bad file"
-    assert "version 1 of the format is not read any more: prove the scene again" in report.reason
-
-
 # Landings from 28 in reach some 26 in on other sides; the limit set ends at 23.3832 in on side 2; an orbit of period 13
 # never exceeds 20.103 in; from the inner end of side 2, at 8.9, it takes four jogs at least to 19 in.
 FALSE = [

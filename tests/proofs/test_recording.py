@@ -137,14 +137,15 @@ def test_equal_operations_once_and_dead_ones_dropped():
 
 
 def test_constants_are_shortest_decimals():
-    for value, text in (
-        (0.1, "0.1"),
-        (3, "3"),
-        (-2.0, "-2"),
-        (1e-7, "1e-07"),
-        (np.float64(2.5), "2.5"),
-        (2**53, "9007199254740992.0"),
-    ):
+    texts = {
+        0.1: "0.1",
+        3: "3",
+        -2.0: "-2",
+        1e-7: "1e-07",
+        np.float64(2.5): "2.5",
+        2**53: "9007199254740992.0",
+    }
+    for value, text in texts.items():
         assert recorded(lambda p, x, side, value=value: value, ROBOT, 1, 0)["ops"] == [["c", text]]
 
 
@@ -179,11 +180,8 @@ def test_the_table_of_a_map():
         "periodic": [[None], [None]],
     }
     table = recorded_map(Tent(1.8), 1)
-    assert (table["branches"], [p["branch"] for p in table["programs"]], len(table["margins"])) == (
-        2,
-        [0, 1],
-        1,
-    )
+    assert (table["branches"], len(table["margins"])) == (2, 1)
+    assert [program["branch"] for program in table["programs"]] == [0, 1]
 
 
 def test_the_textbook():
@@ -291,15 +289,8 @@ def test_the_largest_program():
 # ----------------------------------------------------------------
 # Random programs: recorded, compiled, in Python, and read back from their text.
 
-OF_ONE = (
-    "-({})",
-    "abs({})",
-    "math.sqrt(abs({}))",
-    "math.exp(-abs({}))",
-    "math.sin({})",
-    "np.cos({})",
-    "np.tanh({})",
-)
+OF_ONE = ("-({})", "abs({})", "math.sqrt(abs({}))", "math.exp(-abs({}))", "math.sin({})", "np.cos({})")
+OF_ONE += ("np.tanh({})",)
 OF_TWO = ("({} + {})", "({} - {})", "({} * {})", "({} / (2.5 + math.cos({})))", "max({}, {})", "min({}, {})",
           "np.arctan2({}, 3 + abs({}))")  # fmt: skip
 
@@ -315,15 +306,8 @@ def random_formula(draw, depth):
 
 def read_back(lines, x, a, b):
     """Evaluate printed lines by Python's own grammar."""
-    names = {
-        "sqrt": np.sqrt,
-        "exp": np.exp,
-        "sin": np.sin,
-        "cos": np.cos,
-        "tanh": np.tanh,
-        "atan2": np.arctan2,
-    }
-    names |= {"max": np.maximum, "min": np.minimum, "a": a, "b": b, "abs": np.abs}
+    names = {name: getattr(np, name) for name in ("sqrt", "exp", "sin", "cos", "tanh", "abs")}
+    names |= {"atan2": np.arctan2, "max": np.maximum, "min": np.minimum, "a": a, "b": b}
     names |= {f"x{k}": x[:, k] for k in range(3)}
     for line in lines:
         name, text = line.strip().replace("'", "_after").split(" = ")
@@ -363,11 +347,8 @@ def holds(params, program, seed):
     known = boxes.state != UNKNOWN
     assert known.mean() > 0.9
     assert ((boxes.lo <= least + off) & (most - off <= boxes.hi))[known].all()
-    names, parameters = (
-        list(params._asdict()),
-        {name: arb(number) for name, number in params._asdict().items()},
-    )
-    formulas = read_formulas({key: program[key] for key in ("ops", "out")}, 3, names, 3, "a test")
+    parameters = {name: arb(number) for name, number in params._asdict().items()}
+    formulas = read_formulas({key: program[key] for key in ("ops", "out")}, 3, [*parameters], 3, "a test")
     checked = Program(formulas, 3, parameters, [])
     for k in range(100):
         balls = checked.at([arb(float(a)).union(arb(float(b))) for a, b in zip(lo[k], hi[k], strict=True)])
@@ -423,13 +404,8 @@ REFUSED = {
     "AttributeError": lambda p, x, side: p.width * x,
     "more than 200000 operations": lambda p, x, side: sum(x for _ in range(10**9)),
 }  # fmt: skip
-NAMED = {
-    "array": "array of x",
-    "clip": "clip of x",
-    "sign": "sign of x",
-    "norm": "norm of x",
-    "an array": "ndarray",
-    "a text": "'x'",
+NAMED = {"an array": "ndarray", "a text": "'x'"} | {
+    name: f"{name} of x" for name in ("array", "clip", "sign", "norm")
 }
 
 

@@ -4,8 +4,6 @@ An orbit refutes because it comes back: periodic without noise, closed within th
 refutes only what is asked of every throw from every start.
 """
 
-import json
-import zipfile
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +22,8 @@ from tests.attack import facts
 from tests.attack.throws import Orbits
 from tests.plates import left_by_some
 from tests.proofs import forge
+from tests.proofs.test_certificates_of_maps import header_of
+from tests.proofs.test_goals import scene_with
 from tests.thrower import reference
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
@@ -37,19 +37,18 @@ WIDE = {"oriented_beyond": {"x": "20 in", "side": 2}}
 NEVER = {"reaches": {"x": "20.105 in", "side": 2, "every_orbit": True}}
 
 
-def scene_of(goal, **tables):
-    tree = {**ls.load("paper-designed").as_dict(), "goal": goal} | tables
-    return ls.load(tree)
-
-
 CASES = {
-    "cycle": (scene_of(WIDE, throw={"kappa": SLOW}), {}, {"throw.speed": "0.75 %"}),
-    "closed": (scene_of(WIDE), NOISY, {}),
-    "landing": (scene_of(WIDE), SCATTERED, {}),
-    "anywhere": (scene_of({"oriented_beyond": {"x": "25 in", "side": 2}, "from_anywhere": True}), {}, {}),
-    "never": (scene_of(NEVER), {}, {}),
-    "order": (scene_of({"flip_order": [0, 2, 1]}), {}, {}),
-    "leaves": (scene_of({"stays_on_arm": True}, arm={"surface_height": "-3 in", "length": "28 in"}), {}, {}),
+    "cycle": (scene_with(WIDE, throw={"kappa": SLOW}), {}, {"throw.speed": "0.75 %"}),
+    "closed": (scene_with(WIDE), NOISY, {}),
+    "landing": (scene_with(WIDE), SCATTERED, {}),
+    "anywhere": (scene_with({"oriented_beyond": {"x": "25 in", "side": 2}, "from_anywhere": True}), {}, {}),
+    "never": (scene_with(NEVER), {}, {}),
+    "order": (scene_with({"flip_order": [0, 2, 1]}), {}, {}),
+    "leaves": (
+        scene_with({"stays_on_arm": True}, arm={"surface_height": "-3 in", "length": "28 in"}),
+        {},
+        {},
+    ),
 }
 
 
@@ -72,11 +71,6 @@ def files(claims, tmp_path_factory):
         scene, within = (nominal, CASES[name][2]) if CASES[name][2] else (proof.scene, {})
         write_refutation(found[name], proof.attractions[0], proof.scene.goal, states, recurs, within, scene)
     return found
-
-
-def header_of(path):
-    with zipfile.ZipFile(path) as file:
-        return json.loads(file.read("header.json"))
 
 
 def section(header):
@@ -217,7 +211,7 @@ def test_where_a_throw_hardly_expands_orbits_take_hundreds_of_throws_to_come_bac
 
 def test_what_passes_once_closes_only_where_the_noise_brings_it_back():
     """From 27.9 on side 2 one throw lands beyond 20 on side 0: with 0.001 % of noise no throws lead there again."""
-    scene = scene_of(WIDE)
+    scene = scene_with(WIDE)
     box = parameter_box(scene, noise={"throw.speed": "0.001 %"})
     (x,) = images(scene.map, [27.9], 2).x
     assert x > 20
@@ -227,7 +221,7 @@ def test_what_passes_once_closes_only_where_the_noise_brings_it_back():
 
 def test_attracts_all_is_refuted_by_a_start_that_leaves_without_any_noise():
     """With h = -3 in every start leaves (docs/model.md)."""
-    scene = scene_of(WIDE, arm={"surface_height": "-3 in", "length": "28 in"})
+    scene = scene_with(WIDE, arm={"surface_height": "-3 in", "length": "28 in"})
     (claim,) = ls.certify(scene, ["attracts-all"]).claims
     assert (claim.verdict, claim.recurs) == ("refuted", {"once": True})
     facts = facts_with(surface_height=-3.0)
@@ -444,7 +438,7 @@ def test_what_is_no_orbit_is_no_file(files, tmp_path):
 
 def test_one_passage_never_refutes_what_is_proved_of_every_start(files, tmp_path):
     """The designed goal is proved; from 27.9 in on side 2 a part passes beyond 20 in on side 0, once."""
-    scene = scene_of(WIDE)
+    scene = scene_with(WIDE)
     (after,) = images(scene.map, [27.9], 2).x
     assert after > 20
     assert ls.certify(scene, ["goal"]).claims[0].verdict == "proved"

@@ -194,24 +194,15 @@ WAYS = {
     "a tolerance of a goal": put("tolerance", {"goal.oriented_beyond.x": "1 in"}),
     "a scene with more": put(*SCENE, "note", "proved of all parts"),
     "another model": put(*SCENE, "model", "flip", "energy"),
-    # versions and kinds of JSON
+    # kinds of JSON; other versions and keys: tests/checker/test_versions.py
     "version true": put("version", True),
     "version 3.0": put("version", 3.0),
     "version as text": put("version", "3"),
-    "version 2": put("version", 2),
-    "version 4": put("version", 4),
-    "another model in the header": put("scene", "flip", "energy"),
-    "a map beside the scene": put(
-        "map", {"name": "throw", "version": 1, "flight": "exact", "flip": "signed"}
-    ),
     "format in capitals": put("format", "LIMITSETS-PROOF"),
     "a claim in capitals": put("claims", 4, "claim", "Goal"),
     "a claim with a blank": put("claims", 4, "claim", "goal "),
     "a claim with a long name": put("claims", 4, "claim", "goal" + " " * 100 + "is not proved"),
-    "a claim of more": put("claims", 4, "verdict", "proved"),
-    "the goal claimed twice": lambda f: f.header["claims"].append(f.header["claims"][4]),
     "a claim without a section": put("claims", 4, "section", None),
-    "a header with more": put("verdict", "proved"),
     # the starts
     "no starts": leave_out(*GOAL, "starts"),
     "starts in capitals": put(*GOAL, "starts", "Every"),
@@ -235,7 +226,6 @@ WAYS = {
     "lost without noise": all_of(*OF_CELLS, put(*GOAL, "lost", {str(i): (5.0).hex() for i in range(3)})),
     "lost, and every start": put(*GOAL, "lost", BEYOND),
     "only the cells": all_of(*OF_CELLS),
-    "version 1": put("version", 1),
     # ranks, transients, attractors
     "one cell unranked": rank_of(-1, -1),
     "all cells unranked": rank_of(slice(None), -1),
@@ -307,9 +297,8 @@ def test_a_dropped_attractor_leaves_the_goal_proved_on_cells_at_most(two, tmp_pa
     assert left == 0
     assert (report.verdict, report.starts) == ("proved-on-cells", "cells")
     assert 0.01 < report.share < 1
-    assert report.open == pytest.approx(
-        1 - report.share, abs=1e-12
-    )  # both are rounded to 1e-6, against the claim
+    # both are rounded to 1e-6, against the claim
+    assert report.open == pytest.approx(1 - report.share, abs=1e-12)
     near = near_section(two)
     for starts, more in (
         ("every", {"near_joint": near}),

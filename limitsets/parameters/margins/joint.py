@@ -32,7 +32,7 @@ from limitsets.parameters.margins.deviations import (
 from limitsets.parameters.margins.margin_result import Margin
 from limitsets.proofs.prover.goals.violating_orbits import on_limit_set
 from limitsets.proofs.prover.parameters import SceneBox
-from limitsets.proofs.prover.query import Outcome, Query, unjoined
+from limitsets.proofs.prover.query import Outcome, Query
 from limitsets.systems.maps import orbit
 
 # ----------------------------------------------------------------
@@ -342,12 +342,12 @@ class Subdivision:
 
     def joined(self, share: Fraction) -> tuple[Fraction, str]:
         """Return up to which share of the box all is one claim, as a certificate has to make it, and what stops it."""
-        missing = unjoined(self.within(share)) if share else ""
+        missing = self.query.unjoined(self.within(share)) if share else ""
         if missing:
             share, _ = halved(
                 Fraction(0),
                 share,
-                lambda part: not unjoined(self.within(part)),
+                lambda part: not self.query.unjoined(self.within(part)),
                 Fraction(1, 8),
                 Fraction(1, 64),
             )

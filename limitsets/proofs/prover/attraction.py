@@ -14,7 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from limitsets.proofs.prover.basin import ROUNDING, Basin, NearHinge, basin, near_hinge, shares_of
+from limitsets.proofs.prover.basin import (
+    ROUNDING,
+    Basin,
+    NearHinge,
+    basin,
+    missing_near,
+    near_hinge,
+    shares_of,
+)
 from limitsets.proofs.prover.cover import Cover
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph
@@ -126,53 +134,41 @@ def attraction(cover: Cover) -> Attraction:
     Attraction
         With the reason where it is not proved.
     """
-    component, lost = components_of(cover.graph)
-    unresolved = CellSet.of(cover.grid, np.concatenate([np.zeros(0, np.int64), *lost]))
+    component, recurring = components_of(cover.graph)
+    unresolved = CellSet.of(cover.grid, np.concatenate([np.zeros(0, np.int64), *recurring]))
     joint = near_hinge(cover)
-    return Attraction(
-        cover,
-        component,
-        joint,
-        *_verdict(cover, component, unresolved, joint),
-        unresolved,
-    )
-
-
-def _verdict(
-    cover: Cover, component: NDArray[np.int32], unresolved: CellSet, joint: tuple[NearHinge, ...]
-) -> tuple[bool, str]:
-    """Whether attraction is proved, and the first thing that is missing."""
     lost = np.concatenate([images.lost for images in cover.images])
     if lost.any():
-        return False, f"nothing is proved of the image of {cover.place(int(np.flatnonzero(lost)[0]))}"
-    if cover.box.landing > 0.0:
-        return False, f"near the joint: {next(near.reason for near in joint if not near.empty)}"
-    leaving = np.flatnonzero(cover.graph.ranges.exits)
-    if leaving.size:
-        return False, f"the image of {cover.place(int(leaving[0]))} may leave the cells"
-    if len(unresolved):
-        return (
-            False,
-            f"{len(unresolved)} recurrent cells do not attract: first {cover.place(unresolved.numbers()[0])}",
+        reason = f"nothing is proved of the image of {cover.place(int(lost.argmax()))}"
+    elif cover.box.landing > 0.0:
+        reason = f"near the joint: {next(near.reason for near in joint if not near.empty)}"
+    else:
+        reason = (
+            cover.leaving or not_attracting(cover, unresolved) or no_cells(component) or missing_near(joint)
         )
-    if not (component >= 0).any():
-        return False, "there are no attracting cells"
-    for side, near in enumerate(joint):
-        if not near.proved:
-            return False, f"near the joint on side {side}: {near.reason}"
-    return True, ""
+    return Attraction(cover, component, joint, not reason, reason, unresolved)
+
+
+def no_cells(component: NDArray[np.int32]) -> str:
+    """Say that no cell is in an attracting component; empty if some are."""
+    return "" if (component >= 0).any() else "there are no attracting cells"
+
+
+def not_attracting(cover: Cover, recurring: CellSet) -> str:
+    """Say of recurrent cells that they do not attract; empty if there are none."""
+    if not len(recurring):
+        return ""
+    return f"{len(recurring)} recurrent cells do not attract: first {cover.place(recurring.numbers()[0])}"
 
 
 def near_section(attractors: Attraction) -> dict[str, dict[str, Any]]:
     """Write what a recheck needs of the starts below the cells: by side the factor, the bracket of a fixed point."""
-    section: dict[str, dict[str, Any]] = {}
-    for side, near in enumerate(attractors.joint):
-        if near.empty:
-            continue
-        section[str(side)] = {"q": near.q.hex()}
-        if near.fixed_point is not None:
-            section[str(side)]["fixed_point"] = [end.hex() for end in near.fixed_point]
-    return section
+    return {
+        str(side): {"q": near.q.hex()}
+        | ({"fixed_point": [end.hex() for end in near.fixed_point]} if near.fixed_point else {})
+        for side, near in enumerate(attractors.joint)
+        if not near.empty
+    }
 
 
 # ----------------------------------------------------------------
@@ -206,9 +202,7 @@ def trapping(attractors: Attraction) -> str:
     Comparisons of the enclosures' ends with the cells' borders only, both exact.  Source: docs/model.md, attraction.
     """
     grid, arm = attractors.cover.grid, float(attractors.cover.box.lo.arm_length)
-    if not (attractors.component >= 0).any():
-        return "there are no attracting cells"
-    for number in range(int(attractors.component.max()) + 1):
+    for number in range(int(attractors.component.max(initial=-1)) + 1):
         inside = CellSet(grid, attractors.component == number)
         extents = inside.extents()
         for side, images in enumerate(attractors.cover.images):
@@ -225,4 +219,4 @@ def trapping(attractors: Attraction) -> str:
             if cells:
                 k, what = cells[0]
                 return f"{what} the image of side {side}, x in [{edges[k]:.6g}, {edges[k + 1]:.6g}]"
-    return ""
+    return no_cells(attractors.component)

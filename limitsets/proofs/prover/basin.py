@@ -178,27 +178,34 @@ def near_hinge(cover: Cover) -> tuple[NearHinge, ...]:
     tuple of NearHinge
         One per side.
     """
-    answers = []
-    for side, (edges,) in enumerate(cover.grid.edges):
-        if not cover.box.rests[side]:
-            answers.append(NO_STARTS)
-            continue
-        if cover.points:
-            answers.append(_beyond(cover, side, float(edges[0])))
-            continue
-        out = np.full(8, np.nan)
-        _near_hinge(*cover.box.bare, side, float(edges[0]), out)
-        q = 1.0 + (float(out[5]) - 1.0) * (1.0 - SLACK_OF_Q)
-        good = [*(out[:5] > 0.0), q > 1.0]
-        reason = "" if all(good) else REASONS[good.index(False)]
-        if cover.box.landing > 0.0 and not reason:
-            reason = SCATTERED
-        rises, x, reach = bool(out[7] > 0.0), float(edges[0]), float(out[6])
-        rolls = False
-        if cover.box.effects and not reason:
-            reach, rolls, reason = _rolled(cover, side, x, reach)
-        answers.append(NearHinge(x, q, reach, rises, not reason, reason, rolls=rolls))
-    return tuple(answers)
+    return tuple(_near_side(cover, side, float(edges[0])) for side, (edges,) in enumerate(cover.grid.edges))
+
+
+def _near_side(cover: Cover, side: int, x: float) -> NearHinge:
+    """Prove the expansion on one side, whose cells begin at x."""
+    if not cover.box.rests[side]:
+        return NO_STARTS
+    if cover.points:
+        return _beyond(cover, side, x)
+    out = np.full(8, np.nan)
+    _near_hinge(*cover.box.bare, side, x, out)
+    q = 1.0 + (float(out[5]) - 1.0) * (1.0 - SLACK_OF_Q)
+    good = [*(out[:5] > 0.0), q > 1.0]
+    reason = "" if all(good) else REASONS[good.index(False)]
+    if cover.box.landing > 0.0 and not reason:
+        reason = SCATTERED
+    rises, reach, rolls = bool(out[7] > 0.0), float(out[6]), False
+    if cover.box.effects and not reason:
+        reach, rolls, reason = _rolled(cover, side, x, reach)
+    return NearHinge(x, q, reach, rises, not reason, reason, rolls=rolls)
+
+
+def missing_near(joint: Sequence[NearHinge]) -> str:
+    """Say on which side what is missing near the joint; empty if nothing is."""
+    missing = (
+        f"near the joint on side {side}: {near.reason}" for side, near in enumerate(joint) if near.reason
+    )
+    return next(missing, "")
 
 
 def _rolled(cover: Cover, side: int, x: float, reach: float) -> tuple[float, bool, str]:
@@ -403,14 +410,7 @@ def basin(cover: Cover, component: NDArray[np.int32], joint: Sequence[NearHinge]
         (text.format(cover.place(int(np.argmax(mask)))) for mask, text in reasons if mask.any()), ""
     )
     if not missing and not near:
-        missing = next(
-            (
-                f"near the joint on side {side}: {each.reason}"
-                for side, each in enumerate(joint)
-                if each.reason
-            ),
-            "",
-        )
+        missing = missing_near(joint)
     # a little more, so that other arithmetic can confirm it
     throws = throws + throws // 8 + 1 if thin.any() else 0
     return Basin(
@@ -459,23 +459,20 @@ def _below_cells(cover: Cover, joint: Sequence[NearHinge], shut: Mask, *, thin: 
 
 def _start(cover: Cover, joint: Sequence[NearHinge], shut: Mask, near: bool) -> tuple[Array, Array]:
     """On each side, from where on every start is claimed, and up to where the starts are lost or creep."""
-    (lo, hi), start, explained = cover.box.bare, [], []
+    (lo, hi), start, explained = cover.box.bare, np.full(len(joint), math.inf), np.full(len(joint), math.inf)
     for side, (each, (edges,)) in enumerate(zip(joint, cover.grid.edges, strict=True)):
         if each.empty:
-            start.append(math.inf)
-            explained.append(math.inf)
             continue
         last = int(np.flatnonzero(shut[cover.grid.of_side(side)]).max(initial=-1))
         point = each.fixed_point if near else None
         below = float(hi.a[side]) if point is None else point[1]
-        start.append(below if near and last < 0 else float(edges[last + 1]))
-        ends = float(lo.a[side]) if point is None else point[0]
+        start[side] = below if near and last < 0 else edges[last + 1]
+        explained[side] = lo.a[side] if point is None else point[0]
         if each.reason == SCATTERED and each.reach - each.x < cover.box.landing:
             _, _, decided, most = _displacements(cover, side, np.arange(last + 1)).T
             lost = (most < cover.box.landing * (1.0 - ROOM)) & (decided > 0.0)
-            ends = float(edges[int(np.argmin([*lost, False]))])
-        explained.append(ends)
-    return np.array(start), np.array(explained)
+            explained[side] = edges[int(np.argmin([*lost, False]))]
+    return start, explained
 
 
 def shares_of(

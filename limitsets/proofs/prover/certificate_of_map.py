@@ -93,18 +93,14 @@ def targets_of(lower: Any, upper: Any, grid: Grid) -> Targets:
 
 
 def cells_of(
-    lower: Any,
-    upper: Any,
-    grid: Grid,
-    ends: NDArray[np.bool_] | None = None,
-    final: Numbers | None = None,
+    images: Targets, grid: Grid, ends: NDArray[np.bool_] | None = None, final: Numbers | None = None
 ) -> Arrays:
     """Find the arrays of one box of parameters.
 
     Parameters
     ----------
-    lower, upper : NamedTuple
-        Corners of the parameters.
+    images : Targets
+        Of all maps of the box.
     grid : Grid
         The cells.
     ends : ndarray of bool, shape (n_cells,), optional
@@ -120,7 +116,6 @@ def cells_of(
         ``edges.S.A``, ``target.B``, `rank` and `component`.  A cell from which an image may leave the domain, is not
         enclosed, or may come to recurrent cells that do not attract, has rank -1.
     """
-    images = targets_of(lower, upper, grid)
     target, lost = np.where(images.beyond[..., None], IMPOSSIBLE, images.cells), images.lost
     if final is not None:
         target[:, final >= 0], lost[final >= 0] = IMPOSSIBLE, False
@@ -156,14 +151,12 @@ def ranges_of(grid: Grid, target: Numbers, to: Numbers, lost: NDArray[np.bool_])
     """Make the graph of the targets; `to` has the side that each branch leads to."""
     cell, branch = np.nonzero(target[:, :, 0].T != IMPOSSIBLE)
     boxes, sides = target[branch, cell], to[branch, cell]
-    begin = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=grid.n_cells))])
     first, last = (np.ascontiguousarray(part) for part in np.hsplit(boxes, 2))
+    parts = TargetBoxes(cell, sides, first, last, np.zeros(grid.n_cells, np.uint8), 0.0)
     if grid.domain.closes:
-        whole = TargetBoxes(cell, sides, first, last, np.zeros(grid.n_cells, np.uint8), 0.0)
-        parts = cut_at_seams(whole, grid.shape)
-        begin = np.concatenate([[0], np.cumsum(np.bincount(parts.cell, minlength=grid.n_cells))])
-        sides, first, last = parts.side, parts.lo, parts.hi
-    return build(grid, begin, sides, first, last, lost.astype(np.uint8))
+        parts = cut_at_seams(parts, grid.shape)
+    begin = np.concatenate([[0], np.cumsum(np.bincount(parts.cell, minlength=grid.n_cells))])
+    return build(grid, begin, parts.side, parts.lo, parts.hi, lost.astype(np.uint8))
 
 
 def _labels(
@@ -202,42 +195,6 @@ def widened(lo: Array, hi: Array) -> tuple[Array, Array]:
     """Boxes of an orbit as the file has them: in wider ones the checker finds its own Newton's operator."""
     wide = MORE * (hi - lo) + LEAST * np.maximum(np.maximum(np.abs(lo), np.abs(hi)), 1.0)
     return lo - wide, hi + wide
-
-
-def cycle_in_file(
-    lo: Array,
-    hi: Array,
-    side: Ints,
-    branches: Ints,
-    chosen: Array | None,
-    *,
-    radius: float | None = None,
-    unstable: bool = False,
-) -> dict[str, Any]:
-    """Write a periodic orbit.
-
-    Parameters
-    ----------
-    lo, hi : ndarray, shape (p, d)
-        Boxes of its points.
-    side, branches : ndarray of int, shape (p,)
-        Of its points.
-    chosen : ndarray, shape (p, d, d), or None
-        Frames in which it is contracted, if it attracts.
-    radius : float, optional
-        Of the balls in these frames that are contracted, if cells lie there.
-    unstable : bool
-        Whether the checker shall prove that it is.
-    """
-    listed = {
-        "boxes": hexed(np.stack(widened(lo, hi), axis=-1)),
-        "side": side.tolist(),
-        "branch": branches.tolist(),
-        "attracts": chosen is not None,
-        "frames": None if chosen is None else hexed(chosen),
-        "radius": None if radius is None else radius.hex(),
-    }
-    return listed | ({"unstable": True} if unstable else {})
 
 
 def frames_to_try(slopes: Array) -> list[Array]:

@@ -14,7 +14,7 @@ from limitsets.base import AnswerError, Progress, arguments_checked_as, shown, s
 from limitsets.feeder.scene import LaidLike, Scene, laid_goals, load
 from limitsets.feeder.scene.quantities import deviation, find
 from limitsets.feeder.scene.units import parse
-from limitsets.proofs.prover.attraction import Attraction, attraction, near_section, trapping
+from limitsets.proofs.prover.attraction import Attraction, attraction, near_section, no_cells, trapping
 from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.end_points import proved_ends
 from limitsets.proofs.prover.goals import cuts, prove, prove_or_refute
@@ -29,7 +29,7 @@ from limitsets.proofs.prover.parameters import (
     scattered,
     whole,
 )
-from limitsets.proofs.prover.proof import Claim, Proof
+from limitsets.proofs.prover.proof import Claim, Proof, claimed
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.proofs.prover.query import weakest_of
 from limitsets.proofs.prover.thinning import least_slope
@@ -64,39 +64,31 @@ def _not_attracted(attractors: Attraction, scene: Scene) -> Claim:
     box = attractors.cover.box
     if box.lo.surface_height <= 0.0 <= box.hi.surface_height:
         reason = "the arm's surface is not proved to be below the joint nor above it"
-        return Claim("attracts-all", "undecided", f"{reason}; {attractors.reason}", {}, final=True)
+        return claimed("attracts-all", f"{reason}; {attractors.reason}", final=True)
     for side, point in enumerate(attractors.cover.points):
         if point.reason:
             # a narrower piece of the tolerance may have one that can be enclosed
             alone = box.scene == dict(scene.text)
-            return Claim("attracts-all", "undecided", f"side {side}: {point.reason}", {}, final=alone)
+            return claimed("attracts-all", f"side {side}: {point.reason}", final=alone)
     for side, near in enumerate(attractors.joint):
         if attractors.cover.points and not near.proved:
             reason = f"side {side}, up to x = {near.x:.6g}: {near.reason}"
-            return Claim("attracts-all", "undecided", f"{reason}; {attractors.reason}", {})
+            return claimed("attracts-all", f"{reason}; {attractors.reason}")
     least = min((near.q for near in attractors.joint if attractors.cover.points), default=math.inf)
     gain = f"{least - 1.0:.1g} of its distance"
     slow = f"; beyond the jog's fixed point a throw gains {gain} only, too little for such cells"
     few = len(attractors.unresolved) and least - 1.0 < 0.01
-    return Claim("attracts-all", "undecided", attractors.reason + (slow if few else ""), {})
-
-
-def _invariant(attractors: Attraction, _: Scene) -> Claim:
-    # an attracting component is one that no image leaves; there has to be one
-    if not (attractors.component >= 0).any():
-        return Claim("invariant", "undecided", "there are no attracting cells", {})
-    return Claim("invariant", "proved", "", {})
+    return claimed("attracts-all", attractors.reason + (slow if few else ""))
 
 
 def _expanding(attractors: Attraction, _: Scene) -> Claim:
-    if not (attractors.component >= 0).any():
-        return Claim("expanding", "undecided", "there are no attracting cells", {})
+    if no_cells(attractors.component):
+        return claimed("expanding", no_cells(attractors.component))
     slope, place = least_slope(attractors.cover, attractors.cells)
-    if not slope > 1.0:
-        return Claim("expanding", "undecided", f"slope {slope:.6g} at {place}", {})
     # less by a little, so that other arithmetic can confirm it
     stated = 1.0 + (slope - 1.0) * (1.0 - 2.0**-10)
-    return Claim("expanding", "proved", "", {"least_slope": stated.hex()})
+    missing = "" if slope > 1.0 else f"slope {slope:.6g} at {place}"
+    return claimed("expanding", missing, {"least_slope": stated.hex()})
 
 
 def _goal(attractors: Attraction, scene: Scene, *, search: bool = True) -> Claim:
@@ -127,40 +119,24 @@ def _require_one_scene(claim: str, attractors: Attraction, scene: Scene) -> None
         raise AnswerError("the claim", claim, "a claim about one scene", "ask for it without a tolerance")
 
 
-def _of_effects(claim: str) -> Claim:
-    reason = (
-        f"{claim.replace('-', ' ')} with effects beyond the minimal model cannot be proved in this version"
-    )
-    return Claim(claim, "undecided", reason, {}, final=True)
-
-
 def _end_points(attractors: Attraction, scene: Scene) -> Claim:
     _require_one_scene("end-points", attractors, scene)
-    if attractors.cover.box.effects:
-        return _of_effects("end-points")
-    if attractors.cover.box.landing > 0.0:
-        reason = "end points with noise of landing.x cannot be proved in this version"
-        return Claim("end-points", "undecided", reason, {}, final=True)
+    box = attractors.cover.box
+    if box.effects or box.landing > 0.0:
+        beyond = "effects beyond the minimal model" if box.effects else "noise of landing.x"
+        return claimed("end-points", f"end points with {beyond} cannot be proved in this version", final=True)
     ends = proved_ends(attractors)
-    if ends.reason:
-        return Claim("end-points", "undecided", ends.reason, {})
-    return Claim("end-points", "proved", "", ends.section())
+    return claimed("end-points", ends.reason, ends.section())
 
 
 def _cycles(attractors: Attraction, scene: Scene) -> Claim:
     _require_one_scene("cycles", attractors, scene)
     if attractors.cover.box.effects:
-        return _of_effects("cycles")
+        reason = "cycles with effects beyond the minimal model cannot be proved in this version"
+        return claimed("cycles", reason, final=True)
     orbits = proved_cycles(attractors)
-    if not orbits.cycles:
-        reason = orbits.missing[0] if orbits.missing else f"none is found of period up to {orbits.up_to}"
-        return Claim("cycles", "undecided", reason, {})
-    return Claim("cycles", "proved", "", orbits.section())
-
-
-def _trapping(attractors: Attraction, _: Scene) -> Claim:
-    reason = trapping(attractors)
-    return Claim("trapping", "undecided" if reason else "proved", reason, {})
+    missing = (*orbits.missing, f"none is found of period up to {orbits.up_to}")
+    return claimed("cycles", "" if orbits.cycles else missing[0], orbits.section())
 
 
 PROVERS: dict[str, Callable[[Attraction, Scene], Claim]] = {
@@ -169,8 +145,9 @@ PROVERS: dict[str, Callable[[Attraction, Scene], Claim]] = {
     "end-points": _end_points,
     "expanding": _expanding,
     "goal": _goal,
-    "invariant": _invariant,
-    "trapping": _trapping,
+    # an attracting component is one that no image leaves; there has to be one
+    "invariant": lambda attractors, _: claimed("invariant", no_cells(attractors.component)),
+    "trapping": lambda attractors, _: claimed("trapping", trapping(attractors)),
 }
 CLAIMS = tuple(PROVERS)
 """What can be claimed in this version."""

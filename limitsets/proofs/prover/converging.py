@@ -108,13 +108,14 @@ def settled_orbits(params: Any, starts: Array, side: Ints, domain: Domain) -> li
 # ---------------------------------------------------------------- balls
 
 
-def _entries(lo: Array, hi: Array) -> Entries:
+def entries(lo: Array, hi: Array) -> Entries:
     """Take matrices (p, d, d) apart: each entry for all p at once."""
     size = range(lo.shape[-1])
     return [[Intervals(lo[..., i, j], hi[..., i, j]) for j in size] for i in size]
 
 
-def _times(a: Entries, b: Entries) -> Entries:
+def times(a: Entries, b: Entries) -> Entries:
+    """Multiply matrices that are taken apart."""
     columns = [*zip(*b, strict=True)]
     return [
         [reduce(add, [v * w for v, w in zip(row, column, strict=True)]) for column in columns] for row in a
@@ -125,14 +126,14 @@ def _inverse(frames: Array) -> Entries:
     """Enclose the inverses of frames of one or two dimensions; nan, which proves nothing, where one may be singular."""
     if frames.shape[-1] == 1:
         return [[1.0 / Intervals(frames[:, 0, 0], frames[:, 0, 0])]]
-    (a, b), (c, d) = _entries(frames, frames)
+    (a, b), (c, d) = entries(frames, frames)
     det = a * d - b * c
     return [[d / det, -b / det], [-c / det, a / det]]
 
 
 def _around(frames: Array, radius: float, lo: Array, hi: Array) -> tuple[Array, Array]:
     """Enclose the balls around points that lie in boxes (p, d)."""
-    squares = [reduce(add, [v.square() for v in row]).square_root() for row in _entries(frames, frames)]
+    squares = [reduce(add, [v.square() for v in row]).square_root() for row in entries(frames, frames)]
     far = np.stack([(size * radius).hi for size in squares], axis=1)
     return np.nextafter(lo - far, -np.inf), np.nextafter(hi + far, np.inf)
 
@@ -143,8 +144,8 @@ def _stretches(frames: Array, slopes: Intervals | None) -> Array:
     if slopes is None:
         return np.full(len(frames), np.inf)
     ahead = _inverse(np.roll(frames, -1, axis=0))
-    b = _times(ahead, _times(_entries(slopes.lo, slopes.hi), _entries(frames, frames)))
-    rows = _times([*zip(*b, strict=True)], b)
+    b = times(ahead, times(entries(slopes.lo, slopes.hi), entries(frames, frames)))
+    rows = times([*zip(*b, strict=True)], b)
     return np.asarray(np.max([reduce(add, [v.absolute() for v in row]).hi for row in rows], axis=0))
 
 

@@ -342,6 +342,12 @@ class Cover:
         lo, hi = self.grid.boxes([cell], side)
         return f"side {side}, x in [{lo[0, 0]:.6g}, {hi[0, 0]:.6g}]"
 
+    @property
+    def leaving(self) -> str:
+        """A cell whose image may leave the cells, for people; empty if there is none."""
+        leaving = np.flatnonzero(self.graph.ranges.exits)
+        return f"the image of {self.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
+
 
 def _widened(enclosed: Enclosures, edges: Array, landing: float) -> Enclosures:
     """Widen the images by the slack and by the scatter of the landing place, which no decision depends on."""
@@ -396,10 +402,10 @@ def cover(
 
 def cut_at(plain: Grid, cuts: Mapping[int, Sequence[float]]) -> Grid:
     """Cut the cells of a grid at more places, by side."""
-    sides = []
-    for side, (edges,) in enumerate(plain.edges):
-        wanted = [x for x in cuts.get(side, ()) if edges[0] < x < edges[-1]]
-        sides.append((np.union1d(edges, wanted),))
+    sides = (
+        (np.union1d(edges, [x for x in cuts.get(side, ()) if edges[0] < x < edges[-1]]),)
+        for side, (edges,) in enumerate(plain.edges)
+    )
     return Grid(plain.domain, tuple(sides))
 
 
@@ -447,6 +453,13 @@ def met(ends: NDArray[np.int32], cells: Mask) -> Mask:
     begin, past = (np.bincount(at, minlength=cells.size + 1) for at in (some[:, 0], some[:, 1] + 1))
     reached: Mask = np.cumsum((begin - past)[:-1]) > 0
     return reached
+
+
+def leading_to(ends: NDArray[np.int32], cells: Mask) -> Mask:
+    """Return the cells whose images meet some cells; `ends` as in `met`."""
+    number = np.concatenate([[0], np.cumsum(cells)])
+    leads: Mask = (ends[:, 0] >= 0) & (number[ends[:, 1] + 1] > number[ends[:, 0]])
+    return leads
 
 
 def everywhere(covered: Cover) -> list[NDArray[np.int32]]:

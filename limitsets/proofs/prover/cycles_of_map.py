@@ -19,7 +19,7 @@ from limitsets.proofs.prover.every_orbit import every_orbit
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, Lies, prove_orbit, slopes_of, slopes_on
 from limitsets.proofs.prover.programs import names_alone
-from limitsets.proofs.prover.proof import Claim
+from limitsets.proofs.prover.proof import Claim, claimed
 from limitsets.proofs.prover.proof_of_map import ProofOfMap, frames_of
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.maps import has_slope, kind_of
@@ -54,8 +54,7 @@ def every_cycle(
     domain = proof.graph.grid.domain
     if not _decided(proof.map) or not has_slope(proof.map):
         reason = "it needs slopes, and `margin` where there are branches"
-        undecided = [Claim(word, "undecided", reason, {}, final=True) for word in ("all-cycles", "cycles")]
-        return undecided[0], undecided[1], ()
+        return claimed("all-cycles", reason, final=True), claimed("cycles", reason, final=True), ()
     proved, missing = every_orbit((proof.map, proof.upper), domain, period, progress)
     boxes = np.stack([domain.lo, domain.hi], axis=-1)
     sides = [{"side": side, "box": hexed(box)} for side, box in enumerate(boxes)]
@@ -63,9 +62,7 @@ def every_cycle(
     listed = {"cycles": len(proved), "missing": [], "complete": not missing}
     return (
         Claim("all-cycles", "undecided" if missing else "proved", missing, section),
-        Claim("cycles", "proved", "", listed)
-        if proved
-        else Claim("cycles", "undecided", "none is proved", {}),
+        claimed("cycles", "" if proved else "none is proved", listed),
         tuple(proved),
     )
 
@@ -112,7 +109,7 @@ def _has_cycles(lower: Any) -> bool:
 def cycles_claim(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[CycleOfMap, ...]]:
     """Prove the orbits that floats find in the attracting cells, and return these."""
     if not _has_cycles(proof.map):
-        return Claim("cycles", "undecided", NO_CYCLES, {}, final=True), ()
+        return claimed("cycles", NO_CYCLES, final=True), ()
     candidates, missing = _candidates(proof) if len(proof.cells) else ((), [])
     proved: list[CycleOfMap] = []
     for number, cycle in enumerate(candidates):
@@ -123,12 +120,9 @@ def cycles_claim(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, t
             proved.append(answer)
         else:
             missing.append(f"period {cycle.period} through {np.atleast_1d(cycle.x[0])}: {answer}")
-    if not proved:
-        reason = missing[0] if missing else f"none is found of period up to {UP_TO} in attracting cells"
-        return Claim("cycles", "undecided", reason, {}), ()
-    return Claim(
-        "cycles", "proved", "", {"cycles": len(proved), "missing": missing, "complete": False}
-    ), tuple(proved)
+    none = [*missing, f"none is found of period up to {UP_TO} in attracting cells"][0]
+    section = {"cycles": len(proved), "missing": missing, "complete": False}
+    return claimed("cycles", "" if proved else none, section), tuple(proved)
 
 
 # ---------------------------------------------------------------- cycles that attract, and what tends to them
@@ -161,7 +155,7 @@ def _spread(grid: Grid) -> tuple[Array, Ints]:
 def converging_claim(proof: ProofOfMap) -> tuple[ProofOfMap, Claim]:
     """Draw balls around the cycles that attract, and find the cells in them."""
     if not _has_cycles(proof.map):
-        return proof, Claim("converges", "undecided", NO_CYCLES, {}, final=True)
+        return proof, claimed("converges", NO_CYCLES, final=True)
     grid = proof.graph.grid
     orbits, missing = proof.cycles, list[str]()
     if not orbits:
@@ -179,9 +173,8 @@ def converging_claim(proof: ProofOfMap) -> tuple[ProofOfMap, Claim]:
         # what attracts and has no ball tells more than an orbit that ended on a saddle
         missing[:0] = [f"period {cycle.period} through {cycle.lo[0]}: {why}"] if why else []
     if not drawn:
-        reason = missing[0] if missing else "no cycle that attracts is found"
-        return proof, Claim("converges", "undecided", reason, {})
-    claim = Claim("converges", "proved", "", {"cycles": drawn, "missing": missing})
+        return proof, claimed("converges", [*missing, "no cycle that attracts is found"][0])
+    claim = claimed("converges", "", {"cycles": drawn, "missing": missing})
     return replace(proof, cycles=tuple(chosen), final=final), claim
 
 
@@ -191,7 +184,7 @@ def _ball(proof: ProofOfMap, cycle: CycleOfMap) -> tuple[Ball | None, str]:
 
     def slopes(lo: Array, hi: Array) -> Intervals | None:
         beyond = (lo < domain.lo[cycle.side]).any() or (hi > domain.hi[cycle.side]).any()
-        if beyond or (proof.goal is not None and not proof.goal.holds(lo, hi, cycle.side)):
+        if beyond or (proof.goal is not None and not proof.goal.within(lo, hi, cycle.side).all()):
             return None
         return slopes_on((proof.map, proof.upper), lo, hi, cycle)
 

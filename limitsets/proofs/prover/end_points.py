@@ -27,7 +27,7 @@ comparison of B with its image.  Source: docs/model.md, limit sets.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -247,26 +247,17 @@ class UnionImages:
         return {side: union_of(intervals) for side, intervals in images.items()}
 
 
-def _runs(parts: list[PieceImage]) -> Iterator[list[PieceImage]]:
+def _runs(parts: list[PieceImage]) -> list[list[PieceImage]]:
     """Decided parts of one interval that follow one another on one branch: the map is continuous on their union."""
-    run: list[PieceImage] = []
-    for part in parts:
-        if part.piece.branch not in (codes.JOG, codes.FLIP):
-            continue
-        last = run[-1] if run else None
-        if last and (last.side, last.owner, last.branch, last.hi) == (
-            part.side,
-            part.owner,
-            part.branch,
-            part.lo,
-        ):
-            run.append(part)
+    runs: list[list[PieceImage]] = []
+    for part in (each for each in parts if each.piece.branch in (codes.JOG, codes.FLIP)):
+        last = runs[-1][-1] if runs else None
+        here = (part.side, part.owner, part.branch, part.lo)
+        if last and (last.side, last.owner, last.branch, last.hi) == here:
+            runs[-1].append(part)
         else:
-            if run:
-                yield run
-            run = [part]
-    if run:
-        yield run
+            runs.append([part])
+    return runs
 
 
 def at_rest(image: Callable[[Intervals], Intervals], union: Intervals) -> tuple[Intervals, int]:

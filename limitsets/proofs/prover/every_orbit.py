@@ -264,15 +264,11 @@ def _least_period(x: Array, wider: Tubes, near: Array) -> int:
 def _holds(wider: Tubes, cycle: CycleOfMap) -> bool:
     """Whether W, shape (p, d), holds a proved orbit, from one of its points on."""
     period = len(wider.lo)
-    if period % cycle.period:
-        return False
-    for first in range(cycle.period):
-        order = (np.arange(period) + first) % cycle.period
-        inside = (wider.lo <= cycle.lo[order]).all() and (cycle.hi[order] <= wider.hi).all()
-        if (
-            inside
-            and (cycle.side[order] == wider.side).all()
-            and (cycle.branches[order] == wider.branch).all()
-        ):
-            return True
-    return False
+    orders = ((np.arange(period) + first) % cycle.period for first in range(cycle.period))
+    return period % cycle.period == 0 and any(
+        (wider.lo <= cycle.lo[order]).all()
+        and (cycle.hi[order] <= wider.hi).all()
+        and (cycle.side[order] == wider.side).all()
+        and (cycle.branches[order] == wider.branch).all()
+        for order in orders
+    )

@@ -39,12 +39,12 @@ class GoalOfMap(NamedTuple):
         starts = None if self.starts is None else [region.in_file() for region in self.starts]
         return {"starts": starts, "ends": [region.in_file() for region in self.ends]}
 
-    def holds(self, lo: Array, hi: Array, side: Ints) -> bool:
+    def within(self, lo: Array, hi: Array, side: Ints) -> Mask:
         """Whether each of some boxes, (n, d) on sides (n,), lies in one of the ends."""
         within = np.zeros(len(side), dtype=bool)
         for on, low, high in self.ends:
             within |= (side == on) & ((lo >= low) & (hi <= high)).all(axis=1)
-        return bool(within.all())
+        return within
 
     def spread(self, count: int) -> tuple[Array, Ints]:
         """Places spread over the starts (none: none), and their sides; always the same ones."""
@@ -128,24 +128,13 @@ def _regions(given: Any, name: str, domain: Domain) -> tuple[Region, ...]:
     return tuple(regions)
 
 
-def within_ends(goal: GoalOfMap, grid: Grid) -> Mask:
-    """Find the cells that lie in one of the ends."""
-    within = np.zeros(grid.n_cells, dtype=bool)
-    for side, low, high in goal.ends:
-        mine = np.arange(grid.n_cells)[grid.of_side(side)]
-        lo, hi = grid.boxes(mine, side)
-        within[mine] |= ((lo >= low) & (hi <= high)).all(axis=1)
-    return within
-
-
 def missing(goal: GoalOfMap, grid: Grid, arrays: Arrays) -> str:
     """Say what of a goal is not proved by the cells of a certificate; "" where all is."""
     if not (arrays["component"] >= 0).any():
         return "no cells in the ends are proved to stay there"
+    lo, hi, sides = grid.corners(np.arange(grid.n_cells))
     for side, low, high in goal.starts or ():
-        mine = np.arange(grid.n_cells)[grid.of_side(side)]
-        lo, hi = grid.boxes(mine, side)
-        bad = ((lo < high) & (hi > low)).all(axis=1) & (arrays["rank"][mine] < 0)
+        bad = (sides == side) & ((lo < high) & (hi > low)).all(axis=1) & (arrays["rank"] < 0)
         if bad.any():
             place = _named(side, lo, hi, int(bad.argmax()))
             return f"starts whose orbits are not proved to end there: first {place}"

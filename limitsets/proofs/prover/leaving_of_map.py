@@ -24,7 +24,6 @@ from limitsets.proofs.prover.certificate_of_map import (
     Numbers,
     Targets,
     ranges_of,
-    targets_of,
 )
 from limitsets.systems.cells import Grid
 from limitsets.systems.graph.components import ranks, reach, strong_components
@@ -48,13 +47,6 @@ def exits_of(images: Targets, grid: Grid) -> Numbers:
     return exits
 
 
-def with_exits(arrays: Arrays, lower: Any, upper: Any, grid: Grid) -> Arrays:
-    """Add the exits of the cells to the arrays of a certificate, with targets beyond the domain where they have one."""
-    images = targets_of(lower, upper, grid)
-    exits = exits_of(images, grid)
-    return arrays | {"exit": exits} | targets_beyond(arrays, images, exits >= 0)
-
-
 def targets_beyond(arrays: Arrays, images: Targets, chosen: Any) -> Arrays:
     """Return the targets of a certificate, of the chosen cells (n,) with those beyond the domain."""
     names = (f"target.{branch}" for branch in range(len(images.cells)))
@@ -67,9 +59,8 @@ def targets_beyond(arrays: Arrays, images: Targets, chosen: Any) -> Arrays:
 # ---------------------------------------------------------------- almost every start
 
 
-def with_weights(arrays: Arrays, lower: Any, upper: Any, grid: Grid) -> Arrays | str:
-    """Add weights of the cells without a rank to the arrays of a certificate, on a line; or say what is missing."""
-    images, thin = targets_of(lower, upper, grid), arrays["rank"] < 0
+def weights_of(lower: Any, upper: Any, grid: Grid, images: Targets, thin: Mask) -> Array | str:
+    """Find weights of the cells without a rank, `thin`, on a line; or say what is missing."""
     if (images.unknown & thin).any():
         return "an image of a cell without a rank is not enclosed"
     links = _links(lower, upper, grid, images, thin)
@@ -78,7 +69,7 @@ def with_weights(arrays: Arrays, lower: Any, upper: Any, grid: Grid) -> Arrays |
     weight = _weight(_step(*links), thin.astype(np.float64))
     if weight is None:
         return "the starts in cells without a rank are not seen to thin out: finer cells may show it"
-    return arrays | {"weight": weight} | targets_beyond(arrays, images, thin)
+    return weight
 
 
 def _links(

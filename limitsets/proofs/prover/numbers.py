@@ -13,11 +13,11 @@ Source: Moore, Interval Analysis, 1966; Griewank and Walther, Evaluating Derivat
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,30 @@ from limitsets.base.arrays import Array, Ints
 
 
 BITS = 200
+
+Class = TypeVar("Class")
+
+
+def _with_operand(
+    convert: Callable[[Any], Class | None],
+) -> Callable[[Callable[[Class, Class], Class]], Callable[[Class, Any], Class]]:
+    """Make the operand of an operation a number of its class; one of another class may take a number of this."""
+
+    def of(operation: Callable[[Class, Class], Class]) -> Callable[[Class, Any], Class]:
+        def converted(self: Class, other: Any) -> Class:
+            b = convert(other)
+            return NotImplemented if b is None else operation(self, b)
+
+        return converted
+
+    return of
+
+
+def _span(value: Any) -> RationalInterval | None:
+    """Make a span of a number; None of another operand, whose own class may take a span."""
+    if isinstance(value, RationalInterval):
+        return value
+    return RationalInterval(Fraction(value), Fraction(value)) if isinstance(value, int) else None
 
 
 @dataclass(frozen=True)
@@ -67,10 +91,8 @@ class RationalInterval:
     def __neg__(self) -> RationalInterval:
         return RationalInterval(-self.hi, -self.lo)
 
-    def __add__(self, other: RationalInterval | int) -> RationalInterval:
-        b = _span(other)
-        if b is None:
-            return NotImplemented
+    @_with_operand(_span)
+    def __add__(self, b: RationalInterval) -> RationalInterval:
         return _short(self.lo + b.lo, self.hi + b.hi)
 
     __radd__ = __add__
@@ -81,37 +103,25 @@ class RationalInterval:
     def __rsub__(self, other: int) -> RationalInterval:
         return -self + other
 
-    def __mul__(self, other: RationalInterval | int) -> RationalInterval:
-        b = _span(other)
-        if b is None:
-            return NotImplemented
+    @_with_operand(_span)
+    def __mul__(self, b: RationalInterval) -> RationalInterval:
         if self.lo.numerator >= 0 and b.lo.numerator >= 0:  # most lengths: two products instead of four
             return _short(self.lo * b.lo, self.hi * b.hi)
         ends = [self.lo * b.lo, self.lo * b.hi, self.hi * b.lo, self.hi * b.hi]
-        if other is self:  # a square
+        if b is self:  # a square
             ends = [self.lo**2, self.hi**2, *([Fraction(0)] if self.lo < 0 < self.hi else [])]
         return _short(min(ends), max(ends))
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: RationalInterval | int) -> RationalInterval:
-        b = _span(other)
-        if b is None:
-            return NotImplemented
+    @_with_operand(_span)
+    def __truediv__(self, b: RationalInterval) -> RationalInterval:
         if b.lo <= 0 <= b.hi:
             raise ZeroDivisionError
-        quotient: RationalInterval = self * RationalInterval(1 / b.hi, 1 / b.lo)
-        return quotient
+        return self * RationalInterval(1 / b.hi, 1 / b.lo)
 
     def __rtruediv__(self, other: int) -> RationalInterval:
         return RationalInterval.of(other) / self
-
-
-def _span(value: Any) -> Any:
-    """Make a span of a number; None of another operand, whose own class may take a span."""
-    if isinstance(value, RationalInterval):
-        return value
-    return RationalInterval(Fraction(value), Fraction(value)) if isinstance(value, int) else None
 
 
 def _short(lo: Fraction, hi: Fraction) -> RationalInterval:
@@ -208,6 +218,15 @@ def _outward(lo: Array, hi: Array) -> Intervals:
     return Intervals(np.nextafter(lo, -np.inf), np.nextafter(hi, np.inf))
 
 
+def _as(value: object) -> Intervals | None:
+    """Make intervals of a number; None of another operand, whose own class may take intervals."""
+    if isinstance(value, Intervals):
+        return value
+    if isinstance(value, RationalInterval):
+        return Intervals.of(*value.outward())
+    return Intervals.of(float(value)) if isinstance(value, (int, float)) else None
+
+
 @dataclass(frozen=True, eq=False)
 class Intervals:
     """Intervals, one for each element; arrays of one element stand for all.
@@ -248,27 +267,21 @@ class Intervals:
     def __neg__(self) -> Intervals:
         return Intervals(-self.hi, -self.lo)
 
-    def __add__(self, other: Intervals | RationalInterval | float) -> Intervals:
-        b = _as(other)
-        if b is None:
-            return NotImplemented
+    @_with_operand(_as)
+    def __add__(self, b: Intervals) -> Intervals:
         return _outward(self.lo + b.lo, self.hi + b.hi)
 
     __radd__ = __add__
 
-    def __sub__(self, other: Intervals | RationalInterval | float) -> Intervals:
-        b = _as(other)
-        if b is None:
-            return NotImplemented
+    @_with_operand(_as)
+    def __sub__(self, b: Intervals) -> Intervals:
         return _outward(self.lo - b.hi, self.hi - b.lo)
 
     def __rsub__(self, other: RationalInterval | float) -> Intervals:
         return -self + other
 
-    def __mul__(self, other: Intervals | RationalInterval | float) -> Intervals:
-        b = _as(other)
-        if b is None:
-            return NotImplemented
+    @_with_operand(_as)
+    def __mul__(self, b: Intervals) -> Intervals:
         some = (self.lo * b.lo, self.lo * b.hi, self.hi * b.lo, self.hi * b.hi)
         return _outward(
             np.minimum(np.minimum(some[0], some[1]), np.minimum(some[2], some[3])),
@@ -277,17 +290,15 @@ class Intervals:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Intervals | RationalInterval | float) -> Intervals:
-        b = _as(other)
-        if b is None:
-            return NotImplemented
+    @_with_operand(_as)
+    def __truediv__(self, b: Intervals) -> Intervals:
         sure = (b.lo > 0.0) | (b.hi < 0.0)
         lo, hi = np.where(sure, b.lo, np.nan), np.where(sure, b.hi, np.nan)
         return self * _outward(1.0 / hi, 1.0 / lo)
 
-    def __rtruediv__(self, other: RationalInterval | float) -> Intervals:
-        b = _as(other)
-        return NotImplemented if b is None else b / self
+    @_with_operand(_as)
+    def __rtruediv__(self, b: Intervals) -> Intervals:
+        return b / self
 
     def square(self) -> Intervals:
         """Return x^2, at least 0 but for the rounding."""
@@ -303,15 +314,6 @@ class Intervals:
         """Square root of numbers above 0; both ends are nan where some are not."""
         sure = self.lo > 0.0
         return _outward(*(np.sqrt(np.where(sure, end, np.nan)) for end in (self.lo, self.hi)))
-
-
-def _as(value: object) -> Intervals | None:
-    """Make intervals of a number; None of another operand, whose own class may take intervals."""
-    if isinstance(value, Intervals):
-        return value
-    if isinstance(value, RationalInterval):
-        return Intervals.of(*value.outward())
-    return Intervals.of(float(value)) if isinstance(value, (int, float)) else None
 
 
 # ----------------------------------------------------------------

@@ -36,7 +36,7 @@ from limitsets.base import (
 )
 from limitsets.base.arrays import Ints
 from limitsets.numbers.interval import guard
-from limitsets.proofs.prover.attraction import components_of
+from limitsets.proofs.prover.attraction import components_of, no_cells
 from limitsets.proofs.prover.cycles_of_map import (
     MOST_PERIOD,
     converging_claim,
@@ -45,8 +45,7 @@ from limitsets.proofs.prover.cycles_of_map import (
     refuted_by_cycle,
 )
 from limitsets.proofs.prover.goal_of_map import missing, read_goal
-from limitsets.proofs.prover.leaving_of_map import with_weights
-from limitsets.proofs.prover.proof import Claim
+from limitsets.proofs.prover.proof import Claim, claimed
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import transitions
@@ -65,12 +64,6 @@ def _place(grid: Grid, cell: int) -> str:
     lo, hi = (corner[0] for corner in grid.boxes(np.array([cell]), side))
     spans = ", ".join(f"[{a:.6g}, {b:.6g}]" for a, b in zip(lo, hi, strict=True))
     return f"side {side}, x in {spans}" if grid.sides > 1 else f"x in {spans}"
-
-
-def _invariant(proof: ProofOfMap) -> Claim:
-    if not len(proof.cells):
-        return Claim("invariant", "undecided", "there are no attracting cells", {})
-    return Claim("invariant", "proved", "", {})
 
 
 def _boxes(proof: ProofOfMap) -> Iterator[tuple[Ints, BranchBoxes]]:
@@ -94,14 +87,13 @@ def _trapping(proof: ProofOfMap) -> Claim:
         if reaching.size:
             where = f"the image of {_place(grid, int(mine[reaching[0]]))} may reach the border of the domain"
             reason = f"{where}: widen the domain, or claim invariant"
-            return Claim("trapping", "undecided", reason, {}, final=True)
-    return replace(_invariant(proof), claim="trapping")
+            return claimed("trapping", reason, final=True)
+    return claimed("trapping", no_cells(proof.component))
 
 
 def _ends_in(proof: ProofOfMap) -> Claim:
     assert proof.goal is not None
-    reason = missing(proof.goal, proof.graph.grid, proof.arrays)
-    return Claim("ends-in", "undecided" if reason else "proved", reason, {})
+    return claimed("ends-in", missing(proof.goal, proof.graph.grid, proof.arrays))
 
 
 def _attracts_all(proof: ProofOfMap) -> Claim:
@@ -111,11 +103,9 @@ def _attracts_all(proof: ProofOfMap) -> Claim:
     attracts = np.array([attracting[cells[0]] for cells in sets], dtype=bool)
     if leaving.size:
         place = _place(graph.grid, int(leaving[0]))
-        return Claim(
-            "attracts-all", "undecided", f"the image of {place} may leave the domain, or is not enclosed", {}
-        )
-    if not attracts.any():
-        return Claim("attracts-all", "undecided", "there are no attracting cells", {})
+        return claimed("attracts-all", f"the image of {place} may leave the domain, or is not enclosed")
+    if no_cells(proof.component):
+        return claimed("attracts-all", no_cells(proof.component))
     stays = np.zeros(len(sets), np.int64) if attracts.all() else longest_stays(graph)
     lost = np.concatenate(
         [
@@ -125,40 +115,33 @@ def _attracts_all(proof: ProofOfMap) -> Claim:
     )
     if lost.size:
         place = _place(graph.grid, int(lost.min()))
-        return Claim(
-            "attracts-all", "undecided", f"{lost.size} recurrent cells do not attract: first {place}", {}
-        )
+        return claimed("attracts-all", f"{lost.size} recurrent cells do not attract: first {place}")
     settled = np.zeros(parts.count, dtype=bool)
     settled[np.flatnonzero(parts.recurrent)[attracts]] = True
     # a rank falls with every step, but for those within a recurrent component, through which orbits pass
     most = int(ranks(graph.ranges, parts, settled).max()) + int((stays[stays > 0] - 1).sum())
-    return Claim("attracts-all", "proved", "", {"max_rank": most})
+    return claimed("attracts-all", "", {"max_rank": most})
 
 
 def _escapes(proof: ProofOfMap) -> Claim:
     out = CellSet(proof.graph.grid, proof.exits >= 0)
-    if not len(out):
-        return Claim("escapes", "undecided", "no cell is found all of whose starts leave the domain", {})
     share = out.measure() / float(proof.graph.grid.measure.sum())
-    return Claim("escapes", "proved", "", {"steps": int(proof.exits.max()) + 1, "share": share})
+    none = "" if len(out) else "no cell is found all of whose starts leave the domain"
+    return claimed("escapes", none, {"steps": int(proof.exits.max()) + 1, "share": share})
 
 
 def _almost_every(proof: ProofOfMap) -> Claim:
     if proof.graph.grid.dimension != 1:
-        reason = "that starts thin out is proved in one dimension only"
-        return Claim("almost-every", "undecided", reason, {}, final=True)
-    weighted = with_weights(proof.arrays, proof.map, proof.upper, proof.graph.grid)
-    reason = weighted if isinstance(weighted, str) else ""
-    return Claim("almost-every", "undecided" if reason else "proved", reason, {})
+        return claimed("almost-every", "that starts thin out is proved in one dimension only", final=True)
+    return claimed("almost-every", proof.weights if isinstance(proof.weights, str) else "")
 
 
 def _expanding(proof: ProofOfMap) -> Claim:
     grid = proof.graph.grid
     if grid.dimension != 1:
-        reason = "expansion is proved in one dimension only"
-        return Claim("expanding", "undecided", reason, {}, final=True)
-    if not len(proof.cells):
-        return Claim("expanding", "undecided", "there are no attracting cells", {})
+        return claimed("expanding", "expansion is proved in one dimension only", final=True)
+    if no_cells(proof.component):
+        return claimed("expanding", no_cells(proof.component))
     least, most, place = np.inf, 0.0, ""
     for mine, boxes in _boxes(proof):
         low, high = boxes.slope_lo[:, 0, 0], boxes.slope_hi[:, 0, 0]
@@ -174,9 +157,8 @@ def _expanding(proof: ProofOfMap) -> Claim:
     if most < 1.0:
         reason = f"on all attracting cells the slope is at most {most:.6g} in modulus"
         return Claim("expanding", "refuted", reason, {}, final=True)
-    if not least > 1.0:
-        return Claim("expanding", "undecided", f"slope {least:.6g} at {place}", {})
-    return Claim("expanding", "proved", "", {"least_slope": least.hex()})
+    slow = "" if least > 1.0 else f"slope {least:.6g} at {place}"
+    return claimed("expanding", slow, {"least_slope": least.hex()})
 
 
 # ---------------------------------------------------------------- the same claim between other corners
@@ -190,7 +172,7 @@ def proved_again(proof: ProofOfMap, lower: Any, upper: Any) -> ProofOfMap:
 
 def refuted_again(proof: ProofOfMap, lower: Any, upper: Any) -> ProofOfMap:
     """Look for what refutes "ends-in" between other corners."""
-    open_ = Claim("ends-in", "undecided", "no cycle is found that refutes it", {})
+    open_ = claimed("ends-in", "no cycle is found that refutes it")
     return refuted_by_cycle(replace(proof, map=lower, upper=upper, claims=(open_,), cycles=()))
 
 
@@ -203,10 +185,8 @@ def _with_final(proof: ProofOfMap, claim: str) -> Claim:
     lost = np.flatnonzero(rank < 0)
     if claim == "attracts-all" and lost.size:
         place = _place(grid, int(lost[0]))
-        return Claim(
-            claim, "undecided", f"{lost.size} cells may not lead to attracting cells: first {place}", {}
-        )
-    return Claim(claim, "proved", "", {"max_rank": int(rank.max())} if claim == "attracts-all" else {})
+        return claimed(claim, f"{lost.size} cells may not lead to attracting cells: first {place}")
+    return claimed(claim, "", {"max_rank": int(rank.max())} if claim == "attracts-all" else {})
 
 
 PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
@@ -215,8 +195,8 @@ PROVERS: dict[str, Callable[[ProofOfMap], Claim]] = {
     "ends-in": _ends_in,
     "escapes": _escapes,
     "expanding": _expanding,
-    "invariant": _invariant,
-    "basin": lambda proof: replace(_invariant(proof), claim="basin"),
+    "invariant": lambda proof: claimed("invariant", no_cells(proof.component)),
+    "basin": lambda proof: claimed("basin", no_cells(proof.component)),
     "trapping": _trapping,
 }
 CLAIMS_OF_MAP = (*PROVERS, "cycles", "all-cycles", "converges")

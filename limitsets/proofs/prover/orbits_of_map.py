@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import reduce
-from operator import add, mul
+from operator import add
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -22,13 +22,12 @@ from numpy.typing import NDArray
 
 from limitsets.base.arrays import Array, Ints
 from limitsets.proofs.prover.certificate_of_map import widened
-from limitsets.proofs.prover.converging import Ball
+from limitsets.proofs.prover.converging import Ball, Entries, entries, times
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.programs import names_alone
 from limitsets.systems.maps.derived import SURE, UNKNOWN, branch_boxes
 from limitsets.systems.sets import Cycle
 
-Matrix: TypeAlias = list[list[Intervals]]
 Corners: TypeAlias = tuple[Any, Any]  # of the parameters
 Lies: TypeAlias = Callable[
     [Array, Array, Ints], bool
@@ -222,21 +221,12 @@ def slopes_of(corners: Corners, cycle: CycleOfMap) -> Array:
     return np.asarray(0.5 * (slopes.lo + slopes.hi))
 
 
-def _matrix(lo: Array, hi: Array) -> Matrix:
-    return [[Intervals.of(a, b) for a, b in zip(*rows, strict=True)] for rows in zip(lo, hi, strict=True)]
-
-
-def _times(a: Matrix, b: Matrix) -> Matrix:
-    columns = list(zip(*b, strict=True))
-    return [[reduce(add, map(mul, row, column)) for column in columns] for row in a]
-
-
-def _ends(a: Matrix) -> tuple[Array, Array]:
+def _ends(a: Entries) -> tuple[Array, Array]:
     lo, hi = (np.array([[getattr(entry, end)[0] for entry in row] for row in a]) for end in ("lo", "hi"))
     return lo, hi
 
 
-def _determinant(a: Matrix) -> Intervals:
+def _determinant(a: Entries) -> Intervals:
     """Enclose a determinant, by its first row."""
     minors = ([[*row[:j], *row[j + 1 :]] for row in a[1:]] for j in range(len(a)))
     terms = [
@@ -246,7 +236,7 @@ def _determinant(a: Matrix) -> Intervals:
     return reduce(add, terms)
 
 
-def _unstable(slope: Matrix) -> bool:
+def _unstable(slope: Entries) -> bool:
     """Whether each of some matrices M has an eigenvalue beyond the unit circle, by its size or as a real one.
 
     |det M| > 1; or det(1 - M) < 0, and so a real one above 1: det(s - M) > 0 for large s; or det(1 + M) < 0 and so a
@@ -260,7 +250,7 @@ def _unstable(slope: Matrix) -> bool:
     return bool(size.lo[0] > 1.0 or above.hi[0] < 0.0 or below.hi[0] < 0.0)
 
 
-def _attracts(slope: Matrix) -> bool | None:
+def _attracts(slope: Entries) -> bool | None:
     """Whether every eigenvalue lies in the unit disc: of a 2 x 2 matrix by |det| < 1 and |trace| < 1 + det (Jury)."""
     if _unstable(slope):
         return False
@@ -272,9 +262,10 @@ def _attracts(slope: Matrix) -> bool | None:
     return True if det.absolute().hi[0] < 1.0 and (det + 1.0 - trace).lo[0] > 0.0 else None
 
 
-def _product(slopes: Intervals) -> Matrix:
+def _product(slopes: Intervals) -> Entries:
     """Multiply the derivatives (p, d, d) of the steps of an orbit."""
-    return reduce(lambda product, each: _times(each, product), map(_matrix, slopes.lo, slopes.hi))
+    steps = (entries(slopes.lo[k : k + 1], slopes.hi[k : k + 1]) for k in range(len(slopes.lo)))
+    return reduce(lambda product, step: times(step, product), steps)
 
 
 @np.errstate(all="ignore")

@@ -221,6 +221,15 @@ class Claim:
         return brackets if brackets and all(brackets.values()) else None
 
 
+def claimed(
+    word: str, missing: str, section: Mapping[str, Any] | None = None, *, final: bool = False
+) -> Claim:
+    """Claim a word as proved, by the numbers of its section; undecided where something is missing."""
+    if missing:
+        return Claim(word, "undecided", missing, {}, final=final)
+    return Claim(word, "proved", "", dict(section or {}))
+
+
 def _starts(starts: Any) -> str | None:
     """Write for which starts a goal is proved."""
     if not isinstance(starts, dict):

@@ -24,14 +24,16 @@ from limitsets.proofs.prover.certificate import Saved, require_proved
 from limitsets.proofs.prover.certificate_of_map import (
     Numbers,
     Part,
+    Targets,
     cells_of,
-    cycle_in_file,
+    hexed,
+    targets_of,
     widened,
     write_map,
 )
 from limitsets.proofs.prover.converging import attracting_frames
-from limitsets.proofs.prover.goal_of_map import GoalOfMap, within_ends
-from limitsets.proofs.prover.leaving_of_map import with_exits, with_weights
+from limitsets.proofs.prover.goal_of_map import GoalOfMap
+from limitsets.proofs.prover.leaving_of_map import exits_of, targets_beyond, weights_of
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, is_unstable_in_file, slopes_of, slopes_on
 from limitsets.proofs.prover.programs import begins_of
 from limitsets.proofs.prover.proof import Claim, left_of
@@ -99,16 +101,25 @@ class ProofOfMap(Saved):
         return CellSet(self.graph.grid, self.graph.condensation().destinations(passing(self.graph)) >= 0)
 
     @functools.cached_property
+    def _images(self) -> Targets:
+        return targets_of(self.map, self.upper, self.graph.grid)
+
+    @functools.cached_property
     def arrays(self) -> Arrays:
         """The arrays of a certificate: target cells, ranks, components (docs/certificates.md)."""
         grid = self.graph.grid
-        ends = None if self.goal is None else within_ends(self.goal, grid)
-        return cells_of(self.map, self.upper, grid, ends, self.final)
+        ends = None if self.goal is None else self.goal.within(*grid.corners(np.arange(grid.n_cells)))
+        return cells_of(self._images, grid, ends, self.final)
 
     @functools.cached_property
     def exits(self) -> Numbers:
         """One less than the steps within which all starts of a cell leave the domain, -1: not proved; (n_cells,)."""
-        return np.asarray(with_exits(self.arrays, self.map, self.upper, self.graph.grid)["exit"])
+        return exits_of(self._images, self.graph.grid)
+
+    @functools.cached_property
+    def weights(self) -> Array | str:
+        """Weights of the cells, by which almost every start leaves those without a rank; or what is missing."""
+        return weights_of(self.map, self.upper, self.graph.grid, self._images, self.arrays["rank"] < 0)
 
     def _write(self, path: str | Path, **how: Any) -> None:
         """Write the claims that are proved, of the formulas that `limitsets.formulas` shows."""
@@ -143,11 +154,12 @@ class ProofOfMap(Saved):
             claims["cycles"] = cycles
         arrays = self.arrays if set(claims) - {"cycles", "all-cycles"} else {}
         if "escapes" in claims:
-            arrays = with_exits(arrays, self.map, self.upper, self.graph.grid)
+            arrays = arrays | {"exit": self.exits} | targets_beyond(arrays, self._images, self.exits >= 0)
         if "almost-every" in claims:
-            weighted = with_weights(arrays, self.map, self.upper, self.graph.grid)
-            assert not isinstance(weighted, str)  # it was proved so
-            arrays = weighted
+            thin = arrays["rank"] < 0
+            arrays = (
+                arrays | {"weight": np.asarray(self.weights)} | targets_beyond(arrays, self._images, thin)
+            )
         return Part((self.map, self.upper), claims, arrays)
 
     def functions(self, claim: str) -> str:
@@ -257,13 +269,20 @@ def frames_of(corners: tuple[Any, Any], cycle: CycleOfMap) -> Array | None:
 
 def _cycle_section(proof: ProofOfMap, cycle: CycleOfMap) -> dict[str, Any]:
     """Write a proved orbit as a certificate has it."""
+    corners, ball = (proof.map, proof.upper), cycle.ball
     # branches that are names alone are one in the file
     branches = cycle.branches if kind_of(proof.map).has_margin else np.zeros_like(cycle.branches)
-    boxes = cycle.lo, cycle.hi, cycle.side, branches
-    corners = proof.map, proof.upper
-    turns = {} if cycle.turns is None else {"turns": cycle.turns.tolist()}
-    if cycle.ball is not None:
-        return cycle_in_file(*boxes, cycle.ball.frames, radius=cycle.ball.radius) | turns
-    unstable = cycle.attracts is False and is_unstable_in_file(corners, cycle)
-    frames = frames_of(corners, cycle) if cycle.attracts else None
-    return cycle_in_file(*boxes, frames, unstable=unstable) | turns
+    frames = None if ball is None else ball.frames
+    if ball is None and cycle.attracts:
+        frames = frames_of(corners, cycle)
+    unstable = ball is None and cycle.attracts is False and is_unstable_in_file(corners, cycle)
+    listed: dict[str, Any] = {
+        "boxes": hexed(np.stack(widened(cycle.lo, cycle.hi), axis=-1)),
+        "side": cycle.side.tolist(),
+        "branch": branches.tolist(),
+        "attracts": frames is not None,
+        "frames": None if frames is None else hexed(frames),
+        "radius": None if ball is None else ball.radius.hex(),
+    }
+    listed |= {"unstable": True} if unstable else {}
+    return listed | ({} if cycle.turns is None else {"turns": cycle.turns.tolist()})

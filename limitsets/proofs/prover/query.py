@@ -60,18 +60,12 @@ class _Raster:
         extents = attractors.cells.extents()
         total = sum(hi - lo for parts in extents.values() for lo, hi in parts)
         self.step = total / PLACES
-        self.low, self.first = {}, {}
-        x, side, count = [], [], 0
-        for s, parts in extents.items():
-            if not parts:
-                continue
-            lo, hi = parts[0][0], parts[-1][1]
-            some = np.arange(lo, hi + self.step, self.step)
-            self.low[s], self.first[s] = lo, count
-            x.append(some)
-            side.append(np.full(some.size, s))
-            count += some.size
-        self.x, self.side = np.concatenate(x), np.concatenate(side)
+        spans = {side: (parts[0][0], parts[-1][1]) for side, parts in extents.items() if parts}
+        rows = [np.arange(lo, hi + self.step, self.step) for lo, hi in spans.values()]
+        sizes = [row.size for row in rows]
+        self.low = {side: lo for side, (lo, _) in spans.items()}
+        self.first = dict(zip(spans, np.cumsum([0, *sizes[:-1]]).tolist(), strict=True))
+        self.x, self.side = np.concatenate(rows), np.repeat([*spans], sizes)
 
     def nearest(self, x: Array, side: Ints) -> Ints:
         """Return the number of the nearest place; -1 where there is none."""
@@ -338,8 +332,10 @@ class Query:
         return any(goal.from_anywhere or goal.of_every_start for goal in self.goals)
 
     def unjoined(self, pieces: Sequence[Outcome]) -> str:
-        """Say why pieces do not prove the goals together; empty if they do."""
-        return unjoined(pieces)
+        """Say why pieces do not prove the goals together, in one certificate; empty if they do."""
+        missing = [piece.reason for piece in pieces if piece.verdict != "proved"]
+        missing = missing or [claim.reason for claim in joined_claims(pieces) if claim.verdict != "proved"]
+        return missing[0] if missing else ""
 
     def box(self, piece: SceneBox | None, noise: Mapping[str, str]) -> ParameterBox:
         """Enclose the parameters."""
@@ -501,13 +497,6 @@ def joined_claims(pieces: Sequence[Outcome]) -> tuple[Claim, ...]:
         for piece in pieces
     ]
     return tuple(weakest_of(of_goal, attractions) for of_goal in zip(*claims, strict=True))
-
-
-def unjoined(pieces: Sequence[Outcome]) -> str:
-    """Say why pieces do not prove the goals together, in one certificate; empty if they do."""
-    missing = [piece.reason for piece in pieces if piece.verdict != "proved"]
-    missing = missing or [claim.reason for claim in joined_claims(pieces) if claim.verdict != "proved"]
-    return missing[0] if missing else ""
 
 
 def _said(error: AnswerError) -> str:

@@ -20,7 +20,7 @@ Cells of different groups are kept apart: an orbit that goes from one group to a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -185,7 +185,7 @@ def _rounds(cover: Cover, left: Mask, steep: Array, of: Ints, thick: Mask) -> in
     number = np.flatnonzero(left)
     thrown = _Thrown(_stretches(cover, left, number, of), (1.0 + SLACK) / steep[number])
     names, group = np.unique(of[number], return_inverse=True)
-    waiting, largest_of = np.ones(names.size, dtype=bool), _LargestOf(group)
+    waiting, largest_of = np.ones(names.size, dtype=bool), _largest_of(group)
     bound, earlier, since = np.ones(number.size), np.zeros(number.size), 0
     last = throws = 0
     while waiting.any() and throws < MOST:
@@ -333,14 +333,8 @@ class _Thrown:
         return np.asarray(np.bincount(self.each.target, most, minlength=bound.size), dtype=np.float64)
 
 
-class _LargestOf:
-    """The largest of some values in each group."""
-
-    def __init__(self, group: Ints) -> None:
-        self.order = np.argsort(group, kind="stable")
-        self.begins = np.flatnonzero(np.diff(group[self.order], prepend=-1))
-
-    def __call__(self, values: Array) -> Array:
-        """Return it for values of the cells left."""
-        most: Array = np.maximum.reduceat(values[self.order], self.begins)
-        return most
+def _largest_of(group: Ints) -> Callable[[Array], Array]:
+    """Return the function that gives the largest of some values in each group."""
+    order = np.argsort(group, kind="stable")
+    begins = np.flatnonzero(np.diff(group[order], prepend=-1))
+    return lambda values: np.asarray(np.maximum.reduceat(values[order], begins))

@@ -33,7 +33,7 @@ from limitsets.feeder.thrower.impact import pose
 from limitsets.numbers.interval import Interval
 from limitsets.numbers.jit import proof_kernel
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.cover import targets
+from limitsets.proofs.prover.cover import leading_to, targets
 from limitsets.proofs.prover.numbers import Intervals, Jet, root
 from limitsets.proofs.prover.parameters import ParameterBox, body_at, lengths_of
 
@@ -180,18 +180,10 @@ def kinds_of_two_throws(attraction: Attraction, bad: Mask) -> Iterator[tuple[Two
     grid, ways = attraction.cover.grid, (targets(attraction.cover, JOG), targets(attraction.cover, FLIP))
     angles = np.concatenate([images.witness for images in attraction.cover.images], axis=1)
     attracting = attraction.component >= 0
-
-    def before(cells: Mask, branch: int) -> Mask:
-        """Attracting cells one throw before some."""
-        begin, end = ways[branch].T
-        number = np.concatenate([[0], np.cumsum(cells)])
-        earlier: Mask = attracting & (begin >= 0) & (number[end + 1] > number[begin])
-        return earlier
-
     for second in (JOG, FLIP):
-        last = before(bad, second)
+        last = attracting & leading_to(ways[second], bad)
         for first in (JOG, FLIP):
-            begin = before(last, first)
+            begin = attracting & leading_to(ways[first], last)
             for side in range(grid.sides):
                 own, then = np.zeros_like(begin), np.zeros_like(begin)
                 at, after = grid.of_side(side), grid.of_side((side + first) % grid.sides)

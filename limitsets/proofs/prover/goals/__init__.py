@@ -1,7 +1,7 @@
-"""Proofs of the scene's goal: one file per kind of goal, and one line here.
+"""Proofs of the scene's goal: by kind of goal a `Kind` in `kinds.py`, or in a file of its own, and one line here.
 
-A file gives a `Kind`: how the goal is proved of the attracting cells, how it is refuted, how a proved one reads, and
-the borders that the cells need.  For which starts it is proved is added here, for all kinds alike, from the basin.
+A kind says how the goal is proved of the attracting cells, how it is refuted, how a proved one reads, and the borders
+that the cells need.  For which starts it is proved is added here, for all kinds alike, from the basin.
 `limitsets/feeder/goals/` declares the goals and reads them off samples; what each means is said there and in
 docs/certificates.md.
 """
@@ -16,14 +16,7 @@ import numpy as np
 from limitsets.feeder.goals import Goal, laid_words, unknown_goal
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction, near_section
-from limitsets.proofs.prover.goals import (
-    attracts_all,
-    flip_order,
-    oriented_beyond,
-    predicate,
-    reaches,
-    stays_on_arm,
-)
+from limitsets.proofs.prover.goals import kinds, reaches
 from limitsets.proofs.prover.goals.kind import Answer, Kind, undecided
 from limitsets.proofs.prover.goals.laid_starts import (
     LITTLE,
@@ -51,12 +44,12 @@ __all__ = [
 ]
 
 KINDS: dict[str, Kind] = {
-    "attracts_all": attracts_all.KIND,
-    "flip_order": flip_order.KIND,
-    "oriented_beyond": oriented_beyond.KIND,
-    "predicate": predicate.KIND,
+    "attracts_all": kinds.ATTRACTS_ALL,
+    "flip_order": kinds.FLIP_ORDER,
+    "oriented_beyond": kinds.ORIENTED_BEYOND,
+    "predicate": kinds.PREDICATE,
     "reaches": reaches.KIND,
-    "stays_on_arm": stays_on_arm.KIND,
+    "stays_on_arm": kinds.STAYS_ON_ARM,
 }
 """What proves each goal, by its word."""
 

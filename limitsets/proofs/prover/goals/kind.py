@@ -17,8 +17,9 @@ import numpy as np
 
 from limitsets.base.arrays import Ints, Mask
 from limitsets.feeder.scene import Scene
-from limitsets.proofs.prover.attraction import BELOW, Attraction
-from limitsets.proofs.prover.cover import everywhere, targets
+from limitsets.proofs.prover.attraction import BELOW, Attraction, no_cells
+from limitsets.proofs.prover.basin import missing_near
+from limitsets.proofs.prover.cover import everywhere, leading_to, targets
 from limitsets.proofs.prover.goals.recurrent_orbits import Refutation
 from limitsets.proofs.prover.goals.violating_orbits import State
 from limitsets.systems.graph.components import ranks, reach, strong_components
@@ -72,6 +73,11 @@ def undecided(reason: str, *, final: bool = False) -> Answer:
     return Answer("undecided", reason, final=final)
 
 
+def proved_unless(missing: str, section: Mapping[str, Any], *, final: bool = False) -> Answer:
+    """Answer that the goal is proved, by the numbers of its section; undecided where something is missing."""
+    return undecided(missing, final=final) if missing else Answer("proved", "", section)
+
+
 def against(refutation: Refutation, reason: str = "") -> Answer:
     """Answer by a refutation, with the starts for which the goal fails; undecided if the refutation is empty."""
     if not refutation.of:
@@ -88,16 +94,8 @@ def once(orbit: tuple[State, ...], reason: str = "") -> Answer:
 def common(attraction: Attraction, *, anywhere: bool) -> str:
     """Say which need of every goal is not proved: attracting cells, or that no start leaves; empty if all are."""
     if not anywhere:
-        return "" if (attraction.component >= 0).any() else "there are no attracting cells"
-    if attraction.cover.points:
-        return BELOW
-    for side, near in enumerate(attraction.joint):
-        if not near.proved:
-            return f"near the joint on side {side}: {near.reason}"
-    leaving = np.flatnonzero(attraction.cover.graph.ranges.exits)
-    return (
-        f"the image of {attraction.cover.place(int(leaving[0]))} may leave the cells" if leaving.size else ""
-    )
+        return no_cells(attraction.component)
+    return BELOW if attraction.cover.points else missing_near(attraction.joint) or attraction.cover.leaving
 
 
 def begins(section: Mapping[str, Any]) -> str:
@@ -108,13 +106,8 @@ def begins(section: Mapping[str, Any]) -> str:
 
 def thrown_into(attraction: Attraction, bad: Mask) -> str:
     """Name a cell from which a throw may land in one of some cells; empty if there is none."""
-    number = np.concatenate([[0], np.cumsum(bad)])
-    for ends in everywhere(attraction.cover):
-        cells = np.flatnonzero(ends[:, 0] >= 0)
-        hit = cells[number[ends[cells, 1] + 1] > number[ends[cells, 0]]]
-        if hit.size:
-            return attraction.cover.place(int(hit[0]))
-    return ""
+    leading = (leading_to(ends, bad) for ends in everywhere(attraction.cover))
+    return next((attraction.cover.place(int(cells.argmax())) for cells in leading if cells.any()), "")
 
 
 def place_text(goal: Any, scene: Scene) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from limitsets.base.arrays import Mask
 from limitsets.feeder.goals import Goal, Laid, by_side
 from limitsets.feeder.scene import Scene
-from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.attraction import Attraction, not_attracting
 from limitsets.proofs.prover.basin import NO_STARTS, ROUNDING, leaving_cells
 from limitsets.proofs.prover.cover import everywhere, met
 from limitsets.proofs.prover.goals.kind import Answer, Kind, undecided
@@ -69,9 +69,7 @@ def narrowed(attraction: Attraction, cells: Mask) -> Attraction:
     of = np.where(keep, attraction.component, -1)
     component = np.where(of >= 0, np.searchsorted(np.unique(of[of >= 0]), of), -1).astype(np.int32)
     again = CellSet(grid, attraction.unresolved.mask & keep)
-    reason = ""
-    if len(again):
-        reason = f"{len(again)} recurrent cells do not attract: first {cover.place(again.numbers()[0])}"
+    reason = not_attracting(cover, again)
     lost = leaving > 0
     lost |= np.concatenate([one.lost for one in images])
     if lost.any():

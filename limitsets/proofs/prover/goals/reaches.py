@@ -21,6 +21,7 @@ from limitsets.proofs.prover.goals.kind import (
     below,
     common,
     place_text,
+    proved_unless,
     throws_to_reach,
     undecided,
 )
@@ -64,10 +65,8 @@ def _prove(attraction: Attraction, scene: Scene, goal: Reaches) -> Answer:
     if missing:
         return undecided(missing, final=attraction.cover.box.landing > 0.0 and not goal.laid)
     throws, _, reason = perron_frobenius_bound(attraction.cover, inside & ~wanted)
-    if reason:
-        return undecided(reason)
     # a little more, so that other arithmetic can confirm it
-    return Answer("proved", "", _section(scene, goal, throws + throws // 8 + 1))
+    return proved_unless(reason, _section(scene, goal, throws + throws // 8 + 1))
 
 
 def not_null(attraction: Attraction) -> str:
@@ -91,9 +90,8 @@ def _every(attraction: Attraction, scene: Scene, goal: Reaches, wanted: Mask) ->
     throws, left = throws_to_reach(attraction, cells, wanted)
     if left.size:
         return undecided(f"an orbit from {attraction.cover.place(int(left[0]))} may never get there")
-    if missing:
-        return undecided(missing, final=attraction.cover.box.landing > 0.0 and not goal.laid)
-    return Answer("proved", "", _section(scene, goal, throws))
+    final = attraction.cover.box.landing > 0.0 and not goal.laid
+    return proved_unless(missing, _section(scene, goal, throws), final=final)
 
 
 def _section(scene: Scene, goal: Reaches, throws: int) -> dict[str, Any]:

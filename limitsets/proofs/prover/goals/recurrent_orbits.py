@@ -392,9 +392,10 @@ def closed(box: ParameterBox, path: Path, wrong: Wrong) -> Refutation:
         From places and sides to whether each violates the goal.
     """
     options, step = throw_choices(box, KAPPAS), box.hi.arm_length / PLACES
-    x, side = np.array(path.x[-1:]), np.array(path.side[-1:], dtype=np.int64)
-    reached, seen, left = ReachedStates.of(x, side), np.zeros(0, dtype=np.int64), CLOSINGS
+    reached = ReachedStates.of(np.array(path.x[-1:]), np.array(path.side[-1:], dtype=np.int64))
+    seen, left = np.zeros(0, dtype=np.int64), CLOSINGS
     for _ in range(BACK):
+        x, side = reached.x[-1], reached.side[-1]
         for last, first in _within_reach(box, path, x, side)[:left].tolist():
             back = reached.path(last, options)
             whole = Path(
@@ -408,14 +409,9 @@ def closed(box: ParameterBox, path: Path, wrong: Wrong) -> Refutation:
                 return refutation
         thrown = throws(box, x, side, options)
         place = thrown.side * 2 * PLACES + np.floor(thrown.x / step).astype(np.int64)
-        new = np.flatnonzero(thrown.stays & ~np.isin(place, seen))
-        _, where = np.unique(place[new], return_index=True)
-        keep = new[where]
-        if not keep.size:
+        seen = reached.add_new(thrown, place, seen)
+        if not reached.x[-1].size:
             break
-        seen = np.concatenate([seen, place[keep]])
-        reached.add(thrown, keep)
-        x, side = thrown.x[keep], thrown.side[keep]
     return Refutation()
 
 
@@ -478,10 +474,7 @@ def _kappa_to(box: ParameterBox, x: float, side: int, to: float, on: int) -> flo
         return low if abs(first) <= abs(last) else high
     for _ in range(60):
         middle = 0.5 * (low + high)
-        if (beyond(middle) > 0.0) == (first > 0.0):
-            low = middle
-        else:
-            high = middle
+        low, high = (middle, high) if (beyond(middle) > 0.0) == (first > 0.0) else (low, middle)
     return 0.5 * (low + high)
 
 

@@ -147,12 +147,19 @@ class ReachedStates:
         return cls([x], [side], [none], [none])
 
     def add(self, thrown: ThrownStates, keep: Ints) -> None:
-        """Take some images of the states added last."""
+        """Take images of the states added last, by their numbers."""
         before = sum(part.size for part in self.x[:-1])
         self.x.append(thrown.x[keep])
         self.side.append(thrown.side[keep])
         self.parent.append(thrown.state[keep] + before)
         self.choice.append(thrown.choice[keep])
+
+    def add_new(self, thrown: ThrownStates, place: Ints, seen: Ints) -> Ints:
+        """Take one image on the arm for each place that is not seen yet, and return all places seen; -1 is none."""
+        new = np.flatnonzero(thrown.stays & (place >= 0) & ~np.isin(place, seen))
+        _, first = np.unique(place[new], return_index=True)
+        self.add(thrown, new[first])
+        return np.concatenate([seen, place[new[first]]])
 
     def plus(self, thrown: ThrownStates, keep: Ints) -> ReachedStates:
         """Return the same with some more, leaving this as it is."""
@@ -194,11 +201,13 @@ def violating_path(attraction: Attraction, wrong: Wrong) -> Path | None:
     """Breadth first from an attracting cell, one state per cell, until a state violates the goal."""
     grid: Grid = attraction.cover.grid
     start, on = on_limit_set(attraction)
-    x, side = np.array([start]), np.array([on])
-    seen = np.zeros(grid.n_cells, dtype=bool)
-    reached, options = ReachedStates.of(x, side), throw_choices(attraction.cover.box)
+    reached, options = (
+        ReachedStates.of(np.array([start]), np.array([on])),
+        throw_choices(attraction.cover.box),
+    )
+    seen = np.zeros(0, np.int64)
     for _ in range(MOST_THROWS):
-        thrown = throws(attraction.cover.box, x, side, options)
+        thrown = throws(attraction.cover.box, reached.x[-1], reached.side[-1], options)
         bad = violation(thrown, wrong)
         if bad.size:
             reached.add(thrown, bad)
@@ -206,14 +215,9 @@ def violating_path(attraction: Attraction, wrong: Wrong) -> Path | None:
         cells = np.full(thrown.x.size, -1)
         for s in np.unique(thrown.side).tolist():
             cells[thrown.side == s] = grid.index(thrown.x[thrown.side == s], s)
-        new = np.flatnonzero((cells >= 0) & ~seen[cells] & thrown.stays)
-        _, where = np.unique(cells[new], return_index=True)
-        keep = new[where]
-        if not keep.size:
+        seen = reached.add_new(thrown, cells, seen)
+        if not reached.x[-1].size:
             return None
-        seen[cells[keep]] = True
-        reached.add(thrown, keep)
-        x, side = thrown.x[keep], thrown.side[keep]
     return None
 
 
@@ -223,14 +227,6 @@ def sample_passage(attraction: Attraction, cells: Ints) -> tuple[State, ...]:
     choice = ThrowChoice(box.middle_kappa, 0.0)
     path = orbit(box.at_kappa(choice.kappa), *middle(attraction, cells), SHOWN)
     return replayed(box, Path(path.x.tolist(), path.side.tolist(), [choice] * path.code.size))
-
-
-def proved_wrong(box: ParameterBox, path: Path, wrong: Wrong) -> tuple[State, ...]:
-    """Prove an orbit as `replayed`, and that its last state violates the goal; empty if it cannot be."""
-    states = replayed(box, path)
-    if not states:
-        return ()
-    return states if wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all() else ()
 
 
 def replayed(box: ParameterBox, path: Path) -> tuple[State, ...]:
@@ -279,8 +275,10 @@ def one_throw(
         return ()
     reached = ReachedStates.of(x, side)
     reached.add(thrown, bad)
-    states = proved_wrong(box, reached.path(0, options), wrong)
-    return states if states and states[-1].hi <= box.lo.arm_length else ()
+    states = replayed(box, reached.path(0, options))
+    if not states or not wrong(np.array([states[-1].lo]), np.array([states[-1].side])).all():
+        return ()
+    return states if states[-1].hi <= box.lo.arm_length else ()
 
 
 def start_that_leaves(attraction: Attraction, laid: Laid = ()) -> tuple[State, ...]:
@@ -302,7 +300,9 @@ def start_that_leaves(attraction: Attraction, laid: Laid = ()) -> tuple[State, .
     for option in throw_choices(box, 3):
         for path in _first_to_leave(attraction, option, laid):
             states = replayed(box, path)
-            if states and _is_off(box, states[-1]):
+            last = states[-1] if states else None
+            # proved to be at x <= a or beyond the arm's end
+            if last and (last.hi <= box.lo.a[last.side] or last.lo > box.hi.arm_length):
                 return states
     return ()
 
@@ -339,16 +339,10 @@ def _first_to_leave(attraction: Attraction, option: ThrowChoice, laid: Laid) -> 
         return
     reached = ReachedStates.of(x, side)
     for _ in range(UNTIL_GONE):
-        thrown = throws(attraction.cover.box, x, side, [option])
+        thrown = throws(attraction.cover.box, reached.x[-1], reached.side[-1], [option])
         for k in np.flatnonzero(~thrown.stays)[:TRIED]:
             yield reached.plus(thrown, np.array([k])).path(0, [option])
         keep = np.flatnonzero(thrown.stays)
         if keep.size < thrown.stays.size or not keep.size:
             return
         reached.add(thrown, keep)
-        x, side = thrown.x[keep], thrown.side[keep]
-
-
-def _is_off(box: ParameterBox, state: State) -> bool:
-    """Whether a landing is proved to be at x <= a or beyond the arm's end."""
-    return bool(state.hi <= box.lo.a[state.side] or state.lo > box.hi.arm_length)
