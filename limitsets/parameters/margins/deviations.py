@@ -215,7 +215,7 @@ def given(scene: Scene) -> tuple[str, ...]:
     return (*kept, "throw.speed", "landing.x")
 
 
-def _unit(scene: Scene, quantity: str, reading: str) -> str:
+def _unit(scene: Scene, quantity: str) -> str:
     """Choose the unit: as the scene's [tolerance] has it, or as people give such a deviation."""
     text = scene.text.get("tolerance", {}).get(quantity)
     if text is not None:
@@ -261,7 +261,7 @@ def deviation_scale(scene: Scene, quantity: str, reading: str | None = None) -> 
         raise AnswerError(
             "the quantity", quantity, "one that the throw depends on; it is given by kappa", remedy
         )
-    scale = DeviationScale(quantity, reading, _unit(scene, quantity, reading), scene)
+    scale = DeviationScale(quantity, reading, _unit(scene, quantity), scene)
     if quantity not in ("landing.x", "throw.speed"):
         _text_at(scene, quantity)
     return scale
@@ -277,15 +277,13 @@ def deviation_scales(scene: Scene, reading: str | None = None) -> tuple[Deviatio
     reading : str, optional
         Only this one.
     """
-    by_kappa = "kappa" in scene.text["throw"]
-    scales = []
-    for word in READINGS if reading is None else (reading,):
-        for name in given(scene):
-            if word == "fixed" and (name == "landing.x" or (by_kappa and name == "gravity.tilt")):
-                continue
-            if word == "fixed" or name in VARYING:
-                scales.append(deviation_scale(scene, name, word))
-    return tuple(scales)
+    never_fixed = ("landing.x", "gravity.tilt") if "kappa" in scene.text["throw"] else ("landing.x",)
+    return tuple(
+        deviation_scale(scene, name, word)
+        for word in (READINGS if reading is None else (reading,))
+        for name in given(scene)
+        if (name not in never_fixed if word == "fixed" else name in VARYING)
+    )
 
 
 # ----------------------------------------------------------------

@@ -66,14 +66,11 @@ class InvariantIntervals(NamedTuple):
         return float(np.max(others[np.isfinite(others)], initial=-np.inf))
 
 
-class _Cuts(NamedTuple):
-    """Borders between the branches of one side, ascending from a_i to the arm's end, and the branches between."""
-
-    borders: Array
-    branches: Ints
+_Cuts = tuple[Array, Ints]
 
 
 def _cuts(params: Throw, side: int) -> _Cuts:
+    """Borders between the branches of one side, ascending from a_i to the arm's end, and the branches between."""
     a, end = float(params.a[side]), params.arm_length
     x = a + (end - a) * np.linspace(1e-4, 1.0, SAMPLES)
     values = margins(params, x, side)
@@ -88,7 +85,7 @@ def _cuts(params: Throw, side: int) -> _Cuts:
         share = value[j] / (value[j] - value[j + 1])
         borders.append(float(fine[j] + share * (fine[j + 1] - fine[j])))
     branches = np.concatenate([flips[:1], flips[1:][flips[1:] != flips[:-1]]])
-    return _Cuts(np.array([a, *borders, end]), branches.astype(np.int64))
+    return np.array([a, *borders, end]), branches.astype(np.int64)
 
 
 def _parts(cuts: list[_Cuts], lo: Array, hi: Array) -> tuple[Array, Ints, Ints]:
@@ -121,9 +118,9 @@ def least_slack(params: Throw) -> float:
     """
     room = np.inf
     for side in range(params.a.size):
-        cuts = _cuts(params, side)
-        for k, branch in enumerate(cuts.branches.tolist()):
-            after, on, _ = along(params, cuts.borders[k : k + 2], side, [branch])
+        borders, branches = _cuts(params, side)
+        for k, branch in enumerate(branches.tolist()):
+            after, on, _ = along(params, borders[k : k + 2], side, [branch])
             # the jog from a_i itself moves nothing
             lower = after[0] - params.a[on[0]] if k or branch else np.inf
             room = min(room, lower, params.arm_length - after[1])
@@ -353,8 +350,7 @@ def estimated(
     linear = (reach - threshold) / cost if cost > 0.0 else math.inf
     if linear <= above:
         return Estimate(linear, math.nan, threshold, reach, nominal, effects)
-    loaded = list(hard or [])
-    loaded += [worst_corner(row) for row in falls.T]
+    loaded = [*(hard or ()), *(worst_corner(row) for row in falls.T)]
     spare, top = reach - threshold, min(linear, 1e3)
     margin, x = _sought(
         fed, list(dict.fromkeys(loaded)), top, above=above, spare=spare, steps=steps, close=close
@@ -376,12 +372,8 @@ def failing(scene: Scene, tolerance: Tolerance, side: int, estimate: Estimate, f
     [[], [(-1,), (1,)]]
     """
     fed = _Fed(scene, tolerance, side, _start(estimate, side))
-    wrong = []
-    for signs in corners(len(tolerance.deviations)):
-        threshold, reach = fed.spare(factor, signs)
-        if not threshold <= estimate.x <= reach:
-            wrong.append(signs)
-    return wrong
+    places = {signs: fed.spare(factor, signs) for signs in corners(len(tolerance.deviations))}
+    return [signs for signs, (low, high) in places.items() if not low <= estimate.x <= high]
 
 
 def on_all_corners(

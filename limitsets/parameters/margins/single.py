@@ -59,15 +59,10 @@ def goals_of(
 ) -> tuple[Goal, ...]:
     """Read what is asked: the scene's goal, another, several, or a function; of all starts or of those laid down."""
     ranges = read_laid(scene, laid)
-    return tuple(laid_goal(each, ranges) for each in _goals_of(scene, goal))
-
-
-def _goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple[Goal, ...]:
-    if goal is None:
-        if scene.goal is None:
-            raise AnswerError("the goal", None, "a scene with [goal], or goal=", "say what has to hold")
-        return (scene.goal,)
-    several = list(goal) if isinstance(goal, Sequence) else [goal]
+    asked = scene.goal if goal is None else goal
+    if asked is None:
+        raise AnswerError("the goal", None, "a scene with [goal], or goal=", "say what has to hold")
+    several = list(asked) if isinstance(asked, Sequence) else [asked]
     goals: list[Goal] = []
     for one in several:
         if isinstance(one, Goal):
@@ -78,7 +73,7 @@ def _goals_of(scene: Scene, goal: GoalLike | Sequence[GoalLike] | None) -> tuple
             raise unknown_goal(one)
     if not goals:
         raise AnswerError("the goal", "no goals", "one at least", "name one")
-    return tuple(goals)
+    return tuple(laid_goal(each, ranges) for each in goals)
 
 
 @overload
@@ -189,12 +184,12 @@ def margin_scene(
     goals = goals_of(loaded, goal, laid)
     query = Query.of(loaded, goals)
     query.box(None, {})  # refuses a scene of which nothing can be proved
-    names: tuple[str, ...] = tuple(dict.fromkeys(quantities))
-    todo: list[DeviationScale | str] = []
-    if names:
-        todo = [name if name == "joint" else deviation_scale(query.scene, name, reading) for name in names]
-    else:
-        todo = [*deviation_scales(query.scene, reading)]
+    todo: list[DeviationScale | str] = [
+        name if name == "joint" else deviation_scale(query.scene, name, reading)
+        for name in dict.fromkeys(quantities)
+    ]
+    if not todo:
+        todo += deviation_scales(query.scene, reading)
         todo += ["joint"] if loaded.tolerance and reading is None else []
     margins = []
     for number, one in enumerate(todo):
