@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.patheffects import Normal, Stroke, withTickedStroke
@@ -26,6 +28,7 @@ from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import load
 from limitsets.feeder.scene.quantities import base_unit, find
 from limitsets.feeder.scene.units import exact_factor
+from limitsets.parameters.atlas import Atlas
 from limitsets.parameters.atlas.classes import (
     UNDECIDED,
     AttractorKind,
@@ -35,13 +38,6 @@ from limitsets.parameters.atlas.classes import (
     named_class,
     numbers_of,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from limitsets.parameters.atlas import Atlas
-
 
 # ----------------------------------------------------------------
 # What the pictures of an atlas share: axes, pixels about the points, hatches, and the mark of the scene itself.

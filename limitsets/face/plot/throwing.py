@@ -9,18 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.feeder.geometry import side_ends
+from limitsets.feeder.scene import Scene
+from limitsets.feeder.thrower import Trace
 from limitsets.systems.maps import codes
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-    from limitsets.feeder.thrower import Trace
-
 
 # ----------------------------------------------------------------
 # Places of a part's vertices: lying on a side, and in flight.  Figures and animations place the part by the same
@@ -57,15 +54,6 @@ def turned(points: Array, angle: float) -> Array:
     cosine, sine = math.cos(angle), math.sin(angle)
     images: Array = points @ np.array([[cosine, sine], [-sine, cosine]])
     return images
-
-
-def centre_in_flight(
-    scene: Scene, x: float, side: int, phi: float | Array, kappa: float | None = None
-) -> Array:
-    """Centre of mass in flight after the part has turned by phi (docs/model.md, flight); shape (..., 2)."""
-    h, d, fall = scene.surface_height, float(scene.sides.d[side]), scene.kappa if kappa is None else kappa
-    at = np.asarray(phi)
-    return np.stack([x - (h + d) * at, h + d + x * at - 0.5 * fall * at * at], axis=-1)
 
 
 # ----------------------------------------------------------------
@@ -309,10 +297,9 @@ def _joined(pieces: list[_Piece], rest: tuple[Array, float], shift: float) -> Tu
         poses[share >= 1.0] = (*rest[0], rest[1])
         return poses
 
-    later = pieces[1:]
     faces = tuple(
         (piece.begin / time if time else 1.0, float(piece.vertex[0]), float(piece.vertex[1]))
-        for piece in later
+        for piece in pieces[1:]
     )
     return Turning(time, pose, faces, shift, drawn=False)
 
@@ -492,10 +479,12 @@ def motion(scene: Scene, throw: Throw) -> Motion:
 
 
 def _exact_flight(scene: Scene, throw: Throw, share: Array) -> Array:
-    phi, lean = throw.phi * np.asarray(share), stroke_of(scene)
-    centre = centre_in_flight(scene, throw.x, throw.side, phi, throw.kappa * math.cos(lean))
-    along = -throw.kappa * math.sin(lean)
-    return np.stack([centre[:, 0] + 0.5 * along * phi * phi, centre[:, 1], phi], axis=-1)
+    """Move the centre of mass as docs/model.md says (flight); gravity leans where the stroke is simulated."""
+    h, d, lean = scene.surface_height, float(scene.sides.d[throw.side]), stroke_of(scene)
+    along, fall = -throw.kappa * math.sin(lean), throw.kappa * math.cos(lean)
+    phi = throw.phi * np.asarray(share)
+    x = throw.x - (h + d) * phi + 0.5 * along * phi * phi
+    return np.stack([x, h + d + throw.x * phi - 0.5 * fall * phi * phi, phi], axis=-1)
 
 
 def _small_flight(scene: Scene, throw: Throw, share: Array) -> Array:
