@@ -15,7 +15,7 @@ from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limi
 from limitsets.face.cli.output import saved
 from limitsets.face.cli.subjects import (
     MapOfFile,
-    grid_of,
+    domain_of,
     of_map_alone,
     of_scene_alone,
     spans,
@@ -101,7 +101,7 @@ def certify(
         return _of_map(
             run,
             chosen,
-            grid_of(chosen, domain, cells or CELLS),
+            ls.grid(domain_of(chosen, domain), cells=cells or CELLS),
             words,
             boxes=boxes,
             recheck=not no_recheck,
