@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from limitsets.base import AnswerError, arguments_checked, replaced, shown_in_notebooks
-from limitsets.face.animation.film import Asked
-
-if TYPE_CHECKING:
-    from limitsets.face.animation.film import Film
-
+from limitsets.face.animation.film import Asked, Film
+from limitsets.feeder.scene import load
 
 Progress = Callable[[str, int, int], None] | None
 
@@ -73,8 +70,6 @@ def film_of(
     'Throw 1 of 1: flip from 21.00 in, side 2, to 16.55, side 0'
     """
     if isinstance(shown, str | Path):
-        from limitsets.feeder.scene import load
-
         shown = load(shown)
     if throws is not None and not (isinstance(throws, int) and throws >= 1):
         raise AnswerError("the throws", throws, "a whole number from 1", "show one at least")

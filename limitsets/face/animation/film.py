@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base import AnswerError
 from limitsets.face.plot.throwing import about_centre, turned
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-
+from limitsets.feeder.scene import Scene
 
 Array = NDArray[np.float64]
 Extents = dict[int, list[tuple[float, float]]]
@@ -326,62 +324,56 @@ def cut(
     """Cut legs of one part's motion into frames: each leg ends at a frame, and the first begins at one."""
     counts = [max(1, round(leg.seconds * pace.fps)) for leg in legs]
     require_length(sum(counts) + 1)
-    columns: dict[str, list[Any]] = {word: [] for word in ("times", "poses", "arm", "position", "trail")}
-    texts: dict[str, list[int]] = {"caption": [], "note": [], "stage": []}
-    captions, notes = (
-        list(dict.fromkeys(leg.caption for leg in legs)),
-        list(dict.fromkeys(leg.note for leg in legs)),
-    )
-    marks: list[tuple[int, str, float, float]] = []
+    shares = [np.arange(int(number > 0), count + 1) / count for number, count in enumerate(counts)]
+    # the first frame of each leg, and the number of frames
+    firsts = [0, *(1 + np.cumsum(counts)).tolist()]
+    begins = [0, *(first for leg, first in zip(legs, firsts[:-1], strict=True) if leg.begins)]
+    clock = np.cumsum([0.0, *(leg.seconds / pace.unit for leg in legs[:-1])])  # when each leg begins
+    marks: list[Mark] = []
     rests: list[Rest] = []
-    frame, trail, clock, before, begins = 0, [0, 0], 0.0, False, [0]
-    for number, (leg, count) in enumerate(zip(legs, counts, strict=True)):
-        share = np.arange(0 if number == 0 else 1, count + 1) / count
-        columns["times"].append(clock + share * leg.seconds / pace.unit)
-        columns["poses"].append(leg.pose(share))
-        columns["arm"].append(leg.arm(share))
-        columns["position"].append(leg.lane(share))
+    trails: list[tuple[int, int]] = []
+    begin, end, drawn = 0, 0, False
+    for leg, count, (first, after) in zip(legs, counts, pairwise(firsts), strict=True):
         if leg.begins:
-            begins, trail = [*begins, frame], [frame, frame]
-        if leg.trail and not before:
-            trail = [max(frame - 1, 0), frame]
-        for k in range(share.size):
-            trail = [trail[0], frame + k] if leg.trail else trail
-            columns["trail"].append(trail)
-        texts["caption"] += [captions.index(leg.caption)] * share.size
-        texts["note"] += [notes.index(leg.note)] * share.size
-        texts["stage"] += [leg.stage] * share.size
-        last = frame + share.size - 1
-        marks += [(last - round((1.0 - at) * count), word, x, y) for at, word, x, y in leg.marks]
+            begin = end = first
+        if leg.trail and not drawn:
+            begin = max(first - 1, 0)
+        trails += [(begin, frame if leg.trail else end) for frame in range(first, after)]
+        end, drawn = trails[-1][1], leg.trail
+        for at, word, x, y in leg.marks:
+            frame = after - 1 - round((1.0 - at) * count)
+            until = next((k for k in begins if k > frame), firsts[-1])
+            marks.append(Mark(frame, until, 0, word, x, y))
         if leg.rest is not None:
-            rests.append(Rest(begins[-1], last, *leg.rest))
-        frame, clock, before = last + 1, clock + leg.seconds / pace.unit, leg.trail
-    shown = []
-    for at, word, x, y in marks:
-        until = next((k for k in begins if k > at), frame)
-        shown.append(Mark(at, until, 0, word, x, y))
+            rests.append(Rest(max(k for k in begins if k < after), after - 1, *leg.rest))
+    cuts = list(zip(legs, shares, strict=True))
+    captions = list(dict.fromkeys(leg.caption for leg in legs))
+    notes = list(dict.fromkeys(leg.note for leg in legs))
+    of_leg = np.repeat(np.arange(len(legs)), [share.size for share in shares])
     return Film(
         title,
         scene.unit,
         pace.clock,
         fps=pace.fps,
         about="; ".join(words for words in (pace.words, about) if words),
-        times=np.concatenate(columns["times"]),
-        poses=np.concatenate(columns["poses"])[:, None, :],
+        times=np.concatenate(
+            [at + share * leg.seconds / pace.unit for at, (leg, share) in zip(clock, cuts, strict=True)]
+        ),
+        poses=np.concatenate([leg.pose(share) for leg, share in cuts])[:, None, :],
         outlines=(about_centre(scene),),
         labels=(labels_of(scene),),
-        arm=np.concatenate(columns["arm"]),
+        arm=np.concatenate([leg.arm(share) for leg, share in cuts]),
         surface=(scene.surface_height, scene.arm_length if end is None else end),
         ground=tuple(ground),
         captions=tuple(captions),
         notes=tuple(notes),
-        caption=np.array(texts["caption"]),
-        note=np.array(texts["note"]),
-        trail=np.array(columns["trail"]),
-        marks=tuple(shown),
+        caption=np.array([captions.index(leg.caption) for leg in legs])[of_leg],
+        note=np.array([notes.index(leg.note) for leg in legs])[of_leg],
+        trail=np.array(trails),
+        marks=tuple(marks),
         rests=tuple(rests),
         lanes=lanes,
-        position=np.concatenate(columns["position"]),
-        stage=np.array(texts["stage"]),
+        position=np.concatenate([leg.lane(share) for leg, share in cuts]),
+        stage=np.array([leg.stage for leg in legs])[of_leg],
         view=tuple(view),
     )

@@ -7,7 +7,7 @@ acceleration, so that the arm reaches the speed of the throw when it stops.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,8 @@ from limitsets.face.animation.film import Lanes, Leg, Pace
 from limitsets.face.plot.style import stretch
 from limitsets.face.plot.throwing import Throw, angle_on_side, motion, stroke_of
 from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-    from limitsets.parameters.analysis import Analysis
-
+from limitsets.feeder.scene import Scene
+from limitsets.parameters.analysis import Analysis, analyse
 
 # ----------------------------------------------------------------
 # The lanes beside the film: limit sets, critical points and the goal, from an analysis; and a good start.
@@ -35,8 +32,6 @@ CELLS = 1024
 
 def known_of(scene: Scene, progress: Progress = None, **more: Any) -> tuple[Analysis, Lanes]:
     """Analyse a scene, which chooses its effects if they are `auto`, and give the lanes of the analysis."""
-    from limitsets.parameters.analysis import analyse
-
     analysis = analyse(scene, CELLS, progress=progress)
     return analysis, lanes_of(analysis.scene, analysis, **more)
 

@@ -11,7 +11,7 @@ import math
 import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,7 @@ from numpy.typing import NDArray
 from limitsets.face.animation.film import Extents, Film, Lanes
 from limitsets.face.plot import style
 from limitsets.face.plot.throwing import turned
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-
+from limitsets.feeder.scene import Scene
 
 # ---------------------------------------------------------------- Things to draw, in pixels from the upper left
 

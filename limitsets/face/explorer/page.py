@@ -341,7 +341,8 @@ class ScenePage(Page):
         if hand.what == "tap":
             self.opening.corner(hand.x, hand.y)
         elif hand.what == "grasp":
-            self._holding = self.sliders.has_centre and self.part.is_at_mark(hand.x, hand.y)
+            movable = "part.mass.center.along" in self.sliders.values
+            self._holding = movable and self.part.is_at_mark(hand.x, hand.y)
         elif hand.what == "release":
             self._holding = False
         elif self._holding:
