@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from limitsets.base import AnswerError, arguments_checked, replaced, shown_in_notebooks
+from limitsets.base import AnswerError, Progress, arguments_checked, replaced, shown_in_notebooks
 from limitsets.face.animation.film import Asked, Film
 from limitsets.feeder.scene import load
-
-Progress = Callable[[str, int, int], None] | None
 
 KINDS = {
     "Scene": "thrown_scenes:film_of_scene",
@@ -58,7 +55,7 @@ def film_of(
     throws: int | None = None,
     fps: float = 20.0,
     slow: float = 3.0,
-    progress: Progress = None,
+    progress: Progress | None = None,
 ) -> Film:
     """Make a film as data; arguments as in `animate`.
 
@@ -91,7 +88,7 @@ def animate(
     throws: int | None = None,
     fps: float = 20.0,
     slow: float = 3.0,
-    progress: Progress = None,
+    progress: Progress | None = None,
 ) -> Path:
     """Write a film: the arm that swings up and stops, the part in flight and landing, and its place on the limit set.
 

@@ -14,9 +14,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.base import AnswerError
+from limitsets.base.arrays import Array, Ints
 from limitsets.cell.feeding.falling import ArmEnd, rate_about_end
 from limitsets.face.animation.film import Asked, Film, Leg, Mark, Pace, cut, labels_of, require_length
 from limitsets.face.animation.legs import (
@@ -53,8 +53,6 @@ if TYPE_CHECKING:
     from limitsets.cell.feeding import Feeding
     from limitsets.cell.trays import TrayFill
 
-
-Array = NDArray[np.float64]
 
 # Starts tried per side in the search for a good one; angles of the grid on which the first contact is searched.
 TRIED, ANGLES = 40, 400
@@ -370,7 +368,7 @@ def _frames(
     return frames, thrown
 
 
-def _swung(recording: Recording, kept: NDArray[np.int64], shown: list[_Frame], thrown: list[float]) -> Array:
+def _swung(recording: Recording, kept: Ints, shown: list[_Frame], thrown: list[float]) -> Array:
     """Let the parts that are thrown lie on the arm while it swings."""
     poses: Array = recording.poses[kept].copy()
     for frame, each in enumerate(shown):

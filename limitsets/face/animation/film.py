@@ -6,16 +6,15 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base import AnswerError
+from limitsets.base import AnswerError, Progress
+from limitsets.base.arrays import Array, Ints
 from limitsets.face.plot.throwing import about_centre, turned
 from limitsets.feeder.scene import Scene
 
-Array = NDArray[np.float64]
 Extents = dict[int, list[tuple[float, float]]]
 
 
@@ -144,14 +143,14 @@ class Film:
     ground: tuple[Array, ...]
     captions: tuple[str, ...]
     notes: tuple[str, ...]
-    caption: NDArray[np.int64]
-    note: NDArray[np.int64]
-    trail: NDArray[np.int64]
+    caption: Ints
+    note: Ints
+    trail: Ints
     marks: tuple[Mark, ...]
     rests: tuple[Rest, ...]
     lanes: Lanes | None
     position: Array
-    stage: NDArray[np.int64]
+    stage: Ints
     view: tuple[tuple[float, float], ...] = ()
 
     @property
@@ -281,7 +280,7 @@ class Asked(NamedTuple):
     throws: int | None
     fps: float
     slow: float
-    progress: Any = None
+    progress: Progress | None = None
 
     def pace(self, scene: Scene) -> Pace:
         """Give the pace; it is in seconds if the scene has gravity."""

@@ -10,12 +10,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base import AnswerError
+from limitsets.base import AnswerError, Progress
+from limitsets.base.arrays import Array
 from limitsets.face.animation.film import Lanes, Leg, Pace
 from limitsets.face.plot.style import stretch
-from limitsets.face.plot.throwing import Throw, angle_on_side, motion, stroke_of
+from limitsets.face.plot.throwing import CONTACTS, Throw, angle_on_side, motion, stroke_of
 from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.analysis import Analysis, analyse
@@ -24,13 +24,11 @@ from limitsets.parameters.analysis import Analysis, analyse
 # The lanes beside the film: limit sets, critical points and the goal, from an analysis; and a good start.
 
 
-Progress = Any
-
 # Cells per side: enough for a picture a few hundred pixels wide.
 CELLS = 1024
 
 
-def known_of(scene: Scene, progress: Progress = None, **more: Any) -> tuple[Analysis, Lanes]:
+def known_of(scene: Scene, progress: Progress | None = None, **more: Any) -> tuple[Analysis, Lanes]:
     """Analyse a scene, which chooses its effects if they are `auto`, and give the lanes of the analysis."""
     analysis = analyse(scene, CELLS, progress=progress)
     return analysis, lanes_of(analysis.scene, analysis, **more)
@@ -79,8 +77,6 @@ def require_start(scene: Scene, start: tuple[float, int]) -> tuple[float, int]:
 # The legs of one throw: the arm goes down, swings up and stops; the part flies, strikes, turns and rests.
 
 
-Array = NDArray[np.float64]
-
 SWING = math.radians(12.0)
 """Angle of the arm's swing if the scene has no stroke; half of it if there is a cavity at the end."""
 
@@ -95,7 +91,7 @@ def drawn_of(scene: Scene) -> str:
         said.append("the swing of the arm and the pauses are drawn, the throw is impulsive")
     if scene.flight != "exact" or scene.flip != "signed":
         said.append("the way from the impact to rest is drawn: these formulas have none")
-    on = [name for name in ("slip", "pivot", "bounce") if getattr(scene.effects, name)]
+    on = [name for name in CONTACTS if getattr(scene.effects, name)]
     if on:
         said.append(
             f"the way from the first impact to rest is drawn ({', '.join(on)}); its ends are the map's"

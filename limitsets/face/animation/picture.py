@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.face.animation.film import Extents, Film, Lanes
 from limitsets.face.plot import style
 from limitsets.face.plot.throwing import turned
@@ -23,8 +23,6 @@ from limitsets.feeder.scene import Scene
 
 # ---------------------------------------------------------------- Things to draw, in pixels from the upper left
 
-
-Array = NDArray[np.float64]
 
 TEXT = {"fill": style.INK, "size": 14.0}
 

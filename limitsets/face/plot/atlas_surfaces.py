@@ -7,11 +7,11 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Patch
 
 from limitsets.base import AnswerError, arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.face.plot import style
 from limitsets.face.plot.atlas_maps import frame, hatched, mark, pixels, title_of
 from limitsets.feeder.scene import load
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from limitsets.parameters.atlas import Atlas
     from limitsets.parameters.continuation import Continuation
 
-
-Array = npt.NDArray[np.float64]
 
 # A map of colours that looks even, also in grey and to colour-blind readers.
 COLOURS = "cividis"

@@ -26,8 +26,6 @@ LOOKS: dict[str, dict[str, Any]] = {
     "edge": {"color": style.INK, "ls": (0, (5, 1.5, 1, 1.5))},
     "left": {"color": style.JOG, "ls": (0, (1, 1.5))},
 }
-# Smaller shares are not drawn.
-LEAST = 1e-6
 WORDS_OF_FATES = {
     "right": "side wanted, clear",
     "wrong": "another side",

@@ -12,6 +12,7 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from limitsets.base import arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.cell.trays import TrayFill
 from limitsets.face.plot import style
 from limitsets.face.plot.throwing import about_centre, turned
@@ -56,7 +57,7 @@ def _short(state: str) -> str:
     return state.replace("leaning, vertex ", "leaning, P").replace(" lowest", "")
 
 
-def _placed(filling: TrayFill, pose: Pose, share: float = 1.0) -> NDArray[np.float64]:
+def _placed(filling: TrayFill, pose: Pose, share: float = 1.0) -> Array:
     """Places of the vertices, or of points between the centre of mass and the vertices."""
     return turned(share * about_centre(filling.scene), pose.angle) + np.array([pose.x, pose.y])
 
@@ -118,9 +119,7 @@ def _curve(axes: Axes, filling: TrayFill) -> None:
     )
 
 
-def _with_ends(
-    axes: Axes, x: NDArray[Any], shares: NDArray[np.float64], ends: NDArray[np.float64], **look: Any
-) -> None:
+def _with_ends(axes: Axes, x: NDArray[Any], shares: Array, ends: Array, **look: Any) -> None:
     """Draw shares with the ends of their intervals, shape (n, 2)."""
     axes.errorbar(x, shares, np.abs(ends - shares[:, None]).T, ls="", lw=0.9, **look)
 

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from limitsets.base import AnswerError, arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.face.plot import style
 from limitsets.parameters.fitting import Fit
 from limitsets.parameters.noise.sampling import SampledStatistics
@@ -182,7 +182,7 @@ def _against_level(axes: Axes, levels: Levels, names: Sequence[str], unit: float
     """Draw the numbers of one panel; shares that are too small are marks on the axis."""
     x, none = levels.factors * unit, np.zeros(levels.factors.size, dtype=bool)
     for name, colour, line in zip(names, COLOURS, LINES, strict=False):
-        values: NDArray[np.float64] = levels.numbers.get(name, np.full(x.size, np.nan))
+        values: Array = levels.numbers.get(name, np.full(x.size, np.nan))
         some = values > LEAST
         if not some.any():
             continue

@@ -10,17 +10,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
-from numpy.typing import NDArray
 
 from limitsets.base import AnswerError, arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.face.plot import style
 from limitsets.face.plot.throwing import Motion, Throw, angle_on_side, motion, outline, throws_of, turned
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.scene import Scene, Sketch
 from limitsets.feeder.thrower import trace
 from limitsets.systems.maps import codes
-
-Array = NDArray[np.float64]
 
 CENTRE: dict[str, Any] = {"marker": "o", "ms": 9, "mfc": "white", "mec": style.INK, "mew": 1.6, "ls": ""}
 MASS: dict[str, Any] = {"marker": "D", "ms": 8, "color": style.FLIP, "ls": ""}

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
 from limitsets.base import AnswerError
+from limitsets.base.arrays import Array
 from limitsets.feeder.goals import Goal, OrientedBeyond
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.analysis import other_vertex_first
@@ -56,7 +56,7 @@ class Subject(NamedTuple):
     unit: str
     map: Any
     domain: Domain
-    least: NDArray[np.float64]
+    least: Array
     most: float
     goal: Goal | None
     branches: tuple[str, ...]

@@ -12,8 +12,8 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.thrower import Trace
@@ -24,9 +24,6 @@ from limitsets.systems.maps import codes
 # functions.
 #
 # A pose is the centre of mass (x, y) and the angle by which the part has turned from the frame of the scene's vertices.
-
-
-Array = NDArray[np.float64]
 
 
 def about_centre(scene: Scene) -> Array:
