@@ -170,15 +170,6 @@ def test_two_runs_at_once_do_not_write_into_one_folder(capfd, tmp_path):
     prints(capfd, "analyse paper-designed --cells 64 -o shared")
 
 
-def test_one_word_for_one_thing(capfd):
-    """The report's page and the picture of the basins beside it: both call it limit set."""
-    found = ls.analyse("paper-designed", 256)
-    legend = ls.plot.basins(found.scene, found.basins, found).legends[0]
-    texts = [text.get_text() for text in legend.get_texts()]
-    assert any(text.startswith("to limit set 0") for text in texts)
-    assert not any("attractor" in text for text in texts)
-
-
 # ---------------------------------------------------------------- what comes next, and how long it takes
 
 

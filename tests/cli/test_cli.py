@@ -146,12 +146,6 @@ def test_analyse_in_words(capfd):
     assert f"report: {Path('here') / 'report.md'}" in out
 
 
-def test_analyse_of_a_goal_that_no_part_gets_to(capfd):
-    far = written(goal={"oriented_beyond": {"x": "25 in", "side": 2}})
-    vacuous = "goal oriented_beyond: holds vacuously (sampled, not proved); but no part gets there: the limit"
-    assert vacuous in prints(capfd, f"analyse {far} -o here --cells 1024")
-
-
 def test_analyse_to_an_error(capfd):
     code, out, err = run(capfd, "analyse paper-designed --error 1e-6 --json")
     assert code == 0

@@ -195,13 +195,6 @@ def test_the_cavities_of_two_scenes_are_told_in_words():
         ls.assemble(one, fast, trials=1)
 
 
-@pytest.mark.parametrize(("name", "file"), [("mine", "mine.proof.zip"), ("mine.zip", "mine.zip")])
-def test_a_certificate_without_an_ending_gets_one(capfd, name, file):
-    _, out, _ = run(capfd, "certify paper-designed --claim invariant -o", name)
-    assert f"{file}" in out
-    assert [path.name for path in Path().glob("mine*")] == [file]
-
-
 def test_where_there_is_no_policy_the_next_thing_is_told(capfd):
     throws = [{"name": "own", **ls.load("paper-initial").as_dict()["throw"]}]
     file = written("paper-initial", feedback={"sensor": {"beyond": "20 in"}, "throws": throws})
