@@ -17,7 +17,7 @@ import limitsets as ls
 from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.base.files import as_json, as_table, replaced
 from limitsets.face.report.pages import as_html, bands, page, starts_words, verdict_of, void_of, words
-from limitsets.face.report.writing import FIGURES, audit_page, write
+from limitsets.face.report.writing import FIGURES, audit_page, write, write as write_report
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scattering import Gaussian, Scattering
 from limitsets.parameters.analysis import GoalOutcome
@@ -55,6 +55,10 @@ def test_a_paragraph_is_a_line_and_one_without_sentences_is_none(figures):
 def test_a_template_that_speaks_of_what_it_was_not_told_is_refused():
     with pytest.raises(UndefinedError, match="scene"):
         words("scene")
+
+
+def bytes_of(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda source: Path(source).stem)
@@ -244,6 +248,23 @@ def test_bands_tell_which_sides_occur_where():
 
 
 # ---------------------------------------------------------------- files
+
+
+@pytest.mark.sweep
+def test_a_fault_while_writing_the_page_leaves_the_old_files_whole(tmp_path, monkeypatch):
+    write(analysed("paper-initial"), tmp_path)
+    before = bytes_of(tmp_path)
+    text_of = Path.write_text
+
+    def fails(self, *arguments, **options):
+        if self.name == "report.md":
+            raise OSError(28, "No space left on device")
+        return text_of(self, *arguments, **options)
+
+    monkeypatch.setattr(Path, "write_text", fails)
+    with pytest.raises(LimitsetsError, match="No space left"):
+        write_report(analysed("paper-designed"), tmp_path)
+    assert bytes_of(tmp_path) == before
 
 
 def test_other_files_in_the_folder_stay(tmp_path):
