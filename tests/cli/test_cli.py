@@ -177,6 +177,7 @@ def test_plot(capfd, kind):
 
 def test_plot_where_nothing_is_said_and_of_a_chosen_flight(capfd):
     assert prints(capfd, "plot paper-designed morse") == "figure: paper-designed-morse.png\n"
+    assert prints(capfd, "plot paper-designed part") == "figure: paper-designed-part.png\n"
     assert Path("paper-designed-morse.png").read_bytes().startswith(b"\x89PNG")
     prints(capfd, "plot paper-designed flight --x '38.1 cm' --side 1 -o one.pdf")
     assert Path("one.pdf").read_bytes().startswith(b"%PDF")
