@@ -204,55 +204,41 @@ def _ends(corners: Array, vertex: int) -> tuple[float, float]:
     return -max(clockwise, 0.0), max(counter, 0.0)
 
 
-def turned_to_rest(
-    hit: Impact,
-    rest: tuple[Array, float],
-    sides: int,
-    rho: float,
-    gravity: tuple[float, float],
-    *,
-    pendulum: bool,
-    rolls: bool,
-    scatters: bool,
+def _turned_to_rest(
+    scene: Scene, throw: Throw, hit: Impact, rest: tuple[Array, float], gravity: tuple[float, float]
 ) -> Turning:
     """Find the motion from an impact to rest.
 
     Parameters
     ----------
+    scene, throw : Scene, Throw
+        The scene, and the throw that ends so.
     hit : Impact
         The impact.
     rest : tuple of (ndarray, float)
         Place of rest of the centre of mass [length], and angle by which the part turns until then [rad].
-    sides : int
-        Number of sides by which the part turns, counterclockwise, from the side of the throw.
-    rho : float
-        Radius of gyration [length].
     gravity : tuple of (float, float)
         Gravity over the squared rate of the throw, along the arm and away from it [length].
-    pendulum : bool
-        Whether the striking vertex is held, and the part turns over as a pendulum does.
-    rolls : bool
-        Whether the part can roll on.
-    scatters : bool
-        Whether the landing has noise.
     """
-    pieces = _pendulums(hit, sides, rho, gravity, rolls) if pendulum else None
+    by_contact = any(getattr(scene.effects, name) for name in CONTACTS)
+    # the striking vertex is held, and the part turns over as a pendulum does
+    held = scene.flight == "exact" and scene.flip == "signed" and not by_contact
+    pieces = _pendulums(scene, hit, throw.turned, gravity) if held else None
     if pieces is not None:
         last = pieces[-1]
         off = rest[0] - last.pose(np.array([last.begin + last.time]))[0, :2]
         size = float(np.abs(hit.corners - hit.centre).max())
-        shift = float(off[0]) if scatters else 0.0
+        shift = float(off[0]) if throw.scatters else 0.0
         if max(abs(float(off[0]) - shift), abs(float(off[1]))) <= SAME * size:
             aside = np.array([shift, 0.0])
             return _joined([piece._replace(vertex=piece.vertex + aside) for piece in pieces], rest, shift)
     return _drawn(hit, rest)
 
 
-def _pendulums(
-    hit: Impact, sides: int, rho: float, gravity: tuple[float, float], rolls: bool
-) -> list[_Piece] | None:
+def _pendulums(scene: Scene, hit: Impact, sides: int, gravity: tuple[float, float]) -> list[_Piece] | None:
+    """Turn about one vertex after another until the part has turned by so many sides; None if it does not."""
     corners, centre, vertex, total = hit.corners, hit.centre, hit.struck, 0.0
-    n, pieces, time = len(corners), [], 0.0
+    n, pieces, time, rho = len(corners), [], 0.0, scene.radius_of_gyration
     arm = centre - corners[vertex % n]
     rate = _struck_rate(rho, arm, hit.velocity)
     for _ in range(MOST_FACES):
@@ -267,7 +253,7 @@ def _pendulums(
         total += turn
         if counter - vertex == sides:
             return pieces
-        if not rolls:
+        if not scene.effects.roll:
             return None
         corners = turned(corners - place, turn) + place
         centre = turned(arm, turn) + place
@@ -441,9 +427,7 @@ def motion(scene: Scene, throw: Throw) -> Motion:
     """Give the motion of the part in one throw, at rate 1."""
     kappa, lean = throw.kappa, stroke_of(scene)
     gravity = -kappa * math.sin(lean), -kappa * math.cos(lean)
-    exact = scene.flight == "exact"
-    by_contact = [name for name in CONTACTS if getattr(scene.effects, name)]
-    path = partial(_exact_flight if exact else _small_flight, scene, throw)
+    path = partial(_exact_flight if scene.flight == "exact" else _small_flight, scene, throw)
     struck, corners = lands(scene, throw), outline(scene, throw.side)
     start = angle_on_side(scene, throw.side)
 
@@ -455,16 +439,7 @@ def motion(scene: Scene, throw: Throw) -> Motion:
     way = sum(float(corner[k % len(corners)]) for k in range(first, last))
     way -= sum(float(corner[k % len(corners)]) for k in range(last, first))
     rest = np.array([throw.after, h + float(scene.sides.d[throw.side_after])]), way - throw.phi
-    turning = turned_to_rest(
-        hit,
-        rest,
-        throw.turned,
-        scene.radius_of_gyration,
-        gravity,
-        pendulum=exact and scene.flip == "signed" and not by_contact,
-        rolls=bool(scene.effects.roll),
-        scatters=throw.scatters,
-    )
+    turning = _turned_to_rest(scene, throw, hit, rest, gravity)
     shift, at_impact = turning.shift, start + throw.phi
     foot = hit.corners[struck % len(corners)]
     return Motion(
