@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from itertools import pairwise
 from typing import Any
 
@@ -72,10 +72,12 @@ def basins(source: Any, shares: Basins, found: Any = None) -> Figure:
             "the dimension of the basins", grid.dimension, "1 or 2", "draw a section of them yourself"
         )
     (name, unit), line = _words(source), grid.dimension == 1
-    sets: list[Any] = [] if found is None else style.extents_of(found) if line else _cells_of(found)
+    read: Callable[[Any], list[Any]] = style.extents_of if line else _cells_of
+    sets = [] if found is None else read(found)
     figure = _strips(shares, sets, unit) if line else _plane(shares, sets)
     inside = Patch(facecolor=style.INK if line else style.FLIP, label="the limit set itself")
-    handles = [*_legend(shares), inside if (found is not None if line else any(sets)) else None]
+    drawn = found is not None if line else any(sets)
+    handles = [*_legend(shares), inside if drawn else None]
     columns = 3 if figure.get_figwidth() > 8.0 else 2
     return style.finished(figure, f"Basins{name}: where a start ends up", handles, columns)
 
@@ -224,12 +226,13 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = 
     drawn = _condensed(whole)
     place = _places(drawn)
     layers = Counter(y for _, y in place.values())
-    depth, widest, few = round(max(layers, default=0)), max(layers.values(), default=0), len(place) <= 6
+    depth, widest = round(max(layers, default=0)), max(layers.values(), default=0)
+    few = len(place) <= 6
     wide, tall = 3.0 if few else 1.4, max(0.7, min(1.45, 9.0 / (depth + 1)))
     figure, (axes,) = style.canvas(min(16.0, max(7.0, wide * widest + 1.0)), tall * (depth + 1) + 1.2)
     for node, other in drawn.edges:
-        arrow = FancyArrowPatch(place[node], place[other], ls=":" if isinstance(other, str) else "-", **ARROW)
-        axes.add_patch(arrow)
+        line = ":" if isinstance(other, str) else "-"
+        axes.add_patch(FancyArrowPatch(place[node], place[other], ls=line, **ARROW))
     for node, (x, y) in place.items():
         _node(axes, node, drawn.nodes[node], x, y, few=few, unit=unit)
     half = 0.5 * max(widest, 2) + 0.1

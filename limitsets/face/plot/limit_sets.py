@@ -69,8 +69,8 @@ def limit_set(scene: Scene | TransitionGraph, found: Any, *, axes: Axes | None =
     if axes is None:
         figure, (axes,) = style.canvas(9.0, 1.02 * _lanes_of(about) + 1.3)
     for lane in range(_lanes_of(about)):
-        ends = [float(about.least[lane % count]), about.most]
-        axes.plot(ends, [-lane, -lane], color=style.FAINT, lw=0.8, zorder=1)
+        least = float(about.least[lane % count])
+        axes.plot([least, about.most], [-lane, -lane], color=style.FAINT, lw=0.8, zorder=1)
     for number, extents in enumerate(sets):
         _bars(axes, extents, number, _lanes_of(about) - 1)
         _bands(axes, about, extents)
@@ -277,8 +277,8 @@ def _branches(axes: Axes, about: Subject, side: int) -> None:
     there = images(about.map, x, side)
     for code, name in enumerate(about.branches):
         if code < 2 or (there.code == code).any():
-            y = np.where(there.code == code, there.x, np.nan)
-            axes.plot(x, y, zorder=3, gid=name, **LOOKS[code % len(LOOKS)])
+            look = LOOKS[code % len(LOOKS)]
+            axes.plot(x, np.where(there.code == code, there.x, np.nan), zorder=3, gid=name, **look)
     whole = _whole(about)
     axes.plot(whole, whole, color=style.FAINT, lw=0.8, zorder=1, gid="diagonal")
 

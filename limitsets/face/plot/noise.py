@@ -104,8 +104,8 @@ def noise_arrivals(found: NoiseStatistics, thrown: SampledStatistics | None = No
     if thrown is not None and thrown.arrived.size:
         counted = np.bincount(thrown.arrived, minlength=number.size) / thrown.parts
         left.bar(number, counted[: number.size], width=1.0, color=BAR, label=f"{thrown.parts} parts thrown")
-        still = 1.0 - np.cumsum(counted)[: number.size]
-        right.step(number, still, where="post", color="#7FA9C4", lw=3.0)
+        still = 1.0 - np.cumsum(counted)
+        right.step(number, still[: number.size], where="post", color="#7FA9C4", lw=3.0)
     look: dict[str, Any] = {"color": style.INK, "lw": 1.0}
     edges = np.arange(number.size + 1) - 0.5
     left.stairs(fed.arrived[: number.size], edges, label="transfer operator", **look)
