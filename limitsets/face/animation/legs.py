@@ -182,14 +182,13 @@ def legs_of(
     broken = "; another corner would land first, which the model leaves out" if throw.other_first else ""
     kind_of_throw = f"a {throw.word}" if throw.code >= 0 else throw.word
     flown = moves.turning
-    jumps = throw.turned
 
     def turning_lane(share: Array) -> Array:
         poses = flown.pose(share)
         end = poses[-1] if share[-1] >= 1.0 else flown.pose(np.ones(1))[0]
         way = end[2] - moves.impact[2]
         turned = (poses[:, 2] - moves.impact[2]) / way if abs(way) > 1e-9 else share
-        lane = throw.side + (throw.side_after - throw.side) * (turned if jumps else 0.0 * share)
+        lane = throw.side + (throw.side_after - throw.side) * (turned if throw.turned else 0.0 * share)
         return np.stack([poses[:, 0], np.clip(lane, 0, len(scene.sides) - 1)], axis=-1)
 
     level = np.zeros_like

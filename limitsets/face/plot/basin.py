@@ -158,16 +158,12 @@ def _legend(shares: Basins) -> list[Patch]:
         k: f"to limit set {k}: {_percent(share)} of all starts"
         for k, share in enumerate(shares.attractors[: len(ATTRACTORS)])
     }
-    parts = {codes.UNDECIDED: shares.undecided_between}
     names = {name: code for code, name in codes.NAMES.items()}
-    parts |= {names.get(name, codes.OUTSIDE): share for name, share in shares.exits.items()}
-    present = set(shares.labels.tolist())
-    for label, share in sorted(parts.items(), reverse=True):
-        if label in present:
-            way = (
-                "leaves the domain" if label == codes.OUTSIDE and "outside" in shares.exits else OUT[label][2]
-            )
-            texts[label] = f"{way}: {_percent(share)}"
+    exits = {names.get(name, codes.OUTSIDE): share for name, share in shares.exits.items()}
+    parts = {codes.UNDECIDED: shares.undecided_between} | exits
+    for label in sorted(parts.keys() & set(shares.labels.tolist()), reverse=True):
+        bare = label == codes.OUTSIDE and "outside" in shares.exits
+        texts[label] = f"{'leaves the domain' if bare else OUT[label][2]}: {_percent(parts[label])}"
     plain = {} if shares.grid.dimension == 1 else {"hatch": ""}  # the picture of the plane has none
     return [Patch(label=text, **{**_look(label), **plain}) for label, text in texts.items()]
 

@@ -177,12 +177,11 @@ def _front(axes: Axes, optimum: RobustDesign) -> list[Line2D]:
     look: dict[str, Any] = {"color": AFTER, "marker": "o", "ms": 4.0, "lw": 0.8}
     axes.plot(margins, means, **look)
     handles = [style.key("designs that none beats, sampled", **look)]
-    points = [
-        (optimum.before_margins, optimum.before_sampled, optimum.before_feeding),
-        (optimum.margins, optimum.sampled, optimum.feeding),
-    ]
-    looks = ((BEFORE, "s", "the scene before"), (style.FLIP, "D", "the design"))
-    for (margins_of, sampled, feeding), (colour, marker, label) in zip(points, looks, strict=True):
+    before = optimum.before_margins, optimum.before_sampled, optimum.before_feeding
+    for margins_of, sampled, feeding, colour, marker, label in (
+        (*before, BEFORE, "s", "the scene before"),
+        (optimum.margins, optimum.sampled, optimum.feeding, style.FLIP, "D", "the design"),
+    ):
         if sampled is None or feeding is None:
             continue
         axes.vlines(sampled.margin, feeding.mean, feeding.quantile_95, color=colour, lw=0.8, alpha=0.6)
