@@ -13,6 +13,7 @@ import numpy as np
 from limitsets.base import AnswerError, Progress
 from limitsets.base.arrays import Array, Ints
 from limitsets.face.plot.throwing import about_centre, turned
+from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.scene import Scene
 
 Extents = dict[int, list[tuple[float, float]]]
@@ -297,15 +298,12 @@ def require_length(frames: int) -> None:
 def labels_of(scene: Scene) -> tuple[Label, ...]:
     """Put the number of each side inside the part, next to the middle of the side."""
     corners = about_centre(scene)
-    n, labels = len(corners), []
-    size = float(np.abs(corners).max())
-    for side in range(n):
-        left, right = corners[-side % n], corners[(1 - side) % n]
-        middle, along = 0.5 * (left + right), right - left
-        inward = np.array([-along[1], along[0]]) / float(np.hypot(*along))
-        x, y = (middle + 0.1 * size * inward).tolist()
-        labels.append(Label(str(side), x, y))
-    return tuple(labels)
+    ends = np.array([side_ends(len(corners), side) for side in range(len(corners))])
+    left, right = corners[ends[:, 0]], corners[ends[:, 1]]
+    along = right - left
+    inward = np.stack([-along[:, 1], along[:, 0]], axis=-1) / np.hypot(*along.T)[:, None]
+    places = 0.5 * (left + right) + 0.1 * float(np.abs(corners).max()) * inward
+    return tuple(Label(str(side), x, y) for side, (x, y) in enumerate(places.tolist()))
 
 
 def cut(

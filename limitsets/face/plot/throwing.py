@@ -194,9 +194,7 @@ def pendulum_until(
 
 def _ends(corners: Array, vertex: int) -> tuple[float, float]:
     """Angles by which the part can turn about a vertex: clockwise (at most 0) and counterclockwise."""
-    n = len(corners)
-    before, after = corners[(vertex - 1) % n], corners[(vertex + 1) % n]
-    here = corners[vertex % n]
+    before, here, after = (corners[(vertex + k) % len(corners)] for k in (-1, 0, 1))
     onward, back = after - here, here - before
     # each angle is less than half a turn; it is 0, up to rounding, for a side that lies on the arm already
     clockwise = math.atan2(float(onward[1]), float(onward[0]))
