@@ -329,14 +329,14 @@ def cut(
     marks: list[Mark] = []
     rests: list[Rest] = []
     trails: list[tuple[int, int]] = []
-    begin, end, drawn = 0, 0, False
+    begin, last, drawn = 0, 0, False  # of the path that is shown
     for leg, count, (first, after) in zip(legs, counts, pairwise(firsts), strict=True):
         if leg.begins:
-            begin = end = first
+            begin = last = first
         if leg.trail and not drawn:
             begin = max(first - 1, 0)
-        trails += [(begin, frame if leg.trail else end) for frame in range(first, after)]
-        end, drawn = trails[-1][1], leg.trail
+        trails += [(begin, frame if leg.trail else last) for frame in range(first, after)]
+        last, drawn = trails[-1][1], leg.trail
         for at, word, x, y in leg.marks:
             frame = after - 1 - round((1.0 - at) * count)
             until = next((k for k in begins if k > frame), firsts[-1])

@@ -341,7 +341,7 @@ def _paint(axes: Axes, answers: Atlas, rows: Ints, looks: Mapping[int, dict[str,
     for number, look in looks.items():
         picture[rows == number] = to_rgb(look["facecolor"])
     axes.pcolorfast(x, y, picture, zorder=1)
-    for hatch in {look["hatch"] for look in looks.values()} - {""}:
+    for hatch in sorted({look["hatch"] for look in looks.values()} - {""}):
         numbers = [number for number, look in looks.items() if look["hatch"] == hatch]
         hatched(axes, x, y, np.isin(rows, numbers), hatch)
     (i, j), (k, m) = np.nonzero(rows[:, 1:] != rows[:, :-1]), np.nonzero(rows[1:] != rows[:-1])
