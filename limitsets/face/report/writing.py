@@ -275,11 +275,9 @@ def _needed(finding: Finding, unit: str) -> str:
     if at is None:
         fall = finding.missing == "restitution"
         return f"falls from {_measured(finding, finding.worst, unit)}" if fall else "never matters"
-    if finding.missing == "stroke":
-        return f"matters from {math.degrees(at):.2g} deg"
-    if finding.missing == "scatter":
-        return f"matters from {100 * at:.2g} % of the speed"
-    return f"matters {'below' if finding.missing == 'bounce_threshold' else 'from'} {at:.2g}"
+    sizes = {"stroke": f"{math.degrees(at):.2g} deg", "scatter": f"{100 * at:.2g} % of the speed"}
+    way = "below" if finding.missing == "bounce_threshold" else "from"
+    return f"matters {way} {sizes.get(finding.missing, f'{at:.2g}')}"
 
 
 def lines_of(audit: Audit) -> list[list[str]]:
