@@ -306,6 +306,31 @@ def labels_of(scene: Scene) -> tuple[Label, ...]:
     return tuple(Label(str(side), x, y) for side, (x, y) in enumerate(places.tolist()))
 
 
+def _events(
+    legs: Sequence[Leg], counts: Sequence[int], firsts: Sequence[int]
+) -> tuple[list[Mark], list[Rest], list[tuple[int, int]]]:
+    """Give the marks, the rests, and for each frame the frames between which the path is shown."""
+    begins = [0, *(first for leg, first in zip(legs, firsts[:-1], strict=True) if leg.begins)]
+    marks: list[Mark] = []
+    rests: list[Rest] = []
+    trails: list[tuple[int, int]] = []
+    begin, last, drawn = 0, 0, False  # of the path that is shown
+    for leg, count, (first, after) in zip(legs, counts, pairwise(firsts), strict=True):
+        if leg.begins:
+            begin = last = first
+        if leg.trail and not drawn:
+            begin = max(first - 1, 0)
+        trails += [(begin, frame if leg.trail else last) for frame in range(first, after)]
+        last, drawn = trails[-1][1], leg.trail
+        for at, word, x, y in leg.marks:
+            frame = after - 1 - round((1.0 - at) * count)
+            until = next((k for k in begins if k > frame), firsts[-1])
+            marks.append(Mark(frame, until, 0, word, x, y))
+        if leg.rest is not None:
+            rests.append(Rest(max(k for k in begins if k < after), after - 1, *leg.rest))
+    return marks, rests, trails
+
+
 def cut(
     scene: Scene,
     legs: Sequence[Leg],
@@ -324,25 +349,8 @@ def cut(
     shares = [np.arange(int(number > 0), count + 1) / count for number, count in enumerate(counts)]
     # the first frame of each leg, and the number of frames
     firsts = [0, *(1 + np.cumsum(counts)).tolist()]
-    begins = [0, *(first for leg, first in zip(legs, firsts[:-1], strict=True) if leg.begins)]
     clock = np.cumsum([0.0, *(leg.seconds / pace.unit for leg in legs[:-1])])  # when each leg begins
-    marks: list[Mark] = []
-    rests: list[Rest] = []
-    trails: list[tuple[int, int]] = []
-    begin, last, drawn = 0, 0, False  # of the path that is shown
-    for leg, count, (first, after) in zip(legs, counts, pairwise(firsts), strict=True):
-        if leg.begins:
-            begin = last = first
-        if leg.trail and not drawn:
-            begin = max(first - 1, 0)
-        trails += [(begin, frame if leg.trail else last) for frame in range(first, after)]
-        last, drawn = trails[-1][1], leg.trail
-        for at, word, x, y in leg.marks:
-            frame = after - 1 - round((1.0 - at) * count)
-            until = next((k for k in begins if k > frame), firsts[-1])
-            marks.append(Mark(frame, until, 0, word, x, y))
-        if leg.rest is not None:
-            rests.append(Rest(max(k for k in begins if k < after), after - 1, *leg.rest))
+    marks, rests, trails = _events(legs, counts, firsts)
     cuts = list(zip(legs, shares, strict=True))
     captions = list(dict.fromkeys(leg.caption for leg in legs))
     notes = list(dict.fromkeys(leg.note for leg in legs))
