@@ -59,7 +59,8 @@ def _short(state: str) -> str:
 
 def _placed(filling: TrayFill, pose: Pose, share: float = 1.0) -> Array:
     """Places of the vertices, or of points between the centre of mass and the vertices."""
-    return turned(share * about_centre(filling.scene), pose.angle) + np.array([pose.x, pose.y])
+    corners: Array = turned(share * about_centre(filling.scene), pose.angle) + np.array([pose.x, pose.y])
+    return corners
 
 
 def _poses(axes: Axes, filling: TrayFill) -> None:
