@@ -328,10 +328,10 @@ def test_what_cannot_be_explored_is_refused():
         __slots__ = ()
 
     for about, options, error, words in (
-        (Alien(), {}, LimitsetsError, ""),
+        (Alien(), {}, LimitsetsError, None),
         ("paper-designed", {"domain": [(0, 1)]}, AnswerError, "none beside a scene"),
         (TwoState(), {}, AnswerError, r"the domain of TwoState .*pass domain=\[\(lo, hi\)"),
-        ("no-such-scene", {}, SceneError, ""),
+        ("no-such-scene", {}, SceneError, None),
         ("paper-designed", {"atlas": "/nowhere"}, LimitsetsError, "a folder that limitsets atlas wrote"),
     ):
         with pytest.raises(error, match=words):
