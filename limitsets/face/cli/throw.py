@@ -241,7 +241,7 @@ def animate(
         value = "more than one of --feed, --feedback, --margin, --assemble, --tray"
         raise LimitsetsError("what to show", value, "one of them", "make a film of each")
     # an option, what it says, and the option without which it means nothing
-    for option, thing, value, beside, given, remedy in (
+    for option, thing, told, beside, given, remedy in (
         ("--reading", "the reading", reading, "--margin", margin, "name the quantity"),
         ("--parts", "the parts", parts, "--tray", tray or None, "ask for a tray"),
         (
@@ -253,8 +253,8 @@ def animate(
             "name the other part",
         ),
     ):
-        if value is not None and given is None:
-            raise LimitsetsError(thing, value, f"with {beside}", remedy, key=option)
+        if told is not None and given is None:
+            raise LimitsetsError(thing, told, f"with {beside}", remedy, key=option)
     from limitsets.face.animation import require_file
 
     chosen = ls.load(scene)
