@@ -1,10 +1,11 @@
-"""The browser in which tests look at pages: any Chromium, Chrome or Edge that is installed."""
+"""What tests look at pages with: a reader of HTML, and any Chromium, Chrome or Edge that is installed."""
 
 import os
 import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,36 @@ ARGS = [
 ]  # fmt: skip
 REQUIRED = "LIMITSETS_TESTS_NEED_BROWSER"  # set by .ci/run, which installs a browser
 REASON = "no Chromium, Chrome or Edge is installed"
+
+
+class Page(HTMLParser):
+    """Read tags with their attributes, and texts with the tag around them and its id; every tag is closed."""
+
+    VOID = ("meta", "img", "br", "hr", "link", "input", "circle", "polygon", "polyline")
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[tuple[str, str | None, str]] = []
+        self.open: list[tuple[str, str | None]] = []
+        self.feed(html)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_startendtag(tag, attrs)
+        if tag not in self.VOID:
+            self.open.append((tag, dict(attrs).get("id")))
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop()[0] == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open:
+            self.texts.append((*self.open[-1], data))
 
 
 def installed() -> str | None:

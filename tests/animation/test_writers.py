@@ -2,7 +2,6 @@
 
 import json
 import re
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -12,37 +11,10 @@ from limitsets.base.errors import AnswerError
 from limitsets.face.animation import animating, film_of
 from limitsets.face.animation.picture import Picture
 from limitsets.face.animation.writers import frames
+from tests.browsers import Page
 from tests.test_lines import LATE, run_python
 
 SHORT = {"start": (21.0, 2), "throws": 1, "slow": 1.0, "fps": 20.0}
-
-
-class Page(HTMLParser):
-    """Read tags, their attributes and texts; every tag that is opened is closed."""
-
-    EMPTY = ("meta", "input", "circle", "polygon", "polyline")
-
-    def __init__(self, text):
-        super().__init__()
-        self.tags, self.open, self.texts = [], [], {}
-        self.feed(text)
-        self.close()
-        assert not self.open
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        if tag not in self.EMPTY:
-            self.open.append((tag, dict(attrs).get("id")))
-
-    def handle_startendtag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_endtag(self, tag):
-        assert self.open.pop()[0] == tag
-
-    def handle_data(self, data):
-        if self.open:
-            self.texts[self.open[-1]] = self.texts.get(self.open[-1], "") + data
 
 
 def test_a_page_holds_the_poses_and_nothing_from_elsewhere(tmp_path):
@@ -51,32 +23,24 @@ def test_a_page_holds_the_poses_and_nothing_from_elsewhere(tmp_path):
     page = Page(text)
     assert not re.search(r"https?:|//[a-z]|@import|url\(", text)
     assert not [attrs for _, attrs in page.tags if {"src", "href", "xlink:href"} & attrs.keys()]
-    data = json.loads(page.texts["script", "film"])
+    data = json.loads("".join(text for _, name, text in page.texts if name == "film"))
     assert np.array(data["poses"]) == pytest.approx(film.poses, abs=1e-5)
     assert np.array(data["arm"]) == pytest.approx(film.arm, abs=1e-6)
     assert data["captions"] == list(film.captions)
     assert len(data["times"]) == film.frames
     assert file.stat().st_size < 100_000
-
-
-def test_a_page_speaks_to_those_who_do_not_see_it(tmp_path):
-    page = Page(ls.animate("paper-designed", tmp_path / "run.html", **SHORT).read_text(encoding="utf-8"))
+    # the still part and the first frame are there without a script
+    drawn = " ".join(f"{x:.2f},{y:.2f}" for x, y in Picture.of(film).at(film.polygon(0)))
+    assert f'points="{drawn}"' in text
+    # it speaks to those who do not see it
     attributes = {attrs["id"]: attrs for _, attrs in page.tags if "id" in attrs}
     (picture,) = [attrs for tag, attrs in page.tags if tag == "svg"]
     assert picture["role"] == "img"
     assert all(name in attributes for name in picture["aria-labelledby"].split())
     assert attributes["frame"]["aria-label"] == "Frame"
     assert attributes["said"]["aria-live"] == "polite"
-    said = [text for (tag, _), text in page.texts.items() if tag == "button"]
+    said = [text for tag, _, text in page.texts if tag == "button"]
     assert any("flip from 21.00 in, side 2, to 16.55, side 0" in text for text in said)
-
-
-def test_the_still_part_and_the_first_frame_are_there_without_a_script(tmp_path):
-    text = ls.animate("paper-designed", tmp_path / "run.html", **SHORT).read_text(encoding="utf-8")
-    film = film_of("paper-designed", **SHORT)
-    corners = Picture.of(film).at(film.polygon(0))
-    drawn = " ".join(f"{x:.2f},{y:.2f}" for x, y in corners)
-    assert f'points="{drawn}"' in text
 
 
 def test_a_gif_has_the_frames_and_their_delays(tmp_path):

@@ -5,6 +5,7 @@ import re
 import shlex
 from pathlib import Path
 
+import limitsets as ls
 from limitsets.face.cli import main
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -43,6 +44,13 @@ def refusal(capfd, *words):
     assert len([line for line in err.splitlines() if not PROGRESS.search(line)]) == 1
     assert "bug" not in err
     return err
+
+
+def written(scene="paper-designed", file="mine.toml", values=None, **tables):
+    """Write a scene, with other tables and other values; the file's name."""
+    found = ls.load(ls.load(scene).as_dict() | tables)
+    ls.dump(found.with_values(values) if values else found, file)
+    return file
 
 
 def names_in(folder="."):

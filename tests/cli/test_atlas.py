@@ -1,15 +1,13 @@
 """`atlas` and `animate` at the command line."""
 
 import csv
-import json
 import math
 import sys
 from pathlib import Path
 
 import pytest
 
-import limitsets as ls
-from tests.cli.command import json_of, prints, refusal, run
+from tests.cli.command import json_of, prints, refusal, run, written
 from tests.feeding.scenes import with_cavity
 from tests.trays.scenes import with_tray
 
@@ -38,10 +36,9 @@ def test_the_designed_critical_points_in_every_form(capfd, tmp_path):
 def test_a_task_in_a_file_of_the_present_folder(capfd, tmp_path, monkeypatch):
     (tmp_path / "own_task_here.py").write_text("def twice(scene):\n    return {'twice': 2 * scene.kappa}\n")
     monkeypatch.setattr(sys, "path", [place for place in sys.path if place not in ("", str(tmp_path))])
-    out = prints(
-        capfd, "atlas paper-designed --x throw.kappa=25:30:9 --task own_task_here:twice --workers 2 --json"
-    )
-    assert json.loads(out)["variables"]["twice"]["values"] == [50.0 + 1.25 * k for k in range(9)]
+    task = "--task own_task_here:twice --workers 2"
+    record = json_of(capfd, f"atlas paper-designed --x throw.kappa=25:30:9 {task}")
+    assert record["variables"]["twice"]["values"] == [50.0 + 1.25 * k for k in range(9)]
 
 
 def test_another_plan_in_the_same_place_is_bad_input(capfd):
@@ -118,8 +115,7 @@ def test_json_alone_and_a_place_with_a_unit(capfd):
 
 
 def test_feeding_and_a_margin(capfd):
-    ls.dump(with_cavity("paper-designed"), "fed.toml")
-    prints(capfd, "animate fed.toml --feed --start 19,2 -o fed.html")
+    prints(capfd, f"animate {written(with_cavity())} --feed --start 19,2 -o fed.html")
     assert "Fed rightly" in Path("fed.html").read_text(encoding="utf-8")
     prints(capfd, "animate paper-designed --margin throw.speed --throws 1 -o m.html")
     assert "the goal is violated" in Path("m.html").read_text(encoding="utf-8")
@@ -127,9 +123,7 @@ def test_feeding_and_a_margin(capfd):
 
 def test_what_cannot_be_is_one_line_and_exit_2(capfd):
     for words, expected in (
-        (("-o", "run.avi"), "ends in .gif, .html"),
         (("-o", "run.mp4"), "ffmpeg -i film.gif"),
-        (("--start", "40,2"), "x of the start is 40.0; allowed: more than 4.22558 and up to 28 in on side 2"),
         (("--start", "40 kg,2"), "--start: "),
         (("--start", "15"), "X,SIDE"),
         (("--start", "15,7"), "the side of the start is 7"),
@@ -138,17 +132,16 @@ def test_what_cannot_be_is_one_line_and_exit_2(capfd):
         (("--feedback",), "feedback.throws"),
         (("--reading", "fixed"), "--margin"),
         (("--margin", "throw.speed", "--start", "15,2"), "none with --margin, --assemble"),
-        (("--throws", "9999"), "the frames of the film"),
     ):
         assert expected in refusal(capfd, "animate paper-designed", *words)
     assert not list(Path().glob("*.html"))
 
 
 def test_a_tray_and_a_pair_that_cannot_be_filmed(capfd):
-    ls.dump(with_tray(), "tray.toml")
-    prints(capfd, "animate tray.toml --tray --throws 3 -o tray.html")
+    tray = written(with_tray())
+    prints(capfd, f"animate {tray} --tray --throws 3 -o tray.html")
     assert "one depression of a tray" in Path("tray.html").read_text(encoding="utf-8")
-    assert "with --tray" in refusal(capfd, "animate tray.toml --parts 2 -o tray.html")
+    assert "with --tray" in refusal(capfd, f"animate {tray} --parts 2 -o tray.html")
     # without contact they pass through each other, and the engine has nothing to show
     err = refusal(capfd, "animate paper-triangle --assemble paper-quadrilateral -o pair.html")
     assert "[effects] contact = true" in err

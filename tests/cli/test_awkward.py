@@ -1,7 +1,6 @@
 """What a fresh user stumbled over at the command line: widths, cut summaries, lost reports, wrong places, seeds."""
 
 import csv
-import json
 import platform
 import re
 import subprocess
@@ -15,7 +14,7 @@ import limitsets as ls
 from limitsets.base.errors import SceneError
 from limitsets.face.cli.output import show
 from limitsets.face.report.robust_pages import robustness_page
-from tests.cli.command import json_of, names_in, prints, refusal, run
+from tests.cli.command import json_of, names_in, prints, refusal, run, written
 from tests.plates import LEAD_QUAD, left_by_some
 
 SCATTER = {"world": {"scatter": {"speed": "1 %"}}, "effects": {"spread": "bounded"}}
@@ -24,7 +23,7 @@ OTHER = "it is of paper-designed; name another with --out, or delete it"
 
 
 def own(**tables):
-    return {**ls.load("paper-designed").as_dict(), **tables}
+    return ls.load("paper-designed").as_dict() | tables
 
 
 @pytest.mark.sweep
@@ -59,20 +58,17 @@ def test_no_part_rests_before_the_joint(capfd, x):
     assert "from 0 to 28 in" in refusal(capfd, "throw paper-designed", f"--x={x}", "--side", "2")
 
 
-def places(capfd, scene, *words):
-    out = prints(capfd, "throw", scene, "--x", "12", "--side", "2", "--count", "5", "--json", *words)
-    return [row["x"] for row in json.loads(out)]
+def places(capfd, scene, seed=""):
+    return [row["x"] for row in json_of(capfd, f"throw {scene} --x 12 --side 2 --count 5 {seed}")]
 
 
-def test_throws_that_scatter_have_a_seed(capfd, tmp_path):
-    file = tmp_path / "scatter.toml"
-    ls.dump(ls.load(own(**SCATTER)), file)
-    plain = places(capfd, str(file))
-    assert places(capfd, str(file), "--seed", "0") == plain
-    first = places(capfd, str(file), "--seed", "7")
-    assert first == places(capfd, str(file), "--seed", "7")
+def test_throws_that_scatter_have_a_seed(capfd):
+    file = written(**SCATTER)
+    plain, first = places(capfd, file), places(capfd, file, "--seed 7")
+    assert places(capfd, file, "--seed 0") == plain
+    assert first == places(capfd, file, "--seed 7")
     assert first != plain
-    assert places(capfd, "paper-designed", "--seed", "7") == places(capfd, "paper-designed")
+    assert places(capfd, "paper-designed", "--seed 7") == places(capfd, "paper-designed")
     with pytest.raises(SceneError, match="the seed"):
         ls.load(own()).map_of_seed(-1)
 
@@ -90,8 +86,8 @@ def test_a_report_of_another_scene_is_not_replaced(capfd):
     for _ in range(2):
         assert "replaced" not in run(capfd, "analyse paper-designed", *words)[2]
     assert OTHER in refusal(capfd, "analyse paper-initial", *words)
-    Path("mine.toml").write_text(ls.dump(ls.load(own(arm={"surface_height": "-0.19 in", "length": "28 in"}))))
-    _, _, err = run(capfd, "analyse mine.toml", *words)
+    mine = written(arm={"surface_height": "-0.19 in", "length": "28 in"})
+    _, _, err = run(capfd, f"analyse {mine}", *words)
     assert "reports: the report of paper-designed with other values is replaced" in err
 
 
@@ -99,7 +95,7 @@ def test_a_certificate_of_another_scene_is_not_replaced(capfd):
     """Two folders may hold files of one name, started from a third."""
     for folder, scene in (("first", "paper-designed"), ("second", "paper-initial")):
         Path(folder).mkdir()
-        Path(folder, "mine.toml").write_text(ls.dump(ls.load(scene)))
+        written(scene, f"{folder}/mine.toml")
     ask = ("certify", "--claim", "invariant", "--no-recheck")
     prints(capfd, *ask, "first/mine.toml")
     kept = Path("mine.proof.zip").read_bytes()
@@ -127,13 +123,11 @@ SPELLED_ODDLY = {
 def test_a_certificate_of_other_values_is_not_replaced_in_silence(capfd, tables, out):
     """It may be the last that knows them: the scene's file has others by now. Of the same question nothing is said."""
     told = "limitsets: mine.proof.zip: the certificate of paper-designed with other values is replaced\n"
-    tree = {**ls.load("paper-designed").as_dict(), **tables}
     ask = ("certify", "mine.toml", "--claim", "invariant", "--no-recheck", *out)
     others = (("--tolerance", "arm.surface_height=0.001 in"), ("--noise", "landing.x=0.001 in"))
     said = []
     for height, words in (("-0.2 in", ()), ("-0.19 in", ()), *(("-0.19 in", other) for other in others)):
-        tree["arm"] = {"surface_height": height, "length": "28 in"}
-        Path("mine.toml").write_text(ls.dump(ls.load(tree)))
+        written(arm={"surface_height": height, "length": "28 in"}, **tables)
         for _ in range(2):
             code, _, err = run(capfd, *ask, *words)
             assert code == 0
@@ -151,8 +145,7 @@ def test_a_certificate_of_other_values_stays_where_nothing_is_proved(capfd):
 
 def test_a_scene_that_certify_refuses_is_not_proposed_to_it(capfd):
     """The effect slip has no enclosure."""
-    given = own(world={"friction": 0.9}, effects={"slip": True})
-    Path("my part.toml").write_text(ls.dump(ls.load(given)))
+    written(file="my part.toml", world={"friction": 0.9}, effects={"slip": True})
     refusal(capfd, "certify 'my part.toml'")
     out = prints(capfd, "analyse 'my part.toml' --cells 128 -o out")
     assert "limitsets certify" not in out
@@ -177,15 +170,6 @@ def test_two_runs_at_once_do_not_write_into_one_folder(capfd, tmp_path):
     prints(capfd, "analyse paper-designed --cells 64 -o shared")
 
 
-def test_one_word_for_one_thing(capfd):
-    """The report's page and the picture of the basins beside it: both call it limit set."""
-    found = ls.analyse("paper-designed", 256)
-    legend = ls.plot.basins(found.scene, found.basins, found).legends[0]
-    texts = [text.get_text() for text in legend.get_texts()]
-    assert any(text.startswith("to limit set 0") for text in texts)
-    assert not any("attractor" in text for text in texts)
-
-
 # ---------------------------------------------------------------- what comes next, and how long it takes
 
 
@@ -200,7 +184,7 @@ def test_a_goal_that_fails_names_the_next_command(capfd):
 
 def test_a_goal_that_is_not_proved_names_the_certificate(capfd):
     """From the arm's end parts leave: no orbit refutes the goal of the limit set, and not every start is proved."""
-    ls.dump(ls.load(LEAD_QUAD), "lead.toml")
+    written(LEAD_QUAD, "lead.toml")
     out = prints(capfd, "margin lead.toml throw.speed arm.surface_height", code=1)
     needed = "a margin needs the goal proved of the scene as it is for every start on the arm, beyond the limit set"
     assert f"2 margins, all of them 0: {needed}" in out
@@ -219,16 +203,14 @@ def test_throws_outside_the_model_are_named_on_the_terminal(capfd):
     part = {"vertices": corners, "mass": {"plate_density": "11.775 kg/m^2", "points": [lead]}}
     arm = {"surface_height": "-10 mm", "length": "400 mm"}
     chamfered = {"part": part, "arm": arm, "throw": {"speed": "200 deg/s"}, "gravity": {"tilt": "30 deg"}}
-    ls.dump(ls.load(chamfered), "chamfered.toml")
-    _, out, _ = run(capfd, "analyse chamfered.toml --cells 1024 -o found")
+    out = prints(capfd, f"analyse {written(chamfered)} --cells 1024 -o found")
     assert "careful: of some throws of the limit set from side 2, 3 another vertex lands first" in out
-    _, out, _ = run(capfd, "analyse paper-designed --cells 1024 -o found")
-    assert "careful" not in out
+    assert "careful" not in prints(capfd, "analyse paper-designed --cells 1024 -o other")
 
 
 def test_the_next_command_is_one_that_can_be_pasted(capfd):
     """A file with a blank in its name, and a goal that no design is made for."""
-    ls.dump(ls.load(own(name="two words", goal={"flip_order": [0, 2, 1]})), "two words.toml")
+    written(file="two words.toml", goal={"flip_order": [0, 2, 1]})
     _, out, _ = run(capfd, "analyse 'two words.toml' --cells 1024 -o found")
     assert "next: limitsets audit 'two words.toml'" in out
 
@@ -261,9 +243,8 @@ def test_design_for_the_goal(capfd):
 
 
 def test_a_design_that_parts_leave_says_so(capfd):
-    ls.dump(ls.load(left_by_some()), "left.toml")
-    words = ("--goal", "--bounds", "throw.speed=279.379:279.380", "--evaluations", "5", "-o", "found.toml")
-    out = prints(capfd, "design left.toml", *words, code=1)
+    words = "--goal --bounds throw.speed=279.379:279.380 --evaluations 5 -o found.toml"
+    out = prints(capfd, f"design {written(left_by_some())} {words}", code=1)
     share = re.search(r"careful: from (\S+) % of all starts \(sampled\) parts leave the arm", out)[1]
     assert float(share) == pytest.approx(3.5, abs=1.0)
     assert "limitsets audit found.toml" in out
@@ -292,8 +273,7 @@ def test_a_robust_design_that_was_ended_is_on_disk(capfd, monkeypatch):
 
     monkeypatch.setattr(for_margin, "polished", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     words = "--robust --evaluations 4 --vary part.mass.center.along --seconds 0 -o found"
-    ls.dump(ls.load(own(tolerance={"throw.speed": "1 %"})), "given.toml")
-    assert run(capfd, f"design given.toml {words}")[0] == 130
+    assert run(capfd, f"design {written(tolerance={'throw.speed': '1 %'})} {words}")[0] == 130
     (left,) = Path("found").iterdir()
     assert left.name == "paper-designed-so-far.toml"
     assert ls.analyse(left, 1024).goal.holds
@@ -306,8 +286,7 @@ RATED = {"throw_rate": "2 Hz", "scatter": {"speed": "0.5 %"}}
 def test_times_are_told_in_seconds_and_parts_per_minute(capfd):
     """At two throws a second n throws take n / 2 s, and 120 / n parts come in a minute."""
     cavity = {"position": "20 in", "width": "8 in", "depth": "1 in", "angle": "20 deg"}
-    ls.dump(ls.load(own(world=RATED, cavity=cavity)), "rated.toml")
-    out = prints(capfd, "feed rated.toml --no-proof --trials 100")
+    out = prints(capfd, f"feed {written(world=RATED, cavity=cavity)} --no-proof --trials 100")
     mean = float(re.search(r"throws until a part is fed.*: ([\d.]+) in the mean", out)[1])
     seconds = float(re.search(r"in the mean \(([\d.]+) s\)", out)[1])
     assert seconds == pytest.approx(mean / 2.0, abs=0.06)
@@ -328,17 +307,15 @@ def test_the_sheet_tells_them_too(tmp_path):
 
 
 def test_a_speed_in_a_wrong_unit_is_asked_about(capfd):
-    ls.dump(ls.load("paper-designed").with_values({"throw.speed": "150 rad/s"}), "own.toml")
-    out = prints(capfd, "analyse own.toml --cells 256 -o found")
-    assert "has the speed the right unit?" in out
+    fast = written(values={"throw.speed": "150 rad/s"})
+    assert "has the speed the right unit?" in prints(capfd, f"analyse {fast} --cells 256 -o found")
 
 
 @pytest.mark.sweep
 def test_a_goal_that_fails_comes_with_the_x_from_which_it_holds(capfd):
-    slow = ls.load("paper-designed").with_values({"throw.speed": "150 deg/s"})
-    ls.dump(slow, "own.toml")
+    slow = written(values={"throw.speed": "150 deg/s"})
     farthest = max(hi for side in (0, 1) for _, hi in ls.analyse(slow, 1024).extents[0][side])
-    _, out, _ = run(capfd, "analyse own.toml --cells 1024 -o found")
+    out = prints(capfd, f"analyse {slow} --cells 1024 -o found")
     assert f"The sentence is true from x = {farthest:.3f} in on." in out
 
 
@@ -355,22 +332,22 @@ SHORT = {"arm": {"surface_height": "-0.2 in", "length": "23 in"}}
     ],
 )
 def test_an_orbit_that_leaves_is_said_to(capfd, tables, options, end):
-    ls.dump(ls.load(own(**tables, goal={"stays_on_arm": True})), "short.toml")
-    out = prints(capfd, "certify short.toml --claim goal", *options, code=1)
+    short = written(**tables, goal={"stays_on_arm": True})
+    out = prints(capfd, f"certify {short} --claim goal", *options, code=1)
     rests = f"There the part has left the arm: on side 2 it rests from x = 4.22558 to {end}"
     assert rests in " ".join(out.split())
 
 
 def test_an_orbit_that_stays_is_not_said_to_leave(capfd):
-    ls.dump(ls.load(own(goal={"oriented_beyond": {"x": "12 in", "side": 2}})), "near.toml")
-    out = prints(capfd, "certify near.toml --claim goal", code=1)
+    near = written(goal={"oriented_beyond": {"x": "12 in", "side": 2}})
+    out = prints(capfd, f"certify {near} --claim goal", code=1)
     assert "This orbit shows it" in out
     assert "left the arm" not in out
 
 
 def test_a_surface_above_the_joint_is_not_answered_with_finer_cells(capfd):
-    ls.dump(ls.load(own(arm={"surface_height": "0.2 in", "length": "28 in"})), "above.toml")
-    out = prints(capfd, "analyse above.toml --cells 512")
+    above = written(arm={"surface_height": "0.2 in", "length": "28 in"})
+    out = prints(capfd, f"analyse {above} --cells 512")
     assert "is arm.surface_height meant to be negative" in out
     assert "finer cells" not in out
     assert "ask for more cells" not in out

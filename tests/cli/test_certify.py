@@ -15,7 +15,7 @@ import pytest
 import limitsets as ls
 from limitsets.feeder.scene.left_out import Model
 from limitsets.proofs.prover import certificate as confirm
-from tests.cli.command import documented, json_of, names_in, prints, refusal, run
+from tests.cli.command import documented, json_of, names_in, prints, refusal, run, written
 from tests.feeding.scenes import with_cavity
 from tests.plates import left_by_some
 
@@ -46,10 +46,9 @@ def test_proved_is_exit_0_and_rechecks(capfd):
 
 def test_shares_of_the_starts_are_rounded_to_the_safe_side(capfd):
     """96.456 % were said to be 96.5 %, and proved."""
-    ls.dump(ls.load(left_by_some()), "left.toml")
-    _, out, _ = run(capfd, "certify left.toml --claim goal --json")
-    (record,) = json.loads(out)
-    out = prints(capfd, "certify left.toml --claim goal", code=1)
+    left = written(left_by_some())
+    (record,) = json_of(capfd, f"certify {left} --claim goal", code=1)
+    out = prints(capfd, f"certify {left} --claim goal", code=1)
     words = r"It is proved for ([\d.]+) % .*; ([\d.]+) % are proved to leave the arm; of ([\d.e-]+) % nothing is proved"
     share, leaves, rest = (float(word) for word in re.search(words, out).groups())
     assert share <= 100.0 * record["share"] < share + 0.01
@@ -59,8 +58,8 @@ def test_shares_of_the_starts_are_rounded_to_the_safe_side(capfd):
 
 def test_two_basins_in_words(capfd):
     """With h = 0.1 in the jog's fixed points lie at 3.16349, 3.19076 and 4.80947 in: see test_fixed_point.py."""
-    ls.dump(ls.load("paper-designed").with_values({"arm.surface_height": 0.1}), "above.toml")
-    out = prints(capfd, "certify above.toml")
+    above = written(file="above.toml", values={"arm.surface_height": 0.1})
+    out = prints(capfd, f"certify {above}")
     assert "attracts-all: PROVED" in out
     assert "From every position on the arm beyond R*" in out
     assert "From every position nearer than R*, jogs bring the part ever closer to x = a" in out
@@ -71,8 +70,8 @@ def test_two_basins_in_words(capfd):
         assert lo < want < hi < lo + 1e-9
     out = prints(capfd, "recheck above.proof.zip")
     assert "every start a_i < x < R*_i stays on side i and tends to a_i" in out
-    _, out, _ = run(capfd, "certify above.toml --noise 'throw.speed=0.1 %'")
-    assert "Between the two ends nothing is claimed" in out
+    noisy = run(capfd, f"certify {above} --noise 'throw.speed=0.1 %'")[1]
+    assert "Between the two ends nothing is claimed" in noisy
 
 
 def test_refuted_is_exit_1_with_the_orbit_and_a_certificate_of_the_rest(capfd):
@@ -108,32 +107,28 @@ def test_scattered_landings_and_tilts_name_their_throws(capfd):
     assert "landing.x within 0.15 in of the model's place" in out
     assert "lands off by [in]" in out
     assert "+0.150000" in out
-    scene = ls.load("paper-designed").as_dict() | {"gravity": {"tilt": "30 deg"}}
-    ls.dump(ls.load(scene), "tilt.toml")
-    out = prints(capfd, "certify tilt.toml --claim goal --noise 'gravity.tilt=0.3 deg'", code=1)
+    tilt = f"certify {written(gravity={'tilt': '30 deg'})} --claim goal --noise 'gravity.tilt=0.3 deg'"
+    out = prints(capfd, tilt, code=1)
     assert "tilt of the next throw" in out
     assert "29.7 deg" in out
-    both = ["--noise", "gravity.tilt=0.3 deg", "--noise", "throw.speed=0.1 %"]
-    out = prints(capfd, "certify tilt.toml --claim goal", *both, code=1)
+    out = prints(capfd, f"{tilt} --noise 'throw.speed=0.1 %'", code=1)
     assert "kappa of the next throw [in]" in out
 
 
 def test_a_goal_of_another_kind_is_put_in_words(capfd):
-    scene = ls.load("paper-designed").as_dict() | {"goal": {"flip_order": [0, 1, 2]}}
-    ls.dump(ls.load(scene), "order.toml")
-    out = prints(capfd, "certify order.toml --claim goal -o a.zip")
+    order = written(goal={"flip_order": [0, 1, 2]})
+    out = prints(capfd, f"certify {order} --claim goal -o a.zip")
     assert "parts come to lie on sides 0, 1, 2 in turn" in out
-    out = prints(capfd, "recheck a.zip")
-    assert "in the order 0 1 2, again and again" in out
+    assert "in the order 0 1 2, again and again" in prints(capfd, "recheck a.zip")
 
 
 def test_nothing_proved_writes_nothing_and_says_why(capfd):
-    ls.dump(ls.load("paper-designed").with_values({"throw.kappa": 2.0}), "fast.toml")
-    out = prints(capfd, "certify fast.toml", code=1)
+    fast = written(values={"throw.kappa": 2.0})
+    out = prints(capfd, f"certify {fast}", code=1)
     assert "attracts-all: UNDECIDED" in out
     assert "side " in out
     assert "no certificate is written" in out
-    assert names_in() == {"fast.toml"}
+    assert names_in() == {fast}
 
 
 def test_json_alone_is_on_stdout(capfd):
@@ -253,11 +248,6 @@ def scene(**tables):
     return ls.load(ls.load("paper-designed").as_dict() | tables)
 
 
-def written(found, name="mine.toml"):
-    ls.dump(found, name)
-    return name
-
-
 def broken(found):
     """Count by the whole audit what breaks on the limit set, effects of the scene apart."""
     return sum(bool(each.called_for) and not each.simulated for each in ls.audit(found).on("limit-set"))
@@ -309,7 +299,7 @@ def test_the_answer_is_there_before_the_audit(capfd, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(limitsets.auditing, "audited", late)
-    out = prints(capfd, "certify", written(scene(world=RUBBED)), code=130)
+    out = prints(capfd, "certify", written(world=RUBBED), code=130)
     assert "assumption" not in out
 
 
@@ -358,13 +348,12 @@ def test_noise_that_allows_for_the_scatter_has_it():
 
 def test_nothing_is_left_out_of_a_scene_whose_effects_have_all_its_facts(capfd):
     """Bounded scatter is in the proof; of a scene that states nothing nothing can be left out."""
-    file = written(scene(world={"scatter": {"speed": "0.1 %"}}, effects={"spread": "bounded"}))
-    out = prints(capfd, "certify", file, "-o", "mine.proof.zip")
+    file = written(world={"scatter": {"speed": "0.1 %"}}, effects={"spread": "bounded"})
     nothing = "of the model with spread: no fact of [world] is left out;"
-    assert nothing in out
-    assert json.loads(run(capfd, "certify", file, "--json")[1])[0]["model"]["left_out"] == []
-    assert nothing in run(capfd, "recheck mine.proof.zip")[1]
-    assert ALL in run(capfd, "certify paper-designed")[1]
+    assert nothing in prints(capfd, f"certify {file} -o mine.proof.zip")
+    assert json_of(capfd, f"certify {file}")[0]["model"]["left_out"] == []
+    assert nothing in prints(capfd, "recheck mine.proof.zip")
+    assert ALL in prints(capfd, "certify paper-designed")
 
 
 def test_tables_and_python_name_it():
@@ -389,12 +378,9 @@ def test_of_a_map_nothing_of_this_is_said():
 
 
 def test_a_recheck_names_what_the_file_leaves_out(capfd):
-    file = written(scene(world=RUBBED))
-    code, *_ = run(capfd, "certify", file, "-o", "mine.proof.zip")
-    assert code == 0
-    out = prints(capfd, "recheck mine.proof.zip")
-    assert f"{LEFT_OUT}; not audited" in out
-    record = json.loads(run(capfd, "recheck mine.proof.zip --json")[1])
+    prints(capfd, f"certify {written(world=RUBBED)} -o mine.proof.zip")
+    assert f"{LEFT_OUT}; not audited" in prints(capfd, "recheck mine.proof.zip")
+    record = json_of(capfd, "recheck mine.proof.zip")
     assert record["model"] == MODEL | {"assumptions_broken": None}
     assert LEFT_OUT in ls.recheck("mine.proof.zip")._repr_html_()
 
@@ -420,13 +406,11 @@ def test_a_feeder_that_scatters_without_bounds(capfd):
 def test_a_sheet_of_a_scene_that_scatters(capfd):
     """Margins are of the scene without its scatter, and so is the verdict on the goal."""
     for effect in ("gaussian", "bounded"):
-        file = written(scene(world=SPREAD["world"], effects={"spread": effect}))
-        words = ("-o", effect, *SHEET.split())
-        out = prints(capfd, "robustness", file, *words, code=1)
+        line = f"robustness {written(**SPREAD | {'effects': {'spread': effect}})} -o {effect} {SHEET}"
+        out = prints(capfd, line, code=1)
         assert "In the scene without its scatter this holds, proved." in out
         assert WITHOUT in out
-        _, out, _ = run(capfd, "robustness", file, *words, "--json")
-        assert json.loads(out)["holds"] is None
+        assert json_of(capfd, line, code=1)["holds"] is None
 
 
 def test_a_feeder_that_feeds_nothing_says_so_first(capfd):
@@ -485,9 +469,8 @@ def test_files(capfd):
 
 @pytest.mark.sweep
 def test_analyse_resolves_auto_and_says_so(capfd):
-    tree = ls.load("paper-initial").as_dict() | {"effects": {"auto": True}}
-    ls.dump(ls.load(tree), "auto.toml")
-    record = json_of(capfd, "analyse auto.toml -o found")
+    auto = written("paper-initial", effects={"auto": True})
+    record = json_of(capfd, f"analyse {auto} -o found")
     assert "roll" in record["effects"]["switched_on"]
     assert record["effects"]["left_out"]["slip"] == "world.friction is missing: cannot tell"
     assert record["scene"]["effects"]["roll"] is True
@@ -495,4 +478,4 @@ def test_analyse_resolves_auto_and_says_so(capfd):
     assert "The audit of the limit set switched on: roll" in page
     assert "slip: world.friction is missing" in page
     assert "stays where it is until the next throw" not in page  # that is what rolling lifts
-    prints(capfd, "throw auto.toml --x 18 --side 1")
+    prints(capfd, f"throw {auto} --x 18 --side 1")

@@ -11,7 +11,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.face.cli.arguments import bounds_of
-from tests.cli.command import documented, json_of, names_in, prints, refusal, run
+from tests.cli.command import documented, json_of, names_in, prints, refusal, run, written
 from tests.fitting.machines import ABOVE, ALONG, HEIGHT, RADIUS, farthest, film
 
 # ----------------------------------------------------------------
@@ -42,10 +42,9 @@ def test_a_file_and_a_folder(capfd):
     out = prints(capfd, *words, "-o", "found.toml")
     assert out.splitlines()[-1] == "scene: found.toml"
     assert points_of(ls.load("found.toml")) == pytest.approx([10, 10, 20], abs=1e-9)
-    out = prints(capfd, *words, "--stages", "2", "-o", "deep/found", "--json")
+    record = json_of(capfd, *words, "--stages", "2", "-o", "deep/found")
     folder = Path("deep/found")
     assert names_in(folder) == {"paper-initial-design.toml", "design.json", "design.png", "part.png"}
-    record = json.loads(out)
     assert record == json.loads((folder / "design.json").read_text(encoding="utf-8"))
     assert record["reached"] is True
     assert record["targets"] == [10, 10, 20]
@@ -114,19 +113,11 @@ def test_bounds_that_are_turned_round_are_refused(word):
 
 @pytest.mark.sweep
 def test_a_search_writes_scene_answer_and_figure(here, capfd):
-    tree = ls.load("paper-designed").as_dict() | {"tolerance": {"throw.speed": "1 %"}}
-    ls.dump(ls.load(tree), "given.toml")
-    record = json_of(
-        capfd,
-        "design given.toml --robust --evaluations 4 --vary part.mass.center.along,throw.kappa --seconds 0 --out found",
-    )
+    given = written(tolerance={"throw.speed": "1 %"})
+    words = "--evaluations 4 --vary part.mass.center.along,throw.kappa --seconds 0 --out found"
+    record = json_of(capfd, f"design {given} --robust {words}")
     assert record["margins"] == []
-    assert {path.name for path in Path("found").iterdir()} == {
-        "paper-designed-robust.toml",
-        "design.json",
-        "front.png",
-        "part.png",
-    }
+    assert names_in("found") == {"paper-designed-robust.toml", "design.json", "front.png", "part.png"}
     kept = json.loads(Path("found/design.json").read_text(encoding="utf-8"))
     assert isinstance(kept["model"]["assumptions_broken"], int)  # as it is printed
     assert kept["model"] == record["model"]
@@ -136,24 +127,22 @@ def test_a_search_writes_scene_answer_and_figure(here, capfd):
 
 @pytest.mark.sweep
 def test_the_scene_alone(capfd):
-    words = ("--robust", "--evaluations", "20", "--seconds", "0", "-o", "found.toml")
-    out = prints(capfd, "design paper-designed", *words)
+    out = prints(capfd, "design paper-designed --robust --evaluations 20 --seconds 0 -o found.toml")
     assert out.splitlines()[-1] == "scene: found.toml"
-    assert [path.name for path in Path().iterdir()] == ["found.toml"]
+    assert names_in() == {"found.toml"}
     assert ls.load("found.toml").value("throw.kappa") > 0
 
 
 def test_where_nothing_is_found_the_nearest_miss_is_written(capfd):
-    words = ("--robust", "--bounds", "part.mass.center.along=0.1:0.2", "--evaluations", "20")
-    out = prints(capfd, "design paper-designed", *words, "-o", "missed", code=1)
+    line = "design paper-designed --robust --bounds part.mass.center.along=0.1:0.2 --evaluations 20"
+    out = prints(capfd, line, "-o", "missed", code=1)
     assert "nearest miss" in out
     assert "none that feeds among" in out
     assert out.splitlines()[-1] == "scene: missed/paper-designed-robust.toml (the nearest miss, no answer)"
     record = json.loads(Path("missed/design.json").read_text(encoding="utf-8"))
     assert sum(record["ruled_out"].values()) == record["evaluations"]
     assert ls.load(record["scene"]) == ls.load("missed/paper-designed-robust.toml")
-    code, out, _ = run(capfd, "design paper-designed", *words, "--json", "--csv", "missed.csv")
-    assert (code, set(json.loads(out))) == (1, set(record))
+    assert set(json_of(capfd, line, "--csv", "missed.csv", code=1)) == set(record)
     assert "nearest miss" in Path("missed.csv").read_text(encoding="utf-8")
 
 

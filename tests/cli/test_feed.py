@@ -14,7 +14,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from tests.cli.command import DOCS, json_of, prints, refusal, run
+from tests.cli.command import DOCS, json_of, names_in, prints, refusal, run, written
 from tests.feeding.own_throws import thrown
 from tests.feeding.scenes import with_cavity
 from tests.plates import left_by_some
@@ -26,27 +26,23 @@ from tests.scene.test_load import BOTH, chamfered
 PAGE = (DOCS / "json.md").read_text(encoding="utf-8")
 
 
-def written(name, **changes):
-    ls.dump(with_cavity(name, **changes), "fed.toml")
-    return "fed.toml"
+def fed(name="paper-designed", **changes):
+    return written(with_cavity(name, **changes), "fed.toml")
 
 
 def test_words_files_and_exit(capfd):
-    file = written("paper-designed", rate="2 Hz")
-    quick = ("--trials", "200")
-    out = prints(capfd, "feed", file, *quick, "-o", "fed")
+    out = prints(capfd, f"feed {fed(rate='2 Hz')} --trials 200 -o fed")
     assert "the arm ends at x = 20 in, side 2 is wanted" in out
     assert "safety: PROVED" in out
     assert "within 786 throws" in out
-    assert {path.name for path in Path("fed").iterdir()} == {"feeding.json", "part.png", "feeding.png"}
+    assert names_in("fed") == {"feeding.json", "part.png", "feeding.png"}
     assert json.loads(Path("fed/feeding.json").read_text())["scene"] == "paper-designed"
 
 
 @pytest.mark.sweep
 def test_json_alone_and_noise(capfd):
-    file = written("paper-designed")
     words = "--no-proof --scatter 'landing.x=0.1 in' --law bounded --trials 50 --seed 4"
-    table = json_of(capfd, f"feed {file} {words}")
+    table = json_of(capfd, f"feed {fed()} {words}")
     assert table["safety"] is None
     assert table["scatter"] == {"landing": "Uniform(bound=0.1)"}
     assert table["trials"]["seed"] == 4
@@ -55,14 +51,12 @@ def test_json_alone_and_noise(capfd):
 
 @pytest.mark.sweep
 def test_the_certificate_is_written_and_rechecked(capfd):
-    file = written("paper-designed", position="20.5 in")
-    quick = ("--trials", "50", "--certificate", "fed.proof.zip")
-    out = prints(capfd, "feed", file, *quick)
-    assert "certificate: fed.proof.zip, rechecked in" in out
+    line = f"feed {fed(position='20.5 in')} --trials 50 --certificate fed.proof.zip"
+    assert "certificate: fed.proof.zip, rechecked in" in prints(capfd, line)
     out = prints(capfd, "recheck fed.proof.zip")
     assert "feeds: the arm ends at x = 20.5 in" in out
     assert "feeds: PROVED" in out
-    record = json_of(capfd, "feed", file, *quick, "--no-recheck")
+    record = json_of(capfd, f"{line} --no-recheck")
     assert record["certificate"] == {"file": "fed.proof.zip", "denied": False, "recheck": None}
 
 
@@ -70,15 +64,14 @@ def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
     """It is kept, and the command says so."""
     from limitsets.cell.feeding import proving as writing
 
-    file, right = written("paper-designed"), writing.section_of
+    right = writing.section_of
 
     def too_few(proof, end):
         section = right(proof, end)
         return section | {"progress": section["progress"] | {"throws": 5}}
 
     monkeypatch.setattr(writing, "section_of", too_few)
-    quick = ("--trials", "50", "--certificate", "fed.proof.zip")
-    out = prints(capfd, "feed", file, *quick, code=1)
+    out = prints(capfd, f"feed {fed()} --trials 50 --certificate fed.proof.zip", code=1)
     assert "progress: UNDECIDED, the checker denies it: side 0, cell" in out
     assert "the checker denies the certificate: it is kept as fed.denied.zip" in out
     assert Path("fed.denied.zip").exists()
@@ -88,7 +81,7 @@ def test_what_the_checker_denies_is_undecided(capfd, monkeypatch):
 @pytest.mark.sweep
 def test_a_run_that_is_ended_leaves_no_draft():
     """A signal that ends a process leaves its files as they are: the command has to take away what it began."""
-    command = [sys.executable, "-m", "limitsets", "feed", written("paper-designed", position="20.5 in")]
+    command = [sys.executable, "-m", "limitsets", "feed", fed(position="20.5 in")]
     command += ["--trials", "50", "--certificate", "out/fed.proof.zip"]
     folder = Path("out")
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
@@ -101,7 +94,7 @@ def test_a_run_that_is_ended_leaves_no_draft():
 
 
 def test_not_proved_is_exit_1(capfd):
-    out = prints(capfd, "feed", written("paper-initial"), "--trials", "50", code=1)
+    out = prints(capfd, f"feed {fed('paper-initial')} --trials 50", code=1)
     assert "safety: REFUTED" in out
 
 
@@ -114,10 +107,9 @@ def test_many_parts_at_once(capfd):
     """The keys are those of docs/json.md; without contact nothing is thrown at once."""
     pytest.importorskip("pymunk")
     tables = {"world": {"friction": 0.9, "throw_rate": "2 Hz"}, "effects": {"contact": True}}
-    ls.dump(with_cavity("paper-designed", tables=tables), "many.toml")
+    many = written(with_cavity(tables=tables))
     quick = ("--no-proof", "--trials", "20", "--parts", "2", "--batches", "2")
-    out = prints(capfd, "feed many.toml", *quick, "--json")
-    crowds = json.loads(out)["crowds"]
+    crowds = json_of(capfd, f"feed {many}", *quick)["crowds"]
     line = next(line for line in PAGE.splitlines() if line.startswith("| `crowds`"))
     named = re.search(r"`\{(.*?)\}`", line).group(1).split(", ")
     for crowd, between in zip(crowds, (True, False), strict=True):
@@ -125,10 +117,10 @@ def test_many_parts_at_once(capfd):
         assert (crowd["parts"], crowd["batches"], crowd["between"]) == (2, 2, between)
         rate = crowd["right_per_throw"]["value"]
         assert crowd["right_per_minute"] == pytest.approx(120.0 * rate)
-    out = prints(capfd, "feed many.toml", *quick)
+    out = prints(capfd, f"feed {many}", *quick)
     assert "2 parts at once that push each other (arm: hinge):" in out
     assert "right per throw" in out
-    assert "effects.contact" in refusal(capfd, "feed", written("paper-designed"), *quick)
+    assert "effects.contact" in refusal(capfd, f"feed {fed()}", *quick)
 
 
 # ----------------------------------------------------------------
@@ -136,16 +128,13 @@ def test_many_parts_at_once(capfd):
 
 
 def test_certify_exits_with_0_where_all_that_is_laid_down_is_proved(capfd):
-    ls.dump(ls.load(left_by_some()), "left.toml")
-    prints(capfd, "certify left.toml --claim goal", code=1)
-    scene = ls.load("left.toml")
-    words = "--laid", f"2={0.4 * scene.arm_length}:{0.5 * scene.arm_length}"
-    code, out, _ = run(capfd, "certify left.toml", *words, "--json")
-    (record,) = json.loads(out)
-    assert (code, record["verdict"], list(record["starts"])) == (0, "proved", ["within"])
+    left = written(left_by_some(), "left.toml")
+    prints(capfd, f"certify {left} --claim goal", code=1)
+    length = ls.load(left).arm_length
+    (record,) = json_of(capfd, f"certify {left} --laid 2={0.4 * length}:{0.5 * length}")
+    assert (record["verdict"], list(record["starts"])) == ("proved", ["within"])
     assert record["laid"] == record["starts"]["within"]
-    code, out, _ = run(capfd, "recheck left.proof.zip")
-    assert (code, out.splitlines()[-1]) == (0, "PROVED")
+    assert prints(capfd, "recheck left.proof.zip").splitlines()[-1] == "PROVED"
 
 
 def test_certify_says_where_parts_are_laid_down(capfd):
@@ -158,7 +147,7 @@ def test_certify_says_where_parts_are_laid_down(capfd):
     "command", [*(f"{name} paper-designed" for name in ("certify", "margin", "robustness")), "feed fed.toml"]
 )
 def test_bad_ranges_are_refused_in_a_line(capfd, command):
-    ls.dump(with_cavity(), "fed.toml")
+    fed()
     for word, said in (
         ("0", "SIDE=LO:HI"),
         ("0=8", "SIDE=LO:HI"),
@@ -183,16 +172,13 @@ def test_critical_points_have_no_starts(capfd):
 
 def test_a_design_is_asked_for_what_is_laid_down_alone(capfd):
     """Of the whole arm no throw of 60 is proved: from some starts parts leave; of 120 to 150 mm on side 2 one is."""
-    ls.dump(ls.load(left_by_some()).with_values({"throw.kappa": "300 mm"}), "left.toml")
-    words = "left.toml", "--goal", "--vary", "throw.kappa", "--evaluations", "60", "--json"
-    code, out, _ = run(capfd, "design", *words)
-    assert (code, json.loads(out)["verdict"]) == (1, "undecided")
-    laid = "--laid", "2=120:150"
-    code, out, _ = run(capfd, "design", *words, *laid, "-o", "found.toml")
-    record = json.loads(out)
-    assert (code, record["verdict"]) == (0, "proved")
+    left = written(left_by_some(), values={"throw.kappa": "300 mm"})
+    words = f"design {left} --goal --vary throw.kappa --evaluations 60"
+    assert json_of(capfd, words, code=1)["verdict"] == "undecided"
+    record = json_of(capfd, f"{words} --laid 2=120:150 -o found.toml")
+    assert record["verdict"] == "proved"
     assert record["room"] > 0.0 >= record["room_before"]
-    prints(capfd, "certify found.toml --claim goal", *laid)
+    prints(capfd, "certify found.toml --claim goal --laid 2=120:150")
     prints(capfd, "recheck found.proof.zip")
     # apart from the package: every part that is laid down comes beyond X, on side 2 alone, and none leaves the arm
     scene = ls.load("found.toml")
@@ -207,9 +193,7 @@ def test_a_design_is_asked_for_what_is_laid_down_alone(capfd):
 
 
 def test_feed_says_where_parts_are_laid_down(capfd):
-    ls.dump(with_cavity(), "fed.toml")
-    words = "--laid", "0=6:14", "--trials", "50", "--certificate", "fed.proof.zip"
-    out = prints(capfd, "feed fed.toml", *words)
+    out = prints(capfd, f"feed {fed()} --laid 0=6:14 --trials 50 --certificate fed.proof.zip")
     assert "where parts are laid down: x = 6 to 14 in on side 0" in out
     assert "no start that is laid down feeds another side than 2" in out
     assert "every start that is laid down is fed within" in out
@@ -226,7 +210,7 @@ FIRST = "switched on landing and roll: the part cannot rest on side 3, and tips 
 
 def written_chamfer(**tables):
     """Write a scene's file, and return its text."""
-    ls.dump(ls.load(chamfered(**{"effects": BOTH, **tables})), "chamfered.toml")
+    written(chamfered(**{"effects": BOTH, **tables}), "chamfered.toml")
     return Path("chamfered.toml").read_text(encoding="utf-8")
 
 
@@ -315,9 +299,7 @@ def scattering(law, scene="paper-designed"):
 
 def latch(law):
     """Write the latch; without a law its scatter is a fact only."""
-    name = f"{law or 'plain'}.toml"
-    ls.dump(ls.load(LATCH | ({"effects": {"spread": law}} if law else {})), name)
-    return name
+    return written(LATCH, f"{law or 'plain'}.toml", **({"effects": {"spread": law}} if law else {}))
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -327,9 +309,8 @@ def test_a_margin_of_a_scene_that_scatters_is_that_of_the_scene_without_its_scat
     (found,) = ls.margin(scattering(law), "throw.speed", width=0.1)
     assert (found.proved, found.refuted) == (plain.proved, plain.refuted)
     assert found.model.left_out == ("scatter",)
-    ls.dump(scattering(law), "mine.toml")
     # proved of another scene than the one that was asked about
-    out = prints(capfd, "margin mine.toml throw.speed --width 0.1", code=1)
+    out = prints(capfd, f"margin {written(scattering(law))} throw.speed --width 0.1", code=1)
     assert WITHOUT in out.splitlines()[0]
     (row,) = (line.split() for line in out.splitlines() if line.startswith(" throw.speed"))
     proved, refuted = (float(word) for word in row if re.fullmatch(r"[0-9.]+", word))
@@ -378,10 +359,9 @@ def test_a_sampled_limit_set_is_said_to_be_without_scatter(capfd):
 
 def test_feed_says_what_ends_a_part_and_how_throws_scatter(capfd):
     """Parts whose throw acts beyond the end were counted as fed or off the arm; the law was not printed."""
-    tree = with_cavity("paper-designed").as_dict()
     world = {"scatter": {"speed": "0.5 %", "landing": "0.02 in"}, "throw_rate": "2 Hz"}
-    ls.dump(ls.load(tree | {"world": world, "effects": {"spread": "gaussian"}}), "mine.toml")
-    _, out, _ = run(capfd, "feed mine.toml --trials 2000 --no-level --no-proof")
+    file = written(with_cavity(), world=world, effects={"spread": "gaussian"})
+    _, out, _ = run(capfd, f"feed {file} --trials 2000 --no-level --no-proof")
     assert "or comes to lie where its throw acts beyond the end: " in out
     assert "speed: normal, standard deviation 0.5 %; landing: normal, standard deviation 0.02 in" in out
 
@@ -392,14 +372,3 @@ def test_a_deviation_without_its_unit_is_told_of_percent(capfd):
     assert '"<decimal number> %" or an angular speed' in err
     _, _, err = run(capfd, "certify paper-designed --noise landing.x=1")
     assert "%" not in err  # a share of a landing means nothing
-
-
-def test_the_explorer_says_of_which_model_its_proofs_are():
-    """The starts of the last claim stood in place of the model's sentence."""
-    from limitsets.face.explorer.answers import proof_words
-
-    model = "of the minimal model: friction of [world] is not in it"
-    claim = {"claim": "goal", "verdict": "proved", "reason": "", "starts": "every", "share": 1.0, "note": ""}
-    shown = proof_words([claim], [], "rested", model)
-    assert model in shown
-    assert "for every start" in shown

@@ -1,14 +1,13 @@
 """`limitsets feedback`: words, JSON as docs/json.md has it, files, exit codes."""
 
 import csv
-import json
 import re
 from pathlib import Path
 
 import pytest
 
 import limitsets as ls
-from tests.cli.command import documented, json_of, names_in, prints, refusal, run
+from tests.cli.command import documented, json_of, names_in, prints, refusal, run, written
 
 SCENE = "one-bit.toml"
 FEW = ("--starts", "2=17:18", "--cells", "256")
@@ -16,10 +15,9 @@ FEW = ("--starts", "2=17:18", "--cells", "256")
 
 @pytest.fixture(autouse=True)
 def _scene(here):
-    tree = ls.load("paper-initial").as_dict()
-    throws = [{"name": "own", **tree["throw"]}, {"name": "fast", "kappa": "27.57073926 in"}]
-    tree["feedback"] = {"sensor": {"beyond": "20 in"}, "throws": throws}
-    ls.dump(ls.load(tree), SCENE)
+    own = ls.load("paper-initial").as_dict()["throw"]
+    throws = [{"name": "own", **own}, {"name": "fast", "kappa": "27.57073926 in"}]
+    written("paper-initial", SCENE, feedback={"sensor": {"beyond": "20 in"}, "throws": throws})
 
 
 def test_a_policy_in_words(capfd):
@@ -29,7 +27,7 @@ def test_a_policy_in_words(capfd):
     assert "is the part beyond 20 in?" in out
     assert re.search(r"solved: [0-9]+ throws are enough", out)
     assert "thrown: 10000 of 10000 came" in out
-    assert [path.name for path in Path().iterdir()] == [SCENE]
+    assert names_in() == {SCENE}
 
 
 def test_json_has_the_keys_of_the_page(capfd):
@@ -89,10 +87,10 @@ def test_a_certificate_is_written_and_confirmed(capfd):
     out = prints(capfd, "recheck one.proof.zip")
     assert "policy: from every start named the part is brought to lie on side 2 at x >= 20 in" in out
     assert out.splitlines()[-1] == "PROVED"
-    words = ("feedback", SCENE, *FEW, "--certificate", "two.proof.zip", "--no-recheck", "--json")
-    out = prints(capfd, *words)
-    assert json.loads(out)["certificate"] == {"file": "two.proof.zip", "denied": False, "recheck": None}
-    out = prints(capfd, *words[:-3], "no.proof.zip", "--throws", "1", code=1)
+    words = ("feedback", SCENE, *FEW, "--certificate")
+    record = json_of(capfd, *words, "two.proof.zip", "--no-recheck")
+    assert record["certificate"] == {"file": "two.proof.zip", "denied": False, "recheck": None}
+    out = prints(capfd, *words, "no.proof.zip", "--throws", "1", code=1)
     assert "no certificate is written: there is no policy" in out
     assert not Path("no.proof.zip").exists()
 
@@ -106,19 +104,16 @@ def test_what_the_checker_denies_is_not_solved(capfd, monkeypatch):
     out = prints(capfd, "feedback", SCENE, *FEW, "--certificate", "one.proof.zip", code=1)
     assert "the checker denies the certificate: it is kept as one.denied.zip" in out
     assert "not decided: the checker denies it" in out
-    assert sorted(path.name for path in Path().iterdir()) == [SCENE, "one.denied.zip"]
+    assert names_in() == {SCENE, "one.denied.zip"}
 
 
 def test_no_policy_is_exit_1(capfd):
-    out = prints(
-        capfd, "feedback", SCENE, "--cells", "128", "--blind", "--throws", "3", "--csv", "t.csv", code=1
-    )
+    out = prints(capfd, f"feedback {SCENE} --cells 128 --blind --throws 3 --csv t.csv", code=1)
     assert "nothing is asked" in out
     assert "not with 3 throws on these cells" in out
     assert not Path("t.csv").exists()
-    code, out, _ = run(capfd, "feedback", SCENE, "--cells", "256", "--seconds", "0", "--json", "--side", "2")
-    record = json.loads(out)
-    assert (code, record["verdict"], record["policy"], record["simulated"]) == (1, "not-decided", None, None)
+    record = json_of(capfd, f"feedback {SCENE} --cells 256 --seconds 0 --side 2", code=1)
+    assert (record["verdict"], record["policy"], record["simulated"]) == ("not-decided", None, None)
 
 
 def test_a_sweep_names_the_best_place(capfd):

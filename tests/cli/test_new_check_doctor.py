@@ -1,7 +1,6 @@
 """A scene to start from, all that is wrong with a scene at once, and what is installed."""
 
 import csv
-import json
 import re
 import sys
 import tomllib
@@ -14,7 +13,7 @@ from limitsets.base.errors import SceneError
 from limitsets.feeder.scene.checking import examined, starting_text
 from limitsets.feeder.scene.schema import Section, Several, schema
 from limitsets.feeder.scene.validation import refusals
-from tests.cli.command import documented, json_of, prints, refusal, run
+from tests.cli.command import documented, json_of, names_in, prints, refusal, run, written
 
 LEAD = """
 part.vertices = [["0 mm", "0 mm"], ["146 mm", "0 mm"], ["100 mm", "90 mm"]]
@@ -46,23 +45,20 @@ def tables(of):
     return [inner] if isinstance(inner, Section) else []
 
 
-def test_the_new_scene_loads_and_is_the_designed_feeder(capfd, tmp_path):
-    code, out, _ = run(capfd, "new 'my part.toml'")
-    assert (code, out.splitlines()[0]) == (0, "scene: my part.toml")
+def test_the_new_scene_loads_and_is_the_designed_feeder(capfd):
+    assert prints(capfd, "new 'my part.toml'").splitlines()[0] == "scene: my part.toml"
     found = ls.load("my part.toml")
     assert found.as_dict() == ls.load("paper-designed").as_dict() | {"name": "my part"}
     before = Path("my part.toml").read_bytes()
-    code, out, err = run(capfd, "new 'my part.toml'")
-    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    refusal(capfd, "new 'my part.toml'")
     assert Path("my part.toml").read_bytes() == before
-    assert [path.name for path in tmp_path.iterdir()] == ["my part.toml"]
+    assert names_in() == {"my part.toml"}
 
 
 @pytest.mark.parametrize("name", ["mine.txt", "no folder/mine.toml", "mine"])
-def test_a_name_that_cannot_be(name, capfd, tmp_path):
-    code, _, err = run(capfd, "new", name)
-    assert (code, len(err.splitlines())) == (2, 1)
-    assert not list(tmp_path.iterdir())
+def test_a_name_that_cannot_be(name, capfd):
+    refusal(capfd, "new", name)
+    assert not names_in()
 
 
 def test_every_key_of_the_schema_stands_in_it_with_its_words_and_an_example_that_fits():
@@ -115,17 +111,15 @@ def test_the_first_error_of_load_is_among_them(text, tmp_path):
 
 
 def test_a_scene_that_is_right(capfd):
-    code, out, _ = run(capfd, "check paper-designed")
-    told = out.splitlines()
-    assert (code, told[0]) == (0, "paper-designed: nothing is wrong")
+    first, *told = prints(capfd, "check paper-designed").splitlines()
+    assert first == "paper-designed: nothing is wrong"
     # sqrt(193.045 / 25.3778518) rad/s
-    assert told[1:] == [
-        "paper-designed: throw.kappa gives the throw, and gravity changes none: it tells which speed that is, 158 deg/s"
-    ]
-    assert json.loads(run(capfd, "check paper-designed --json")[1]) == []
+    speed = "throw.kappa gives the throw, and gravity changes none: it tells which speed that is, 158 deg/s"
+    assert told == [f"paper-designed: {speed}"]
+    assert json_of(capfd, "check paper-designed") == []
 
 
-def test_the_doctor_says_what_is_there(capfd, monkeypatch, tmp_path):
+def test_the_doctor_says_what_is_there(capfd, tmp_path):
     record = json_of(capfd, "doctor --csv packages.csv")
     assert set(record) == documented("doctor")
     assert record["limitsets"] == ls.__version__
@@ -166,9 +160,9 @@ def test_the_doctor_clears_the_compiled_code(capfd, monkeypatch, tmp_path):
     folder.mkdir(parents=True)
     (folder / "code").write_bytes(b"x" * 1000)
     monkeypatch.setattr("limitsets.numbers.jit.cache.FOLDER", folder)
-    assert json.loads(run(capfd, "doctor --json")[1])["cache"]["bytes"] == 1000
+    assert json_of(capfd, "doctor")["cache"]["bytes"] == 1000
     assert folder.is_dir()
-    record = json.loads(run(capfd, "doctor --json --clear")[1])["cache"]
+    record = json_of(capfd, "doctor --clear")["cache"]
     assert (record["bytes"], record["versions"], record["cleared"]) == (1000, 1, True)
     assert not folder.exists()
 
@@ -180,6 +174,7 @@ def with_tables(**tables):
 AT_158 = {"speed": "158 deg/s"}
 CAVITY = {"position": "20 in", "width": "8 in", "depth": "1 in", "angle": "30 deg"}
 SHORT = {"length": "15 in", "surface_height": "0 in"}
+LONG_AND_HIGH = {"arm": {"length": "2.8 m", "surface_height": "7 in"}}
 GOAL_TOO_FAR = {"oriented_beyond": {"x": "200 in", "side": 2}}
 
 
@@ -268,11 +263,7 @@ PLATE_OF_25_G = tomllib.loads(LEAD)
         ({"throw": {"speed": "2.758 deg/s"}}, "throw.speed", ("turns 0.000107 times",)),
         ({"throw": {"kappa": "25 um"}}, "throw.kappa", ("9055 times", "8.91 in")),
         ({"arm": {"length": "28 m", "surface_height": "0 in"}}, "arm.length", ("28 m long",)),
-        (
-            {"arm": {"length": "2.8 m", "surface_height": "7 in"}},
-            "arm.surface_height",
-            ("1.04 times the part",),
-        ),
+        (LONG_AND_HIGH, "arm.surface_height", ("1.04 times the part",)),
         ({"gravity": {"acceleration": "193.045 m/s^2"}}, "gravity.acceleration", ("193 m/s^2",)),
         ({"world": {"throw_rate": "120 Hz"}}, "world.throw_rate", ("120 throws a second",)),
         (scatter(speed="60 %"), "world.scatter.speed", ("'60 %'", "0.6 times the speed")),
@@ -298,13 +289,11 @@ def test_improbable_values_are_told_and_not_refused(capfd, tables, key, words):
     assert not wrong
     assert [doubt.key for doubt in doubts] == [key]
     assert all(word in str(doubts[0]) for word in (*words, "usual: ", "has it the right unit?"))
-    ls.dump(ls.load(tree), "odd.toml")
-    code, out, _ = run(capfd, "check odd.toml")
-    assert (code, out.splitlines()[0]) == (0, str(doubts[0]._replace(file="odd.toml")))
-    assert out.splitlines()[1] == "odd.toml: nothing is wrong, 1 thing is improbable"
-    code, out, _ = run(capfd, "check odd.toml --json")
-    (record,) = json.loads(out)
-    assert (code, set(record), record["improbable"]) == (0, documented("check"), True)
+    first, second, *_ = prints(capfd, f"check {written(tree, 'odd.toml')}").splitlines()
+    assert first == str(doubts[0]._replace(file="odd.toml"))
+    assert second == "odd.toml: nothing is wrong, 1 thing is improbable"
+    (record,) = json_of(capfd, "check odd.toml")
+    assert (set(record), record["improbable"]) == (documented("check"), True)
 
 
 def test_of_what_has_no_usual_size_nothing_is_said():
@@ -348,16 +337,14 @@ def test_usual_plates_and_the_built_in_scenes_are_neither_wrong_nor_improbable()
         assert examined(name) == ((), ())
 
 
-def test_a_new_scene_in_millimetres_is_the_same_feeder(capfd, tmp_path):
-    file = tmp_path / "mine.toml"
-    prints(capfd, "new", str(file), "--unit", "mm")
-    text = file.read_text(encoding="utf-8")
-    assert ' in"' not in text.partition("[part]")[2]
-    scene, like = ls.load(file), ls.load("paper-designed")
+def test_a_new_scene_in_millimetres_is_the_same_feeder(capfd):
+    prints(capfd, "new mine.toml --unit mm")
+    assert ' in"' not in Path("mine.toml").read_text(encoding="utf-8").partition("[part]")[2]
+    scene, like = ls.load("mine.toml"), ls.load("paper-designed")
     assert scene.unit == "mm"
     assert scene.arm_length == pytest.approx(25.4 * like.arm_length, rel=1e-9)
     assert scene.kappa == pytest.approx(25.4 * like.kappa, rel=1e-9)
-    assert "mm" in refusal(capfd, "new", str(tmp_path / "other.toml"), "--unit", "yd")
+    assert "mm" in refusal(capfd, "new other.toml --unit yd")
 
 
 def test_what_the_parser_refuses_is_said_in_plain_words(capfd):

@@ -1,7 +1,6 @@
 """What holds for every command: options, missing extras, remedies, the page of the JSON."""
 
 import csv
-import json
 import os
 import re
 import subprocess
@@ -14,7 +13,7 @@ from typer.main import get_command
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.face.cli.app import app
-from tests.cli.command import DOCS, PROGRESS, documented, json_of, prints, run
+from tests.cli.command import DOCS, PROGRESS, documented, json_of, names_in, prints, refusal, run, written
 from tests.feeding.scenes import with_cavity
 
 # ----------------------------------------------------------------
@@ -44,8 +43,8 @@ def test_every_command_that_prints_a_table_saves_it(name):
 
 
 def test_throws_in_full(capfd):
-    out = prints(capfd, "throw paper-designed --x 15 --side 2 --count 5 --json --csv t.csv")
-    rows, throws = rows_of("t.csv"), json.loads(out)
+    throws = json_of(capfd, "throw paper-designed --x 15 --side 2 --count 5 --csv t.csv")
+    rows = rows_of("t.csv")
     assert list(rows[0])[:5] == ["throw", "x [in]", "side", "status", "turned by [deg]"]
     assert [float(row["x [in]"]) for row in rows] == [15.0, *(each["x"] for each in throws)]
     assert [float(row["displacement [in]"]) for row in rows[1:]] == [each["displacement"] for each in throws]
@@ -53,9 +52,8 @@ def test_throws_in_full(capfd):
 
 
 def test_limit_sets_in_full_and_figures_of_another_form(capfd):
-    words = ("--cells", "512", "--csv", "sets.csv", "--format", "svg", "--html", "--json")
-    out = prints(capfd, "analyse paper-designed", *words)
-    (found,) = json.loads(out)["attractors"]
+    record = json_of(capfd, "analyse paper-designed --cells 512 --csv sets.csv --format svg --html")
+    (found,) = record["attractors"]
     bands = [(int(side), *part) for side, parts in found["extents"].items() for part in parts]
     rows = rows_of("sets.csv")
     assert [(int(row["side"]), float(row["x low [in]"]), float(row["x high [in]"])) for row in rows] == bands
@@ -82,24 +80,22 @@ def test_a_page_links_to_figures_that_it_cannot_show(capfd):
 
 
 def test_the_form_of_one_figure(capfd):
-    words = ("plot", "paper-designed", "flight", "--cells", "256")
-    prints(capfd, *words, "--format", "svg")
+    words = "plot paper-designed flight --cells 256 --format svg"
+    prints(capfd, words)
     assert Path("paper-designed-flight.svg").read_bytes().startswith(b"<?xml")
-    code, _, err = run(capfd, *words, "--format", "svg", "-o", "a.png")
-    assert (code, len(err.splitlines())) == (2, 1)
+    refusal(capfd, f"{words} -o a.png")
 
 
 @pytest.mark.parametrize("file", [".", "no folder/t.csv"])
 def test_a_table_that_cannot_be_written_is_refused_first(file, capfd):
-    code, out, err = run(capfd, "throw paper-designed --x 15 --side 2 --csv", file)
-    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    refusal(capfd, "throw paper-designed --x 15 --side 2 --csv", file)
 
 
 def test_a_table_is_replaced_whole(capfd):
     Path("t.csv").write_text("old\n" * 1000)
     prints(capfd, "scenes --csv t.csv")
     assert [row["scene"] for row in rows_of("t.csv")] == ls.scenes()
-    assert [path.name for path in Path().iterdir()] == ["t.csv"]
+    assert names_in() == {"t.csv"}
 
 
 # ----------------------------------------------------------------
@@ -165,8 +161,7 @@ QUICK = ("--no-proof", "--trials", "20")
 
 
 def noisy(**tables):
-    ls.dump(with_cavity("paper-designed", tables={"world": {"scatter": SCATTER}, **tables}), "noisy.toml")
-    return "noisy.toml"
+    return written(with_cavity(), world={"scatter": SCATTER}, **tables)
 
 
 def test_feed_says_in_its_first_line_that_the_scatter_is_not_used(capfd):
@@ -176,17 +171,15 @@ def test_feed_says_in_its_first_line_that_the_scatter_is_not_used(capfd):
     _, _, err = run(capfd, "feed", noisy(), *QUICK, "--json")
     assert "[world] scatter is not used" in err
     words = ("--scatter", "throw.speed=0.3 %", "--no-level")
-    _, out, _ = run(capfd, "feed", noisy(), *QUICK, *words)
-    assert "not used" not in out
-    _, out, _ = run(capfd, "feed", noisy(effects={"spread": "gaussian"}), *QUICK, "--no-level")
-    assert "not used" not in out
+    assert "not used" not in run(capfd, "feed", noisy(), *QUICK, *words)[1]
+    scattered = noisy(effects={"spread": "gaussian"})
+    assert "not used" not in run(capfd, "feed", scattered, *QUICK, "--no-level")[1]
 
 
 def test_the_levels_of_the_noise_can_be_left_out(capfd):
     scene = noisy(effects={"spread": "gaussian"})
     assert "times the noise" in run(capfd, "feed", scene, *QUICK)[1]
-    out = prints(capfd, "feed", scene, *QUICK, "--no-level")
-    assert "times the noise" not in out
+    assert "times the noise" not in prints(capfd, "feed", scene, *QUICK, "--no-level")
 
 
 def test_the_cavities_of_two_scenes_are_told_in_words():
@@ -202,30 +195,18 @@ def test_the_cavities_of_two_scenes_are_told_in_words():
         ls.assemble(one, fast, trials=1)
 
 
-@pytest.mark.parametrize(("name", "file"), [("mine", "mine.proof.zip"), ("mine.zip", "mine.zip")])
-def test_a_certificate_without_an_ending_gets_one(capfd, name, file):
-    _, out, _ = run(capfd, "certify paper-designed --claim invariant -o", name)
-    assert f"{file}" in out
-    assert [path.name for path in Path().glob("mine*")] == [file]
-
-
 def test_where_there_is_no_policy_the_next_thing_is_told(capfd):
-    tree = ls.load("paper-initial").as_dict()
-    throws = [{"name": "own", **tree["throw"]}]
-    tree["feedback"] = {"sensor": {"beyond": "20 in"}, "throws": throws}
-    ls.dump(ls.load(tree), "one.toml")
-    words = ("--starts", "2=17:18", "--cells", "64", "--throws", "1")
-    out = prints(capfd, "feedback one.toml", *words, code=1)
+    throws = [{"name": "own", **ls.load("paper-initial").as_dict()["throw"]}]
+    file = written("paper-initial", feedback={"sensor": {"beyond": "20 in"}, "throws": throws})
+    out = prints(capfd, f"feedback {file} --starts 2=17:18 --cells 64 --throws 1", code=1)
     assert "not with 1 throws on these cells" in out
     assert "next: more --throws or --cells, --sweep LO:HI:N for another place of the sensor" in out
 
 
 def test_analyse_tells_what_is_improbable(capfd):
-    ls.dump(ls.load("paper-designed").with_values({"throw.speed": "160 rpm"}), "fast.toml")
-    _, out, _ = run(capfd, "analyse fast.toml --cells 64")
-    assert "throw.speed: careful, '160 rpm'" in out
-    _, out, err = run(capfd, "analyse fast.toml --cells 64 --json")
-    assert "throw.speed: careful, '160 rpm'" in err
+    fast = written(values={"throw.speed": "160 rpm"})
+    assert "throw.speed: careful, '160 rpm'" in prints(capfd, f"analyse {fast} --cells 64")
+    assert "throw.speed: careful, '160 rpm'" in run(capfd, f"analyse {fast} --cells 64 --json")[2]
     assert "careful" not in run(capfd, "analyse paper-designed --cells 64")[1].replace("careful: of", "")
 
 

@@ -111,7 +111,9 @@ def test_corners_that_are_clicked_become_a_part(page):
 
 
 def test_throws_are_shown_from_a_start_and_end_where_the_map_says(page):
+    near = dict(page.arm.canvas.view)
     page.throw(21.0, 2)
+    assert page.arm.canvas.view["y"][1] > near["y"][1]  # the flight is in sight
     film = page._film
     assert film.rests[0].side == 0
     assert film.rests[0].x == pytest.approx(float(ls.orbit(page.scene.map, 21.0, 2, 1).x[1]))
@@ -120,27 +122,9 @@ def test_throws_are_shown_from_a_start_and_end_where_the_map_says(page):
     assert page._film is None
     last = film.rests[-1]
     assert shown(page.lanes, "start")["x"] == [pytest.approx(last.x)]
+    assert page.arm.canvas.view == near
     page.throw(-5.0, 0)
     assert "wrong" in page._error.object
-
-
-def test_the_arm_is_near_again_after_a_film(page):
-    near = dict(page.arm.canvas.view)
-    page.throw(21.0, 2)
-    assert page.arm.canvas.view["y"][1] > near["y"][1]  # the flight is in sight
-    page._began -= 1000.0
-    page.beat()
-    assert page.arm.canvas.view == near
-
-
-def test_added_masses_are_drawn_where_they_are(page):
-    page.open(ls.load(LEAD))
-    page.beat()
-    masses, words = shown(page.part, "added masses"), shown(page.part, "weights")["words"]
-    assert (masses["x"], masses["y"], words) == ([20.0], [4.0], ["8 g"])
-    page.sliders.put({"part.mass.points[0].x": 10.0})
-    page.beat()
-    assert shown(page.part, "added masses")["x"] == [10.0]
 
 
 def test_throws_outside_the_model_are_said(page):
@@ -162,14 +146,20 @@ def test_throws_of_the_limit_set_that_land_on_another_vertex_are_said(page):
     assert careful in page._careful.object
 
 
-def test_a_point_mass_has_a_slider(page):
+def test_added_masses_are_drawn_where_they_are_and_have_sliders(page):
     page.open(ls.load(LEAD))
+    page.beat()
+    masses, words = shown(page.part, "added masses"), shown(page.part, "weights")["words"]
+    assert (masses["x"], masses["y"], words) == ([20.0], [4.0], ["8 g"])
     page.sliders.put({"part.mass.points[0].mass": 16.0})
     page.beat()
     assert shown(page.part, "weights")["words"] == ["16 g"]
     plate, lead = 3.0 * 0.03 * 0.02 / 2, 0.016  # kg; the plate's centroid is at (10, 20/3) mm
     x = (plate * 10.0 + lead * 20.0) / (plate + lead)
     assert page.scene.centre[0] == pytest.approx(x)
+    page.sliders.put({"part.mass.points[0].x": 10.0})
+    page.beat()
+    assert shown(page.part, "added masses")["x"] == [10.0]
 
 
 def test_what_a_browser_sends_as_a_place_may_be_anything(page):
@@ -265,11 +255,14 @@ def test_a_picture_is_sent_when_anything_of_it_has_changed_and_not_otherwise(pag
 
 def test_a_map_of_two_dimensions_is_its_points_and_a_bad_parameter_a_line():
     page = ls.explore(ls.maps.Henon()).page()
-    before = len(shown(page.points, "points")["x"])
-    assert before > 1000
+    assert len(shown(page.points, "points")["x"]) > 1000
     page.sliders.put({"a": 5.0})  # all of it leaves
     page.beat()
     assert len(shown(page.points, "points")["x"]) == 0
+    page._wrote = -1.0  # text is written a few times a second
+    page.beat()
+    assert "0 of 8 orbits" in page._said.object
+    assert "8 of 8 orbits pass x_0 = -" in page._said.object
     page.sliders._typed(page.sliders.knobs[0], "much")
     assert "wrong" in page._error.object
 
@@ -325,16 +318,6 @@ def test_a_cycle_is_drawn_so_that_it_is_seen():
     assert shown(page.points, "few points")["x"] == []
 
 
-def test_where_orbits_go_that_do_not_stay_is_said():
-    page = ls.explore(ls.maps.Henon()).page()
-    page.sliders.put({"a": 5.0})
-    page.beat()
-    page._wrote = -1.0  # text is written a few times a second
-    page.beat()
-    assert "0 of 8 orbits" in page._said.object
-    assert "8 of 8 orbits pass x_0 = -" in page._said.object
-
-
 def test_a_map_of_one_dimension_has_lanes():
     page = ls.explore(ls.maps.Logistic(3.9)).page()
     assert shown(page.lanes, "limit sets")["right"] == [pytest.approx(0.975)]
@@ -344,16 +327,15 @@ def test_what_cannot_be_explored_is_refused():
     class Alien(tuple):
         __slots__ = ()
 
-    with pytest.raises(LimitsetsError):
-        ls.explore(Alien())
-    with pytest.raises(AnswerError):
-        ls.explore("paper-designed", domain=[(0, 1)])
-    with pytest.raises(AnswerError, match=r"the domain of TwoState .*pass domain=\[\(lo, hi\)"):
-        ls.explore(TwoState())
-    with pytest.raises(SceneError):
-        ls.explore("no-such-scene")
-    with pytest.raises(LimitsetsError, match="a folder that limitsets atlas wrote"):
-        ls.explore("paper-designed", atlas="/nowhere")
+    for about, options, error, words in (
+        (Alien(), {}, LimitsetsError, None),
+        ("paper-designed", {"domain": [(0, 1)]}, AnswerError, "none beside a scene"),
+        (TwoState(), {}, AnswerError, r"the domain of TwoState .*pass domain=\[\(lo, hi\)"),
+        ("no-such-scene", {}, SceneError, None),
+        ("paper-designed", {"atlas": "/nowhere"}, LimitsetsError, "a folder that limitsets atlas wrote"),
+    ):
+        with pytest.raises(error, match=words):
+            ls.explore(about, **options)
 
 
 @pytest.mark.sweep

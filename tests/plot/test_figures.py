@@ -1,7 +1,6 @@
 """Figures of limit sets, basins, throws and parts."""
 
 import itertools
-import json
 import re
 import subprocess
 import sys
@@ -399,19 +398,6 @@ def test_names_of_the_sides_keep_off_the_part_and_each_other(source):
     assert not any(path.intersects_bbox(box) for box in boxes)
     assert not any(one.overlaps(two) for k, one in enumerate(boxes) for two in boxes[:k])
     assert all(figure.bbox.contains(*corner) for box in boxes for corner in box.corners())
-
-
-def test_a_part_given_by_three_lengths():
-    texts = named(ls.plot.part(ls.load("paper-designed")).axes[0], "side")
-    assert [text.get_text() for text in texts] == ["side 0: 5.75 in", "side 1: 3.6 in", "side 2: 6.75 in"]
-
-
-def test_plot_part_needs_no_analysis(tmp_path, monkeypatch, capfd):
-    monkeypatch.chdir(tmp_path)
-    code, out, err = run(capfd, "plot paper-designed part --json")
-    assert (code, err) == (0, "")
-    assert json.loads(out) == {"figure": "paper-designed-part.png"}
-    assert (tmp_path / "paper-designed-part.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_it_is_the_first_figure_of_reports(tmp_path):

@@ -6,7 +6,6 @@ import math
 import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,7 @@ from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scattering import Gaussian, Scattering
 from limitsets.parameters.analysis import GoalOutcome
 from tests.assembly.pairs import both_own
-from tests.browsers import browser
+from tests.browsers import Page, browser
 from tests.cli.command import run
 from tests.feeding.scenes import with_cavity
 from tests.plates import left_by_some
@@ -302,32 +301,6 @@ def test_a_proved_share_is_rounded_down():
 # The report as one file: it stands alone, says what the Markdown says, and is readable on a phone.
 
 
-VOID = {"meta", "img", "br", "hr", "link", "input"}
-
-
-class Reader(HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.open, self.text, self.images, self.links = [], [], [], []
-
-    def handle_starttag(self, tag, attributes):
-        names = dict(attributes)
-        self.images += [(names["alt"], names["src"])] if tag == "img" else []
-        self.links += [value for name, value in attributes if name in ("href", "src")]
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attributes):
-        self.handle_starttag(tag, attributes)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if "style" not in self.open:
-            self.text.append(data)
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("report")
@@ -336,26 +309,28 @@ def folder(tmp_path_factory):
 
 
 def test_it_stands_alone_and_has_all_figures(folder):
-    reader = Reader()
-    reader.feed((folder / "report.html").read_text(encoding="utf-8"))
-    assert reader.open == []
-    assert all(link.startswith("data:") for link in reader.links)
-    assert len(reader.images) == len(FIGURES)
-    for caption, source in reader.images:
-        assert caption
-        assert b"<svg" in base64.b64decode(source.partition(",")[2])
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    links = [
+        attributes[name] for _, attributes in page.tags for name in ("href", "src") if name in attributes
+    ]
+    assert all(link.startswith("data:") for link in links)
+    images = [attributes for tag, attributes in page.tags if tag == "img"]
+    assert len(images) == len(FIGURES)
+    for image in images:
+        assert image["alt"]
+        assert b"<svg" in base64.b64decode(image["src"].partition(",")[2])
 
 
 def test_it_says_what_the_markdown_says(folder):
-    reader = Reader()
-    reader.feed((folder / "report.html").read_text(encoding="utf-8"))
+    html = Page((folder / "report.html").read_text(encoding="utf-8"))
     page = re.sub(r"!\[.*?\]\(.*?\)", "", (folder / "report.md").read_text(encoding="utf-8"))
 
     def words(text):
         return re.findall(r"[\w.]+", text)
 
     title = page.splitlines()[0].lstrip("# ")
-    assert words(" ".join(reader.text)) == words(title) + words(page)
+    said = " ".join(text for tag, _, text in html.texts if tag != "style")
+    assert words(said) == words(title) + words(page)
 
 
 def test_text_of_a_scene_is_never_markup():

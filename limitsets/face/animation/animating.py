@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from limitsets.base import AnswerError, arguments_checked, replaced, shown_in_notebooks
-from limitsets.face.animation.film import Asked
-
-if TYPE_CHECKING:
-    from limitsets.face.animation.film import Film
-
-
-Progress = Callable[[str, int, int], None] | None
+from limitsets.base import AnswerError, Progress, arguments_checked, replaced, shown_in_notebooks
+from limitsets.face.animation.film import Asked, Film
+from limitsets.feeder.scene import load
 
 KINDS = {
     "Scene": "thrown_scenes:film_of_scene",
@@ -61,7 +55,7 @@ def film_of(
     throws: int | None = None,
     fps: float = 20.0,
     slow: float = 3.0,
-    progress: Progress = None,
+    progress: Progress | None = None,
 ) -> Film:
     """Make a film as data; arguments as in `animate`.
 
@@ -73,8 +67,6 @@ def film_of(
     'Throw 1 of 1: flip from 21.00 in, side 2, to 16.55, side 0'
     """
     if isinstance(shown, str | Path):
-        from limitsets.feeder.scene import load
-
         shown = load(shown)
     if throws is not None and not (isinstance(throws, int) and throws >= 1):
         raise AnswerError("the throws", throws, "a whole number from 1", "show one at least")
@@ -96,7 +88,7 @@ def animate(
     throws: int | None = None,
     fps: float = 20.0,
     slow: float = 3.0,
-    progress: Progress = None,
+    progress: Progress | None = None,
 ) -> Path:
     """Write a film: the arm that swings up and stops, the part in flight and landing, and its place on the limit set.
 

@@ -14,10 +14,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from limitsets.base import AnswerError
-from limitsets.cell.feeding.falling import rate_about_end
+from limitsets.base.arrays import Array, Ints
+from limitsets.cell.feeding.falling import ArmEnd, rate_about_end
 from limitsets.face.animation.film import Asked, Film, Leg, Mark, Pace, cut, labels_of, require_length
 from limitsets.face.animation.legs import (
     LOWERS,
@@ -43,19 +43,16 @@ from limitsets.face.plot.throwing import (
     throws_of,
     turned,
 )
-from limitsets.feeder.engine.member import ground_of
-from limitsets.systems.maps import codes
+from limitsets.feeder.engine.member import Recording, ground_of
+from limitsets.feeder.scene import Cavity, Scene
+from limitsets.feeder.thrower import trace
+from limitsets.systems.maps import codes, orbit
 
 if TYPE_CHECKING:
     from limitsets.cell.assembly import Assembly
     from limitsets.cell.feeding import Feeding
-    from limitsets.cell.feeding.falling import ArmEnd
     from limitsets.cell.trays import TrayFill
-    from limitsets.feeder.engine.member import Recording
-    from limitsets.feeder.scene import Cavity, Scene
 
-
-Array = NDArray[np.float64]
 
 # Starts tried per side in the search for a good one; angles of the grid on which the first contact is searched.
 TRIED, ANGLES = 40, 400
@@ -110,9 +107,6 @@ def _fate(end: ArmEnd, throw: Throw) -> int:
 
 
 def _until_fed(end: ArmEnd, scene: Scene, x: float, side: int, throws: int) -> list[Throw]:
-    from limitsets.feeder.thrower import trace
-    from limitsets.systems.maps import orbit
-
     path = orbit(scene.map, x, side, throws)
     over = (path.x >= end.x) | end.at_edge(path.x, path.side)
     beyond = np.flatnonzero(over[1:])
@@ -328,8 +322,7 @@ def film_of_tray(filling: TrayFill, asked: Asked) -> Film:
     scene, passes = filling.scene, PASSES if asked.throws is None else asked.throws
     if filling.crowds:
         parts, depressions = filling.crowds[0].parts, filling.crowds[0].depressions
-        pouring = Pouring(filling.passes, parts, depressions, passes, filling.seed)
-        recording = pouring.film(0, last=passes)
+        recording = Pouring(filling.passes, parts, depressions, passes, filling.seed).film(0, last=passes)
         title = f"{scene.name}, {parts} parts a pass over {depressions} depressions"
     else:
         recording = filmed(scene, passes, seed=filling.seed)
@@ -375,7 +368,7 @@ def _frames(
     return frames, thrown
 
 
-def _swung(recording: Recording, kept: NDArray[np.int64], shown: list[_Frame], thrown: list[float]) -> Array:
+def _swung(recording: Recording, kept: Ints, shown: list[_Frame], thrown: list[float]) -> Array:
     """Let the parts that are thrown lie on the arm while it swings."""
     poses: Array = recording.poses[kept].copy()
     for frame, each in enumerate(shown):
@@ -391,13 +384,12 @@ def _marks(recording: Recording, at: Array, thrown: list[float]) -> tuple[Mark, 
     for time, part, word in sorted(recording.marks):
         if time <= at[-1]:
             frame = int(np.searchsorted(at, time))
-            until = next((int(np.searchsorted(at, each)) for each in thrown if each > time), at.size)
-            until = min(until, frame + BRIEFLY)
+            next_throw = next((int(np.searchsorted(at, each)) for each in thrown if each > time), at.size)
             number = min(int(np.searchsorted(recording.times, time)), recording.times.size - 1)
             corners = recording.corners(number, part)
             x, y = corners[int(np.argmin(corners[:, 1]))].tolist()
             if math.isfinite(x):
-                marks.append(Mark(frame, until, part, word, x, y))
+                marks.append(Mark(frame, min(next_throw, frame + BRIEFLY), part, word, x, y))
     return tuple(marks)
 
 

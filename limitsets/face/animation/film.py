@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base import AnswerError
+from limitsets.base import AnswerError, Progress
+from limitsets.base.arrays import Array, Ints
 from limitsets.face.plot.throwing import about_centre, turned
+from limitsets.feeder.geometry import side_ends
+from limitsets.feeder.scene import Scene
 
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-
-
-Array = NDArray[np.float64]
 Extents = dict[int, list[tuple[float, float]]]
 
 
@@ -146,14 +144,14 @@ class Film:
     ground: tuple[Array, ...]
     captions: tuple[str, ...]
     notes: tuple[str, ...]
-    caption: NDArray[np.int64]
-    note: NDArray[np.int64]
-    trail: NDArray[np.int64]
+    caption: Ints
+    note: Ints
+    trail: Ints
     marks: tuple[Mark, ...]
     rests: tuple[Rest, ...]
     lanes: Lanes | None
     position: Array
-    stage: NDArray[np.int64]
+    stage: Ints
     view: tuple[tuple[float, float], ...] = ()
 
     @property
@@ -283,7 +281,7 @@ class Asked(NamedTuple):
     throws: int | None
     fps: float
     slow: float
-    progress: Any = None
+    progress: Progress | None = None
 
     def pace(self, scene: Scene) -> Pace:
         """Give the pace; it is in seconds if the scene has gravity."""
@@ -300,15 +298,37 @@ def require_length(frames: int) -> None:
 def labels_of(scene: Scene) -> tuple[Label, ...]:
     """Put the number of each side inside the part, next to the middle of the side."""
     corners = about_centre(scene)
-    n, labels = len(corners), []
-    size = float(np.abs(corners).max())
-    for side in range(n):
-        left, right = corners[-side % n], corners[(1 - side) % n]
-        middle, along = 0.5 * (left + right), right - left
-        inward = np.array([-along[1], along[0]]) / float(np.hypot(*along))
-        x, y = (middle + 0.1 * size * inward).tolist()
-        labels.append(Label(str(side), x, y))
-    return tuple(labels)
+    ends = np.array([side_ends(len(corners), side) for side in range(len(corners))])
+    left, right = corners[ends[:, 0]], corners[ends[:, 1]]
+    along = right - left
+    inward = np.stack([-along[:, 1], along[:, 0]], axis=-1) / np.hypot(*along.T)[:, None]
+    places = 0.5 * (left + right) + 0.1 * float(np.abs(corners).max()) * inward
+    return tuple(Label(str(side), x, y) for side, (x, y) in enumerate(places.tolist()))
+
+
+def _events(
+    legs: Sequence[Leg], counts: Sequence[int], firsts: Sequence[int]
+) -> tuple[list[Mark], list[Rest], list[tuple[int, int]]]:
+    """Give the marks, the rests, and for each frame the frames between which the path is shown."""
+    begins = [0, *(first for leg, first in zip(legs, firsts[:-1], strict=True) if leg.begins)]
+    marks: list[Mark] = []
+    rests: list[Rest] = []
+    trails: list[tuple[int, int]] = []
+    begin, last, drawn = 0, 0, False  # of the path that is shown
+    for leg, count, (first, after) in zip(legs, counts, pairwise(firsts), strict=True):
+        if leg.begins:
+            begin = last = first
+        if leg.trail and not drawn:
+            begin = max(first - 1, 0)
+        trails += [(begin, frame if leg.trail else last) for frame in range(first, after)]
+        last, drawn = trails[-1][1], leg.trail
+        for at, word, x, y in leg.marks:
+            frame = after - 1 - round((1.0 - at) * count)
+            until = next((k for k in begins if k > frame), firsts[-1])
+            marks.append(Mark(frame, until, 0, word, x, y))
+        if leg.rest is not None:
+            rests.append(Rest(max(k for k in begins if k < after), after - 1, *leg.rest))
+    return marks, rests, trails
 
 
 def cut(
@@ -326,62 +346,39 @@ def cut(
     """Cut legs of one part's motion into frames: each leg ends at a frame, and the first begins at one."""
     counts = [max(1, round(leg.seconds * pace.fps)) for leg in legs]
     require_length(sum(counts) + 1)
-    columns: dict[str, list[Any]] = {word: [] for word in ("times", "poses", "arm", "position", "trail")}
-    texts: dict[str, list[int]] = {"caption": [], "note": [], "stage": []}
-    captions, notes = (
-        list(dict.fromkeys(leg.caption for leg in legs)),
-        list(dict.fromkeys(leg.note for leg in legs)),
-    )
-    marks: list[tuple[int, str, float, float]] = []
-    rests: list[Rest] = []
-    frame, trail, clock, before, begins = 0, [0, 0], 0.0, False, [0]
-    for number, (leg, count) in enumerate(zip(legs, counts, strict=True)):
-        share = np.arange(0 if number == 0 else 1, count + 1) / count
-        columns["times"].append(clock + share * leg.seconds / pace.unit)
-        columns["poses"].append(leg.pose(share))
-        columns["arm"].append(leg.arm(share))
-        columns["position"].append(leg.lane(share))
-        if leg.begins:
-            begins, trail = [*begins, frame], [frame, frame]
-        if leg.trail and not before:
-            trail = [max(frame - 1, 0), frame]
-        for k in range(share.size):
-            trail = [trail[0], frame + k] if leg.trail else trail
-            columns["trail"].append(trail)
-        texts["caption"] += [captions.index(leg.caption)] * share.size
-        texts["note"] += [notes.index(leg.note)] * share.size
-        texts["stage"] += [leg.stage] * share.size
-        last = frame + share.size - 1
-        marks += [(last - round((1.0 - at) * count), word, x, y) for at, word, x, y in leg.marks]
-        if leg.rest is not None:
-            rests.append(Rest(begins[-1], last, *leg.rest))
-        frame, clock, before = last + 1, clock + leg.seconds / pace.unit, leg.trail
-    shown = []
-    for at, word, x, y in marks:
-        until = next((k for k in begins if k > at), frame)
-        shown.append(Mark(at, until, 0, word, x, y))
+    shares = [np.arange(int(number > 0), count + 1) / count for number, count in enumerate(counts)]
+    # the first frame of each leg, and the number of frames
+    firsts = [0, *(1 + np.cumsum(counts)).tolist()]
+    clock = np.cumsum([0.0, *(leg.seconds / pace.unit for leg in legs[:-1])])  # when each leg begins
+    marks, rests, trails = _events(legs, counts, firsts)
+    cuts = list(zip(legs, shares, strict=True))
+    captions = list(dict.fromkeys(leg.caption for leg in legs))
+    notes = list(dict.fromkeys(leg.note for leg in legs))
+    of_leg = np.repeat(np.arange(len(legs)), [share.size for share in shares])
     return Film(
         title,
         scene.unit,
         pace.clock,
         fps=pace.fps,
         about="; ".join(words for words in (pace.words, about) if words),
-        times=np.concatenate(columns["times"]),
-        poses=np.concatenate(columns["poses"])[:, None, :],
+        times=np.concatenate(
+            [at + share * leg.seconds / pace.unit for at, (leg, share) in zip(clock, cuts, strict=True)]
+        ),
+        poses=np.concatenate([leg.pose(share) for leg, share in cuts])[:, None, :],
         outlines=(about_centre(scene),),
         labels=(labels_of(scene),),
-        arm=np.concatenate(columns["arm"]),
+        arm=np.concatenate([leg.arm(share) for leg, share in cuts]),
         surface=(scene.surface_height, scene.arm_length if end is None else end),
         ground=tuple(ground),
         captions=tuple(captions),
         notes=tuple(notes),
-        caption=np.array(texts["caption"]),
-        note=np.array(texts["note"]),
-        trail=np.array(columns["trail"]),
-        marks=tuple(shown),
+        caption=np.array([captions.index(leg.caption) for leg in legs])[of_leg],
+        note=np.array([notes.index(leg.note) for leg in legs])[of_leg],
+        trail=np.array(trails),
+        marks=tuple(marks),
         rests=tuple(rests),
         lanes=lanes,
-        position=np.concatenate(columns["position"]),
-        stage=np.array(texts["stage"]),
+        position=np.concatenate([leg.lane(share) for leg, share in cuts]),
+        stage=np.array([leg.stage for leg in legs])[of_leg],
         view=tuple(view),
     )

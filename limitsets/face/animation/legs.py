@@ -7,36 +7,29 @@ acceleration, so that the arm reaches the speed of the throw when it stops.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from limitsets.base import AnswerError
+from limitsets.base import AnswerError, Progress
+from limitsets.base.arrays import Array
 from limitsets.face.animation.film import Lanes, Leg, Pace
 from limitsets.face.plot.style import stretch
-from limitsets.face.plot.throwing import Throw, angle_on_side, motion, stroke_of
+from limitsets.face.plot.throwing import CONTACTS, Throw, angle_on_side, motion, stroke_of
 from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-    from limitsets.parameters.analysis import Analysis
-
+from limitsets.feeder.scene import Scene
+from limitsets.parameters.analysis import Analysis, analyse
 
 # ----------------------------------------------------------------
 # The lanes beside the film: limit sets, critical points and the goal, from an analysis; and a good start.
 
 
-Progress = Any
-
 # Cells per side: enough for a picture a few hundred pixels wide.
 CELLS = 1024
 
 
-def known_of(scene: Scene, progress: Progress = None, **more: Any) -> tuple[Analysis, Lanes]:
+def known_of(scene: Scene, progress: Progress | None = None, **more: Any) -> tuple[Analysis, Lanes]:
     """Analyse a scene, which chooses its effects if they are `auto`, and give the lanes of the analysis."""
-    from limitsets.parameters.analysis import analyse
-
     analysis = analyse(scene, CELLS, progress=progress)
     return analysis, lanes_of(analysis.scene, analysis, **more)
 
@@ -84,8 +77,6 @@ def require_start(scene: Scene, start: tuple[float, int]) -> tuple[float, int]:
 # The legs of one throw: the arm goes down, swings up and stops; the part flies, strikes, turns and rests.
 
 
-Array = NDArray[np.float64]
-
 SWING = math.radians(12.0)
 """Angle of the arm's swing if the scene has no stroke; half of it if there is a cavity at the end."""
 
@@ -100,7 +91,7 @@ def drawn_of(scene: Scene) -> str:
         said.append("the swing of the arm and the pauses are drawn, the throw is impulsive")
     if scene.flight != "exact" or scene.flip != "signed":
         said.append("the way from the impact to rest is drawn: these formulas have none")
-    on = [name for name in ("slip", "pivot", "bounce") if getattr(scene.effects, name)]
+    on = [name for name in CONTACTS if getattr(scene.effects, name)]
     if on:
         said.append(
             f"the way from the first impact to rest is drawn ({', '.join(on)}); its ends are the map's"
@@ -191,14 +182,13 @@ def legs_of(
     broken = "; another corner would land first, which the model leaves out" if throw.other_first else ""
     kind_of_throw = f"a {throw.word}" if throw.code >= 0 else throw.word
     flown = moves.turning
-    jumps = throw.turned
 
     def turning_lane(share: Array) -> Array:
         poses = flown.pose(share)
         end = poses[-1] if share[-1] >= 1.0 else flown.pose(np.ones(1))[0]
         way = end[2] - moves.impact[2]
         turned = (poses[:, 2] - moves.impact[2]) / way if abs(way) > 1e-9 else share
-        lane = throw.side + (throw.side_after - throw.side) * (turned if jumps else 0.0 * share)
+        lane = throw.side + (throw.side_after - throw.side) * (turned if throw.turned else 0.0 * share)
         return np.stack([poses[:, 0], np.clip(lane, 0, len(scene.sides) - 1)], axis=-1)
 
     level = np.zeros_like

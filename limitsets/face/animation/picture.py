@@ -11,23 +11,18 @@ import math
 import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.face.animation.film import Extents, Film, Lanes
 from limitsets.face.plot import style
 from limitsets.face.plot.throwing import turned
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-
+from limitsets.feeder.scene import Scene
 
 # ---------------------------------------------------------------- Things to draw, in pixels from the upper left
 
-
-Array = NDArray[np.float64]
 
 TEXT = {"fill": style.INK, "size": 14.0}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -18,7 +18,7 @@ from matplotlib.patches import Circle, Polygon
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from limitsets.base import as_plain
+from limitsets.base import Progress, as_plain
 from limitsets.face.animation.film import Film
 from limitsets.face.animation.picture import (
     ARM,
@@ -39,7 +39,6 @@ from limitsets.face.plot import style
 # Frames as pixels, by matplotlib: fixed shapes are drawn once.
 
 
-Progress = Callable[[str, int, int], None] | None
 Pixels = NDArray[np.uint8]
 
 DPI = 100.0
@@ -49,7 +48,7 @@ POINTS = 72.0 / DPI
 ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 
 
-def frames(picture: Picture, zoom: float = 1.0, progress: Progress = None) -> Iterator[Pixels]:
+def frames(picture: Picture, zoom: float = 1.0, progress: Progress | None = None) -> Iterator[Pixels]:
     """Draw frame after frame, enlarged so many times; each of shape (height, width, 3), both even."""
     width, height = picture.size
     wide, tall = 2 * round(0.5 * zoom * width), 2 * round(0.5 * zoom * height)
@@ -96,15 +95,12 @@ def _artist(shape: Shape) -> Any:
 # space.
 
 
-FPS = 20.0
-"""Delays are whole hundredths of a second."""
-
 ZOOM = 0.9
 # Shades between a colour and white, for soft edges; and frames that are asked for their colours.
 SHADES, ASKED = (0.0, 0.35, 0.7), 25
 
 
-def write_gif(film: Film, file: Path, progress: Progress = None) -> None:
+def write_gif(film: Film, file: Path, progress: Progress | None = None) -> None:
     """Write a film that plays in a loop."""
     from PIL import Image
 
@@ -115,7 +111,7 @@ def write_gif(film: Film, file: Path, progress: Progress = None) -> None:
         Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE)
         for pixels in frames(picture, ZOOM, progress)
     ]
-    delay = 10 * round(100.0 / film.fps)
+    delay = 10 * round(100.0 / film.fps)  # a GIF has whole hundredths of a second
     pictures[0].save(file, "GIF", append_images=pictures[1:], duration=delay, **options)
 
 
@@ -141,7 +137,7 @@ DIGITS = 6
 BESIDE = ("caption", "note", "clock", "about")
 
 
-def write_page(film: Film, file: Path, progress: Progress = None) -> None:
+def write_page(film: Film, file: Path, progress: Progress | None = None) -> None:
     """Write a film."""
     from jinja2 import Environment, StrictUndefined
 

@@ -179,9 +179,10 @@ def fit(run: Run, scene: Scene, file: Path, *, error: str | None = None, no_marg
         drawn = [("part", ls.plot.part(estimates.scene)), ("residuals", ls.plot.fit_residuals(estimates))]
         run.write(drawn, {"fitted.toml": ls.dump(estimates.scene), "fit.json": record})
 
-    def words() -> list[str | Table]:
-        sentences = () if judged is None else judged.sentences
-        return [estimates.table(), *report.pages.lines_of(estimates), *sentences]
-
-    settled = judged is None or judged.verdict == "enough"
-    return Answer(record, words, estimates.table, code=0 if settled else 1)
+    sentences = () if judged is None else judged.sentences
+    return Answer(
+        record,
+        lambda: [estimates.table(), *report.pages.lines_of(estimates), *sentences],
+        estimates.table,
+        code=0 if judged is None or judged.verdict == "enough" else 1,
+    )

@@ -135,8 +135,6 @@ def _end(reason: str, code: int) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    import typer
-
     usage_error: Any = typer.BadParameter.__base__
     refused: Any = usage_error.__base__
     words = list(sys.argv[1:] if arguments is None else arguments)

@@ -102,8 +102,7 @@ def laid_ranges(words: list[str] | None) -> dict[int, list[tuple[float | str, fl
         "name a side, the sign =, and two places with : between them, like 0=8:20",
     )
     for side, text in named(words, "--laid", thing, form="SIDE=LO:HI", remedy=remedy, once=False):
-        lo, _, hi = text.partition(":")
-        ends = [number(end.strip("'\" ")) for end in (lo, hi)]
+        ends = [number(end.strip("'\" ")) for end in text.split(":")]
         units = [end.lstrip("+-.0123456789eE").strip() for end in ends if isinstance(end, str)]
         if len(units) == 1:
             ends = [f"{end!r} {units[0]}" if isinstance(end, float) else end for end in ends]
@@ -173,17 +172,6 @@ def _question_of(file: Path) -> tuple[Any, ...]:
     return ()
 
 
-def say_replaced(file: Path, draft: Path) -> None:
-    """Say that a certificate of other values or deviations gives way to a draft.
-
-    It may be the last that knows those values; not to replace it would be in the way of everyone who edits a scene and
-    proves again.  What differs is known once the new one is written, for both have one form then.
-    """
-    before, after = _question_of(file), _question_of(draft)
-    if before and after and before != after:
-        say_other("the certificate", file, before[0]["name"])
-
-
 def with_ending(file: Path) -> Path:
     """Add the ending of certificates to a name without one; an existing folder or device keeps its name."""
     return file if file.suffix or file.exists() else file.with_name(f"{file.name}.proof.zip")
@@ -211,7 +199,11 @@ def certified(
             kept = str(file.with_name(Path(error.file or "").name))
             answer = answer.denied(error.claims if claim is None else error.claims[claim])
             return answer, written | {"file": kept, "denied": True, "recheck": time.perf_counter() - begin}
-        say_replaced(file, draft)
+        # A certificate of other values gives way: it may be the last that knows them, but not to replace it would be in
+        # the way of everyone who edits a scene and proves again.  What differs is known now: both have one form.
+        before, after = _question_of(file), _question_of(draft)
+        if before and after and before != after:
+            say_other("the certificate", file, before[0]["name"])
     return answer, written | {"file": str(file), "recheck": time.perf_counter() - begin if recheck else None}
 
 

@@ -15,7 +15,7 @@ from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limi
 from limitsets.face.cli.output import saved
 from limitsets.face.cli.subjects import (
     MapOfFile,
-    grid_of,
+    domain_of,
     of_map_alone,
     of_scene_alone,
     spans,
@@ -101,7 +101,7 @@ def certify(
         return _of_map(
             run,
             chosen,
-            grid_of(chosen, domain, cells or CELLS),
+            ls.grid(domain_of(chosen, domain), cells=cells or CELLS),
             words,
             boxes=boxes,
             recheck=not no_recheck,
@@ -131,8 +131,6 @@ def _of_scene(
     some = any(each.written for each in proof.claims)
     run.tell("recheck", 0, 1)
     proof, written = certified(proof, file, proved=some and not proof.effects, recheck=recheck)
-    again = {"recheck": written and written["recheck"]}
-    records = [each | {"timings": each["timings"] | again} for each in proof.to_json()]
     missing = "nothing rechecks maps with effects" if some and proof.effects else "nothing is proved"
 
     def words() -> Iterator[str | Table]:
@@ -142,7 +140,7 @@ def _of_scene(
             yield f"next: {report.pages.after_unproved(proof)}"
 
     code, about = 0 if proof.proved else 1, run.about(proof.model, chosen)
-    return Answer(records, words, proof.table, code=code, about=about)
+    return Answer(_records(proof, written), words, proof.table, code=code, about=about)
 
 
 def _of_map(
@@ -158,8 +156,6 @@ def _of_map(
         proof, written = certified(proof, file, proved=some, recheck=recheck)
     except AnswerError as error:  # of what is proved no file can be made: a function that cannot be recorded
         missing, (_, written) = str(error), certified(proof, file, proved=False, recheck=recheck)
-    again = {"recheck": written and written["recheck"]}
-    records = [each | {"timings": each["timings"] | again} for each in proof.to_json()]
 
     def words() -> Iterator[str | Table]:
         yield f"{chosen.name}: {proof.graph.n_cells} cells, {proof.seconds:.2g} s"
@@ -171,7 +167,13 @@ def _of_map(
             yield table
         yield from said_of(written, missing, partly=not proof.proved)
 
-    return Answer(records, words, proof.table, code=0 if proof.proved else 1)
+    return Answer(_records(proof, written), words, proof.table, code=0 if proof.proved else 1)
+
+
+def _records(proof: Any, written: dict[str, Any] | None) -> list[dict[str, Any]]:
+    """Give the claims as JSON, each with the time that the recheck took."""
+    again = {"recheck": written and written["recheck"]}
+    return [each | {"timings": each["timings"] | again} for each in proof.to_json()]
 
 
 def _text(proof: Proof) -> Iterator[str | Table]:

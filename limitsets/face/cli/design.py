@@ -278,9 +278,8 @@ def _of_margin(
     """Search and prove."""
     from limitsets.parameters.design.for_margin import NoDesignError
 
-    so_far = run.out
-    if run.out is not None and not is_scene_file(run):
-        so_far = run.out / f"{scene.name}-so-far.toml"
+    in_folder = run.out is not None and not is_scene_file(run)
+    so_far = run.folder / f"{scene.name}-so-far.toml" if in_folder else run.out
     try:
         design = ls.robust_design(
             scene,
@@ -295,10 +294,8 @@ def _of_margin(
         if none.miss is None:
             raise
         return _missed(run, none, scene, none.miss)
-    in_folder = run.out is not None and not is_scene_file(run)
-    if in_folder:
+    if in_folder and so_far is not None:
         design = _written(run, design, recheck=recheck)
-    if so_far is not None and so_far != run.out:
         so_far.unlink(missing_ok=True)
     proved = seconds == 0.0 or all(margin.proved > 0.0 for margin in design.margins)
     return designed(run, design, _text_of_margin(design), good=proved, drawn=None if in_folder else tuple)

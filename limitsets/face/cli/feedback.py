@@ -148,11 +148,8 @@ def _starts(scene: Any, words: list[str] | None, begin: str | None) -> Any:
             raise LimitsetsError("the starts", "--from and --starts", "one of them", "leave one out")
         return place(scene, begin)
     remedy = "name each side once, and two places with : between"
-    starts = {}
-    for side, span in named(words, "--starts", "the starts", form="SIDE=LO:HI", remedy=remedy):
-        lo, _, hi = span.partition(":")
-        starts[int(side)] = (place(scene, lo), place(scene, hi))
-    return starts or None
+    spans = named(words, "--starts", "the starts", form="SIDE=LO:HI", remedy=remedy)
+    return {int(side): tuple(place(scene, end) for end in span.split(":")) for side, span in spans} or None
 
 
 def _question(synthesis: Synthesis, tried: list[tuple[float, Synthesis]]) -> Iterator[str | Table]:

@@ -82,9 +82,11 @@ def _write(run: Run, given: tuple[Margin, ...], about: About, *, recheck: bool) 
 
     margins = tuple(settled(each, run.folder, recheck=recheck) for each in given)
     single = [each for each in margins if each.reading != "tolerance"]
-    drawn = [("part", ls.plot.part(given[0].scene))]
-    drawn += [("margins", ls.plot.tornado(single))] if single else []
-    drawn += [("joint", ls.plot.tolerance_box(each)) for each in margins if each.reading == "tolerance"]
+    drawn = [
+        ("part", ls.plot.part(given[0].scene)),
+        *([("margins", ls.plot.tornado(single))] if single else []),
+        *(("joint", ls.plot.tolerance_box(each)) for each in margins if each.reading == "tolerance"),
+    ]
     run.write(drawn, {"margins.json": about.added(margins)})
     return margins
 

@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from functools import cache
 from json import loads
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,10 +23,15 @@ if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene as SceneOf
 
 
-# Folders that this process locks until it ends.
-_LOCKED: set[Path] = set()
+# Locks of folders, held until this process ends.
 _LOCKS = ExitStack()
 atexit.register(_LOCKS.close)
+
+
+@cache
+def _lock(folder: Path) -> None:
+    """Lock a folder, once."""
+    _LOCKS.enter_context(locked(folder))
 
 
 # Width of a line in a pipe: larger than that of any table.
@@ -49,8 +55,7 @@ def show(listing: Table) -> None:
     # names are not broken if other columns can be: two names could look alike when cut
     whole = not any(" " in row[0] for row in rows)
     for number, head in enumerate(heads):
-        no_wrap = not fitted or (number == 0 and whole)
-        grid.add_column(markup.escape(head), no_wrap=no_wrap, overflow="fold")
+        grid.add_column(markup.escape(head), no_wrap=not fitted or (number == 0 and whole), overflow="fold")
     for row in rows:
         grid.add_row(*map(markup.escape, row))
     console.Console(width=None if fitted else LONGEST).print(grid)
@@ -61,10 +66,7 @@ def place_for(scene: SceneOf, folder: Path) -> None:
     from limitsets.face.report.writing import require_place
 
     require_place(folder)
-    place = folder.resolve()
-    if place not in _LOCKED:
-        _LOCKS.enter_context(locked(place))
-        _LOCKED.add(place)
+    _lock(folder.resolve())
     _require_own(folder, scene)
 
 
@@ -116,10 +118,8 @@ def saved(file: Path) -> Iterator[Path]:
         with replaced(file.parent) as draft:
             yield draft / file.name
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise LimitsetsError(
-            "the output file", str(file), "a place that can be written", f"it could not be: {reason}"
-        ) from None
+        reason = f"it could not be: {error.strerror or error}"
+        raise LimitsetsError("the output file", str(file), "a place that can be written", reason) from None
 
 
 class _Interrupts:

@@ -261,8 +261,7 @@ def explore(
     required()
     from limitsets.face.explorer.visits import stored_atlas
 
-    stored = scene is None and atlas is not None
-    about = stored_atlas(atlas)[0] if stored and atlas else subject(scene or FIRST, set_)
+    about = stored_atlas(atlas)[0] if scene is None and atlas is not None else subject(scene or FIRST, set_)
     if isinstance(about, MapOfFile):
         of_map_alone({"--atlas": atlas})
         explorer = ls.explore(about.one(), domain=domain_of(about, domain))

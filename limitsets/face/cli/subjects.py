@@ -22,7 +22,6 @@ from limitsets.face.cli.arguments import named, number
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
-    from limitsets.systems.cells import Grid
 
 FORM = re.compile(r"(?P<file>.+\.py)(?::(?P<name>[^:]*))?", re.DOTALL)
 
@@ -81,7 +80,8 @@ def subject(source: str, settings: list[str] | None = None) -> Scene | MapOfFile
     match = FORM.fullmatch(source)
     if match is None:
         return of_scene_alone(ls.load(source), {"--set": settings})
-    values = {name: _ends(name, text) for name, text in _pairs(settings)}
+    pairs = named(settings, "--set", "the value of a parameter", form="NAME=NUMBER", remedy="write a=1.4")
+    values = {name: _ends(name, text) for name, text in pairs}
     thing = _thing(Path(match["file"]), match["name"])
     lower, upper = (_made(thing, {name: ends[k] for name, ends in values.items()}) for k in (0, -1))
     return MapOfFile(match["name"], lower, upper)
@@ -103,10 +103,6 @@ def _require_none(given: dict[str, Any], beside: str, remedy: str) -> None:
         if value is not None:
             words = " ".join(value) if isinstance(value, list) else str(value)
             raise LimitsetsError(f"the option {option}", words, f"none beside {beside}", remedy)
-
-
-def _pairs(settings: list[str] | None) -> list[tuple[str, str]]:
-    return named(settings, "--set", "the value of a parameter", form="NAME=NUMBER", remedy="write a=1.4")
 
 
 def _ends(name: str, text: str) -> list[float]:
@@ -253,8 +249,3 @@ def domain_of(chosen: MapOfFile, text: str | None) -> list[tuple[float, float]]:
             f"the domain of {chosen.name}", text, allowed, f"write {example}", key="--domain"
         )
     return box
-
-
-def grid_of(chosen: MapOfFile, text: str | None, cells: int) -> Grid:
-    """Cut the domain of a map."""
-    return ls.grid(domain_of(chosen, text), cells=cells)

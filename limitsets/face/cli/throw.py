@@ -240,14 +240,21 @@ def animate(
     if feed + feedback + tray + (margin is not None) + (assemble is not None) > 1:
         value = "more than one of --feed, --feedback, --margin, --assemble, --tray"
         raise LimitsetsError("what to show", value, "one of them", "make a film of each")
-    if reading is not None and margin is None:
-        raise LimitsetsError("the reading", reading, "with --margin", "name the quantity", key="--reading")
-    if parts is not None and not tray:
-        raise LimitsetsError("the parts", parts, "with --tray", "ask for a tray", key="--parts")
-    if standing and assemble is None:
-        raise LimitsetsError(
-            "the cavity", "standing", "with --assemble", "name the other part", key="--standing"
-        )
+    # an option, what it says, and the option without which it means nothing
+    for option, thing, told, beside, given, remedy in (
+        ("--reading", "the reading", reading, "--margin", margin, "name the quantity"),
+        ("--parts", "the parts", parts, "--tray", tray or None, "ask for a tray"),
+        (
+            "--standing",
+            "the cavity",
+            "standing" if standing else None,
+            "--assemble",
+            assemble,
+            "name the other part",
+        ),
+    ):
+        if told is not None and given is None:
+            raise LimitsetsError(thing, told, f"with {beside}", remedy, key=option)
     from limitsets.face.animation import require_file
 
     chosen = ls.load(scene)

@@ -217,10 +217,9 @@ class Opening:
         self._draw.label = "Done: use these corners" if event.new else "Draw a part"
         if event.new:
             self._corners.value = ""
-            self._drawn([], True)
-            return
-        said(self._finished, self._say)
-        self._drawn([], False)
+        else:
+            said(self._finished, self._say)
+        self._drawn([], event.new)
 
     def _finished(self) -> None:
         corners = self._read_corners()

@@ -165,7 +165,7 @@ class AtlasPage:
         self._opened, self._say, self._asked = opened, say, Background()
         self._table: dict[str, Any] | None = None
         self._scene: Scene | None = None
-        self._knobs: tuple[Knob, ...] = ()
+        self._knobs: dict[str, Knob] = {}
         look: dict[str, Any] = {"stylesheets": [SLIDER]}
         self._x = pn.widgets.Select(label="across", width=190, **look)
         self._y = pn.widgets.Select(label="up", width=190, **look)
@@ -192,7 +192,7 @@ class AtlasPage:
 
     def follow(self, scene: Scene, knobs: tuple[Knob, ...]) -> None:
         """Take note of the scene that is shown."""
-        self._scene, self._knobs = scene, knobs
+        self._scene, self._knobs = scene, {knob.name: knob for knob in knobs}
         names = {knob.title: knob.name for knob in knobs}
         if self._x.options != names:
             self._x.options, self._y.options = names, names
@@ -207,12 +207,12 @@ class AtlasPage:
             )
             return
         self._say("")
-        lines = {}
-        for word, name in (("x", self._x.value), ("y", self._y.value)):
-            knob = next(each for each in self._knobs if each.name == name)
-            lines[word] = f"{name}={written(knob.lo, knob.unit)}:{written(knob.hi, knob.unit)}:{POINTS}"
+        x, y = (
+            f"{knob.name}={written(knob.lo, knob.unit)}:{written(knob.hi, knob.unit)}:{POINTS}"
+            for knob in (self._knobs[self._x.value], self._knobs[self._y.value])
+        )
         self._words.object = '<p role="status">the atlas is being computed</p>'
-        self._asked.ask({"what": "atlas", "scene": dump(self._scene), **lines})
+        self._asked.ask({"what": "atlas", "scene": dump(self._scene), "x": x, "y": y})
 
     def tell(self) -> None:
         """Show the answers."""
@@ -237,9 +237,12 @@ class AtlasPage:
         marks = [(k + 1, numbers == each["number"]) for k, each in enumerate(table["classes"])]
         places = [(k, *widest(where)[0]) for k, where in marks if where.any()]
         self._canvas.put("numbers", [(x["values"][j], y["values"][i], str(k)) for k, i, j in places])
-        names = (f"{axis['name']} [{axis['unit']}]" for axis in (x, y))
-        view = {"x": [across[0], across[-1]], "y": [up[0], up[-1]]}
-        self._canvas.view |= {**view, **dict(zip(("across", "up"), names, strict=True))}
+        self._canvas.view |= {
+            "x": [across[0], across[-1]],
+            "y": [up[0], up[-1]],
+            "across": f"{x['name']} [{x['unit']}]",
+            "up": f"{y['name']} [{y['unit']}]",
+        }
         self._canvas.heading = "atlas: arrow keys choose a point, Enter opens it"
         self._canvas.visible = True
         rows = "".join(
@@ -256,13 +259,10 @@ class AtlasPage:
         """Mark the place of the page's scene, if it lies in the atlas."""
         if self._table is None or self._scene is None:
             return
-        values = {knob.name: knob for knob in self._knobs}
-        names = [axis["name"] for axis in self._table["axes"]]
-        if all(
-            name in values and values[name].unit == axis["unit"]
-            for name, axis in zip(names, self._table["axes"], strict=True)
-        ):
-            self._canvas.put("here", [[values[name].value for name in names]])
+        knobs = [self._knobs.get(axis["name"]) for axis in self._table["axes"]]
+        units = [axis["unit"] for axis in self._table["axes"]]
+        if all(knob and knob.unit == unit for knob, unit in zip(knobs, units, strict=True)):
+            self._canvas.put("here", [[knob.value for knob in knobs if knob]])
         self._canvas.send()
 
     def _touched(self, hand: Hand) -> None:

@@ -265,11 +265,6 @@ class Sliders:
         self._fields: dict[str, Any] = {}
         self.column = pn.Column(sizing_mode="stretch_width")
 
-    @property
-    def has_centre(self) -> bool:
-        """Whether there are sliders of the centre of mass."""
-        return "part.mass.center.along" in self.values
-
     def open(self, knobs: tuple[Knob, ...]) -> None:
         """Show these knobs; sliders of the same quantities are kept, and the keyboard's focus with them."""
         if [knob[:3] for knob in knobs] == [knob[:3] for knob in self.knobs]:

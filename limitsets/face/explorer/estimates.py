@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from limitsets.base import LimitsetsError, shown
+from limitsets.base.arrays import Array
 from limitsets.face.plot.basin import strips_of
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.geometry.polygon import above_side
@@ -398,7 +398,7 @@ class Points(NamedTuple):
         Number of the other orbits, by the place where they left, in words.
     """
 
-    x: npt.NDArray[np.float64]
+    x: Array
     starts: int
     gone: dict[str, int]
 
@@ -434,7 +434,7 @@ def points_of_map(params: Any, domain: Domain) -> Points:
     return Points(np.concatenate(samples), STARTS * domain.sides, dict(gone))
 
 
-def _fate(path: Orbit, lo: npt.NDArray[np.float64], hi: npt.NDArray[np.float64]) -> str:
+def _fate(path: Orbit, lo: Array, hi: Array) -> str:
     """Say where an orbit leaves the surroundings of the domain, `FAR` times its size; empty if it stays."""
     far = (path.x - 0.5 * (lo + hi)) / (hi - lo)
     gone = np.flatnonzero(~(np.abs(far) <= FAR).all(axis=1))

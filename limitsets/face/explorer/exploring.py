@@ -78,5 +78,4 @@ def explore(
         return Explorer.of_map(scene, domain)
     if domain is not None:
         raise AnswerError("the domain", "given", "none beside a scene", "a scene has one: leave it out")
-    loaded = load(scene)
-    return Explorer.of_scene(loaded, None if atlas is None else Path(atlas))
+    return Explorer.of_scene(load(scene), None if atlas is None else Path(atlas))

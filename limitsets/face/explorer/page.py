@@ -115,15 +115,11 @@ class MapPage(Page):
         if not self._dirty:
             return
         self._dirty = self._told = False
-        try:
-            self._redraw(map_with(self._params, self.sliders.values))
-        except LimitsetsError as error:
-            self.say(error)
-        else:
-            self.say()
+        said(self._redraw, self.say)
         self._canvas.send()
 
-    def _redraw(self, params: Any) -> None:
+    def _redraw(self) -> None:
+        params = map_with(self._params, self.sliders.values)
         if self.points is not None:
             points = points_of_map(params, self._domain)
             self.points.show(points.x)
@@ -135,6 +131,7 @@ class MapPage(Page):
                 self._refit = False
             self.lanes.show(answer)
             self._words = estimate_words(answer, None, "")
+        self.say()
 
     def close(self) -> None:
         """Do nothing: a map has no running computations."""
@@ -243,10 +240,7 @@ class ScenePage(Page):
         """Do the next step: draw changes, show the next frame of a film, ask for proofs, show their answers."""
         if self._dirty:
             self._dirty = False
-            try:
-                self._redraw(scene_with(self.base, self.sliders.knobs, self.sliders.values))
-            except LimitsetsError as error:
-                self.say(error)
+            said(self._redraw, self.say)
         else:
             if not self._asked and time.monotonic() - self._last > RESTS:
                 self._ask()
@@ -261,7 +255,8 @@ class ScenePage(Page):
         self._tell(self._proofs.answers())
         self.atlas.tell()
 
-    def _redraw(self, scene: Scene) -> None:
+    def _redraw(self) -> None:
+        scene = scene_with(self.base, self.sliders.knobs, self.sliders.values)
         answer = estimate(scene)
         self.scene = scene
         self.say()
@@ -341,7 +336,8 @@ class ScenePage(Page):
         if hand.what == "tap":
             self.opening.corner(hand.x, hand.y)
         elif hand.what == "grasp":
-            self._holding = self.sliders.has_centre and self.part.is_at_mark(hand.x, hand.y)
+            movable = "part.mass.center.along" in self.sliders.values
+            self._holding = movable and self.part.is_at_mark(hand.x, hand.y)
         elif hand.what == "release":
             self._holding = False
         elif self._holding:

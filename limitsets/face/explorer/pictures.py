@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from limitsets.base.arrays import Array
 from limitsets.face.animation.film import Film, Pace, cut, labels_of
 from limitsets.face.animation.legs import rest_leg
 from limitsets.face.explorer.canvas import Canvas, Hand, Layer
@@ -18,8 +18,6 @@ from limitsets.face.plot.throwing import turned
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.units import convert, parse
-
-Array = npt.NDArray[np.float64]
 
 PART, ARM, TRAIL = "#F2C14E", "#9a9a9a", "#666666"
 # Thickness of the arm, as a share of its length.

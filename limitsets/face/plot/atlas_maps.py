@@ -9,23 +9,26 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.patheffects import Normal, Stroke, withTickedStroke
 from scipy.ndimage import distance_transform_edt, label
 
 from limitsets.base import AnswerError, arguments_checked
+from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.face.plot import style
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import load
 from limitsets.feeder.scene.quantities import base_unit, find
 from limitsets.feeder.scene.units import exact_factor
+from limitsets.parameters.atlas import Atlas
 from limitsets.parameters.atlas.classes import (
     UNDECIDED,
     AttractorKind,
@@ -35,13 +38,6 @@ from limitsets.parameters.atlas.classes import (
     named_class,
     numbers_of,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from limitsets.parameters.atlas import Atlas
-
 
 # ----------------------------------------------------------------
 # What the pictures of an atlas share: axes, pixels about the points, hatches, and the mark of the scene itself.
@@ -78,7 +74,7 @@ def frame(answers: Atlas, tall: float = 0.0) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def edges(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def edges(values: Array) -> Array:
     """Give the edges of pixels about values: half way between them."""
     if values.size == 1:
         return np.array([values[0] - 0.5, values[0] + 0.5])
@@ -86,7 +82,7 @@ def edges(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
 
 
-def pixels(answers: Atlas) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def pixels(answers: Atlas) -> tuple[Array, Array]:
     """Edges of the pixels along x and along y."""
     data, names = answers.dataset, answers.axes
     across = edges(data[names[-1]].values)
@@ -95,9 +91,9 @@ def pixels(answers: Atlas) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.floa
 
 def hatched(
     axes: Axes,
-    x: npt.NDArray[np.float64],
-    y: npt.NDArray[np.float64],
-    where: npt.NDArray[np.bool_],
+    x: Array,
+    y: Array,
+    where: Mask,
     hatch: str,
 ) -> None:
     """Hatch pixels, given their edges."""
@@ -338,16 +334,14 @@ def _words(number: int, entry: Entry) -> str:
     return "\n".join(lines).replace("\N{NO-BREAK SPACE}", " ")
 
 
-def _paint(
-    axes: Axes, answers: Atlas, rows: npt.NDArray[np.int64], looks: Mapping[int, dict[str, Any]]
-) -> None:
+def _paint(axes: Axes, answers: Atlas, rows: Ints, looks: Mapping[int, dict[str, Any]]) -> None:
     """Paint the classes, their hatches, and lines between them."""
     x, y = pixels(answers)
     picture = np.ones((*rows.shape, 3))
     for number, look in looks.items():
         picture[rows == number] = to_rgb(look["facecolor"])
     axes.pcolorfast(x, y, picture, zorder=1)
-    for hatch in {look["hatch"] for look in looks.values()} - {""}:
+    for hatch in sorted({look["hatch"] for look in looks.values()} - {""}):
         numbers = [number for number, look in looks.items() if look["hatch"] == hatch]
         hatched(axes, x, y, np.isin(rows, numbers), hatch)
     (i, j), (k, m) = np.nonzero(rows[:, 1:] != rows[:, :-1]), np.nonzero(rows[1:] != rows[:-1])
@@ -359,7 +353,7 @@ def _paint(
         axes.add_collection(lines, autolim=False)
 
 
-def _label(axes: Axes, answers: Atlas, where: npt.NDArray[np.bool_], words: str) -> None:
+def _label(axes: Axes, answers: Atlas, where: Mask, words: str) -> None:
     """Write the number of a class into its largest region, at the point farthest from the region's edge."""
     if len(answers.axes) == 1:
         where = np.repeat(where, max(where.size // 4, 3), axis=0)
@@ -375,7 +369,7 @@ def _label(axes: Axes, answers: Atlas, where: npt.NDArray[np.bool_], words: str)
     axes.text(x, y, words, ha="center", va="center", fontsize=style.SMALL, bbox=box, zorder=5, gid="number")
 
 
-def widest(where: npt.NDArray[np.bool_]) -> tuple[tuple[int, int], float]:
+def widest(where: Mask) -> tuple[tuple[int, int], float]:
     """Give the point that is farthest from the edge of a region, and its distance from there."""
     room = distance_transform_edt(np.pad(where, 1))[1:-1, 1:-1]
     row, column = np.unravel_index(int(room.argmax()), room.shape)

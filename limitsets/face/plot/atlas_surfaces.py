@@ -7,11 +7,11 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import Patch
 
 from limitsets.base import AnswerError, arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.face.plot import style
 from limitsets.face.plot.atlas_maps import frame, hatched, mark, pixels, title_of
 from limitsets.feeder.scene import load
@@ -20,13 +20,10 @@ from limitsets.feeder.scene.quantities import NAMES, base_unit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from limitsets.parameters.atlas import Atlas
     from limitsets.parameters.continuation import Continuation
 
-
-Array = npt.NDArray[np.float64]
 
 # A map of colours that looks even, also in grey and to colour-blind readers.
 COLOURS = "cividis"
@@ -257,7 +254,7 @@ def _scale(continuation: Continuation, name: str) -> tuple[float, str]:
     return 1.0, f"{name} [{unit}]"
 
 
-def _bands(axes: Axes, continuation: Continuation, side: int, along: NDArray[np.float64]) -> None:
+def _bands(axes: Axes, continuation: Continuation, side: int, along: Array) -> None:
     """Draw the bands of one side between neighbouring steps with the same number of bands."""
     for number in continuation.numbers:
         areas: list[Any] = []
@@ -278,7 +275,7 @@ def _bands(axes: Axes, continuation: Continuation, side: int, along: NDArray[np.
     axes.autoscale_view()
 
 
-def _critical(axes: Axes, continuation: Continuation, side: int, along: NDArray[np.float64]) -> None:
+def _critical(axes: Axes, continuation: Continuation, side: int, along: Array) -> None:
     counts = [len(points[side]) for points in continuation.critical]
     for run in np.split(np.arange(len(counts)), np.flatnonzero(np.diff(counts)) + 1):
         for number in range(counts[run[0]] if run.size > 1 else 0):

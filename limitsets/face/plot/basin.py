@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import networkx as nx
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Patch
 
 from limitsets.base import AnswerError, arguments_checked
@@ -18,19 +21,13 @@ from limitsets.feeder.scene import Scene
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import TransitionGraph, morse_graph
 from limitsets.systems.maps import codes, kind_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.typing import ColorType
-
-    from limitsets.systems.sets import Basins
-
+from limitsets.systems.sets import Basins
 
 # Lightness falls, so that neighbours differ in grey as well; in strips they also differ by hatches.
 ATTRACTORS = ("#CFE5F5", "#F0B429", "#5FB59B", "#B5548A", "#3F4E96", "#2B2A1E")
 HATCHES = ("", "///", "...", "\\\\\\", "xxx", "+++")
 EDGE: dict[str, Any] = {"edgecolor": "#444444", "lw": 0.4}
+INSIDE = ListedColormap([style.FLIP])
 OUT: dict[int, tuple[str, str, str]] = {
     codes.INWARD: ("#6E6E6E", "ooo", "leaves inward"),
     codes.OUTWARD: ("#3A3A3A", "", "leaves outward"),
@@ -75,9 +72,8 @@ def basins(source: Any, shares: Basins, found: Any = None) -> Figure:
             "the dimension of the basins", grid.dimension, "1 or 2", "draw a section of them yourself"
         )
     (name, unit), line = _words(source), grid.dimension == 1
-    sets: list[Any] = []
-    if found is not None:
-        sets = style.extents_of(found) if line else _cells_of(found)
+    read: Callable[[Any], list[Any]] = style.extents_of if line else _cells_of
+    sets = [] if found is None else read(found)
     figure = _strips(shares, sets, unit) if line else _plane(shares, sets)
     inside = Patch(facecolor=style.INK if line else style.FLIP, label="the limit set itself")
     drawn = found is not None if line else any(sets)
@@ -122,9 +118,8 @@ def _strips(shares: Basins, sets: list[style.Extents], unit: str) -> Figure:
         for side, parts in extents.items():
             style.bars(axes, parts, -side, 0.07, **look)
     style.lanes(axes, {-side: f"side {side}" for side in range(grid.sides)}, style.TEXT)
-    lo, hi = float(grid.domain.lo.min()), float(grid.domain.hi.max())
-    axes.set(xlim=style.widened(lo, hi, 0.01), ylim=(-grid.sides + 0.5, 0.5))
-    axes.set_xlabel(f"x of the start{unit}")
+    ends = style.widened(float(grid.domain.lo.min()), float(grid.domain.hi.max()), 0.01)
+    axes.set(xlim=ends, ylim=(-grid.sides + 0.5, 0.5), xlabel=f"x of the start{unit}")
     return figure
 
 
@@ -143,17 +138,16 @@ def _plane(shares: Basins, attractors: list[CellSet]) -> Figure:
     grid = shares.grid
     figure, panels = style.canvas(4.6 * grid.sides + 0.6, 5.2, 1, grid.sides)
     kinds = sorted(set(shares.labels.tolist()))
-    colours: list[ColorType] = [_look(kind)["facecolor"] for kind in kinds]
+    colours = ListedColormap([_look(kind)["facecolor"] for kind in kinds])
     number = np.searchsorted(kinds, shares.labels)
     norm = BoundaryNorm(np.arange(len(kinds) + 1) - 0.5, len(kinds))
     for side, axes in enumerate(panels):
         picture = number[grid.of_side(side)].reshape(tuple(grid.shape[side]))
-        look: dict[str, Any] = {"rasterized": True, "cmap": ListedColormap(colours)}
-        axes.pcolormesh(*grid.edges[side], picture.T, norm=norm, **look)
+        axes.pcolormesh(*grid.edges[side], picture.T, norm=norm, rasterized=True, cmap=colours)
         for cells in attractors:
             inside = cells.mask[grid.of_side(side)].reshape(tuple(grid.shape[side]))
-            look |= {"cmap": ListedColormap([style.FLIP]), "gid": "attractor"}
-            axes.pcolormesh(*grid.edges[side], np.ma.masked_where(~inside, inside).T, **look)
+            marked = np.ma.masked_where(~inside, inside).T
+            axes.pcolormesh(*grid.edges[side], marked, rasterized=True, cmap=INSIDE, gid="attractor")
         axes.set(xlabel="$x_0$", ylabel="$x_1$")
         axes.set_title(f"side {side}" if grid.sides > 1 else "", fontsize=style.TEXT)
     return figure
@@ -164,16 +158,12 @@ def _legend(shares: Basins) -> list[Patch]:
         k: f"to limit set {k}: {_percent(share)} of all starts"
         for k, share in enumerate(shares.attractors[: len(ATTRACTORS)])
     }
-    parts = {codes.UNDECIDED: shares.undecided_between}
     names = {name: code for code, name in codes.NAMES.items()}
-    parts |= {names.get(name, codes.OUTSIDE): share for name, share in shares.exits.items()}
-    present = set(shares.labels.tolist())
-    for label, share in sorted(parts.items(), reverse=True):
-        if label in present:
-            way = (
-                "leaves the domain" if label == codes.OUTSIDE and "outside" in shares.exits else OUT[label][2]
-            )
-            texts[label] = f"{way}: {_percent(share)}"
+    exits = {names.get(name, codes.OUTSIDE): share for name, share in shares.exits.items()}
+    parts = {codes.UNDECIDED: shares.undecided_between} | exits
+    for label in sorted(parts.keys() & set(shares.labels.tolist()), reverse=True):
+        bare = label == codes.OUTSIDE and "outside" in shares.exits
+        texts[label] = f"{'leaves the domain' if bare else OUT[label][2]}: {_percent(parts[label])}"
     plain = {} if shares.grid.dimension == 1 else {"hatch": ""}  # the picture of the plane has none
     return [Patch(label=text, **{**_look(label), **plain}) for label, text in texts.items()]
 
@@ -192,6 +182,7 @@ def _percent(share: float) -> str:
 
 # Nodes that are drawn at most: the attracting and the largest ones; the title says how many are left out.
 MOST = 12
+ORDER = "Arrows lead down the order. Areas grow with the number of cells; a double border: attracting."
 Place = tuple[float, float]
 ARROW: dict[str, Any] = {
     "arrowstyle": "-|>",
@@ -230,8 +221,8 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = 
     whole = morse_graph(graph) if isinstance(graph, TransitionGraph) else graph
     drawn = _condensed(whole)
     place = _places(drawn)
-    depth = round(max((y for _, y in place.values()), default=0))
-    widest = max((sum(1 for _, y in place.values() if y == layer) for layer in range(depth + 1)), default=1)
+    layers = Counter(y for _, y in place.values())
+    depth, widest = round(max(layers, default=0)), max(layers.values(), default=0)
     few = len(place) <= 6
     wide, tall = 3.0 if few else 1.4, max(0.7, min(1.45, 9.0 / (depth + 1)))
     figure, (axes,) = style.canvas(min(16.0, max(7.0, wide * widest + 1.0)), tall * (depth + 1) + 1.2)
@@ -244,8 +235,7 @@ def morse(graph: nx.DiGraph[int] | TransitionGraph, name: str = "", unit: str = 
     axes.set(xlim=(-half, half), ylim=(-0.72, depth + 0.55))
     axes.set_axis_off()
     axes.set_title(_title(whole, drawn, name), fontsize=style.TEXT + 1, loc="left")
-    words = "Arrows lead down the order. Areas grow with the number of cells; a double border: attracting."
-    figure.supxlabel(words, fontsize=style.SMALL)
+    figure.supxlabel(ORDER, fontsize=style.SMALL)
     return figure
 
 

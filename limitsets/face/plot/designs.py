@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.face.plot.style import Extents
+from limitsets.feeder.scene import Scene
+from limitsets.parameters.design import Design, RobustDesign, limit_sets_along
 from limitsets.parameters.margins.margin_result import bound
 from limitsets.systems.maps import critical_points
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-
-    from limitsets.feeder.scene import Scene
-    from limitsets.parameters.design import Design, RobustDesign
-
 
 HALF = 0.3  # half the height of a bar; the distance of lanes is 1
 MOST = 12  # scenes that are drawn at most: start, design, and evenly spaced steps between them
 GAP = 0.9  # between the lanes of one scene and the next, in addition to 1
+# The first critical point of a side, and others.
+FIRST: dict[str, Any] = {"lw": 2.2, "gid": "critical point"}
+FURTHER: dict[str, Any] = {"lw": 1.0, "ls": (0, (1, 1)), "gid": "further critical point"}
 # A second attractor of the same scene.
 ANOTHER: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
 
@@ -57,8 +56,6 @@ def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Fi
     ['side 0', 'side 1', 'side 2']
     """
     if sets is None:
-        from limitsets.parameters.design import limit_sets_along
-
         sets = limit_sets_along(found)
     count, rows = len(found.start.sides), min(len(found.path), MOST)
     steps = np.linspace(0, len(found.path) - 1, rows).round().astype(int).tolist()
@@ -94,12 +91,9 @@ def design(found: Design, sets: Sequence[Sequence[Extents]] | None = None) -> Fi
 def _marks(axes: Axes, scene: Scene, top: float) -> None:
     """Mark every critical point; the design moves the first one of each side."""
     for side, points in critical_points(scene.bare_map, scene.domain).items():
+        ends = [top - side - 0.43, top - side + 0.43]
         for number, point in enumerate(points):
-            look: dict[str, Any] = {"lw": 2.2, "gid": "critical point"}
-            if number:
-                look = {"lw": 1.0, "ls": (0, (1, 1)), "gid": "further critical point"}
-            ends = [top - side - 0.43, top - side + 0.43]
-            axes.plot([point.x] * 2, ends, color=style.FLIP, zorder=4, **look)
+            axes.plot([point.x] * 2, ends, color=style.FLIP, zorder=4, **(FURTHER if number else FIRST))
 
 
 def _words(axes: Axes, solution: Design, scene: Scene, step: int, middle: float) -> None:
@@ -183,12 +177,11 @@ def _front(axes: Axes, optimum: RobustDesign) -> list[Line2D]:
     look: dict[str, Any] = {"color": AFTER, "marker": "o", "ms": 4.0, "lw": 0.8}
     axes.plot(margins, means, **look)
     handles = [style.key("designs that none beats, sampled", **look)]
-    points = [
-        (optimum.before_margins, optimum.before_sampled, optimum.before_feeding),
-        (optimum.margins, optimum.sampled, optimum.feeding),
-    ]
-    looks = ((BEFORE, "s", "the scene before"), (style.FLIP, "D", "the design"))
-    for (margins_of, sampled, feeding), (colour, marker, label) in zip(points, looks, strict=True):
+    before = optimum.before_margins, optimum.before_sampled, optimum.before_feeding
+    for margins_of, sampled, feeding, colour, marker, label in (
+        (*before, BEFORE, "s", "the scene before"),
+        (optimum.margins, optimum.sampled, optimum.feeding, style.FLIP, "D", "the design"),
+    ):
         if sampled is None or feeding is None:
             continue
         axes.vlines(sampled.margin, feeding.mean, feeding.quantile_95, color=colour, lw=0.8, alpha=0.6)
@@ -215,15 +208,14 @@ def _costs(axes: Axes, optimum: RobustDesign) -> None:
     """Draw how much of the room between threshold and reach one tolerance of each quantity takes."""
     names = list(optimum.sampled.effects)[:MOST_ROWS]
     rows = np.arange(len(names))
-    for sampled, colour, shift, label in (
-        (optimum.before_sampled, BEFORE, -0.19, "before"),
-        (optimum.sampled, style.FLIP, 0.19, "design"),
+    for sampled, face, colour, shift, label in (
+        (optimum.before_sampled, PALE, BEFORE, -0.19, "before"),
+        (optimum.sampled, style.FLIP, style.FLIP, 0.19, "design"),
     ):
         if sampled is None or not sampled.effects:
             continue
         room = sampled.reach - sampled.threshold
         costs = [100.0 * sum(sampled.effects[name]) / room for name in names]
-        face = colour if colour != BEFORE else PALE
         axes.barh(rows + shift, costs, height=0.36, facecolor=face, edgecolor=colour, label=label)
     axes.set_yticks(rows, [name.removeprefix("part.mass.").removeprefix("part.") for name in names])
     axes.invert_yaxis()

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
 
 from limitsets.base import arguments_checked
+from limitsets.cell.assembly import Assembly
 from limitsets.cell.assembly.assembly_run import OUTCOMES, rate_of
+from limitsets.cell.feeding import Feeding
 from limitsets.cell.feeding.falling import FATES, tipping_times
 from limitsets.face.plot import style
 from limitsets.face.plot.throwing import outline, turned
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from limitsets.cell.assembly import Assembly
-    from limitsets.cell.feeding import Feeding
-    from limitsets.feeder.engine.member import Recording
-
+from limitsets.feeder.engine import Recording
 
 LOOKS: dict[str, dict[str, Any]] = {
     "right": {"color": style.GOAL, "ls": "-"},
@@ -30,8 +26,6 @@ LOOKS: dict[str, dict[str, Any]] = {
     "edge": {"color": style.INK, "ls": (0, (5, 1.5, 1, 1.5))},
     "left": {"color": style.JOG, "ls": (0, (1, 1.5))},
 }
-# Smaller shares are not drawn.
-LEAST = 1e-6
 WORDS_OF_FATES = {
     "right": "side wanted, clear",
     "wrong": "another side",
@@ -93,8 +87,7 @@ def _cavity(axes: Axes, answer: Feeding) -> None:
 
 
 def _tipping(axes: Axes, answer: Feeding) -> None:
-    scene = answer.end.scene
-    side = answer.end.side
+    scene, side = answer.end.scene, answer.end.side
     most = min(float(scene.sides.a[side]), scene.arm_length - answer.end.x)
     e = np.geomspace(1e-6 * most, most, 300)
     axes.plot(e, tipping_times(scene, side)(e), color=style.INK, lw=1.3)
@@ -200,15 +193,14 @@ def assembly(found: Assembly) -> Figure:
 
 
 def _outcomes(axes: Axes, answer: Assembly) -> None:
-    shown = [name for name in OUTCOMES if answer.counts[name] or name == "assembled"]
-    for row, name in enumerate(reversed(shown)):
+    shown = [name for name in reversed(OUTCOMES) if answer.counts[name] or name == "assembled"]
+    for row, name in enumerate(shown):
         rate = rate_of(answer.counts[name], len(answer.rows))
         low, high = rate.interval
         axes.barh(row, rate.share, 0.6, **style.of_set(0 if name == "assembled" else 4))
         axes.plot([low, high], [row, row], color=style.INK, lw=1.3)
         style.note(axes, f"{rate.count}", (high, row), (4, -3))
-    names = [WORDS_OF_PAIRS[name] for name in reversed(shown)]
-    axes.set_yticks(range(len(shown)), names, fontsize=style.SMALL)
+    axes.set_yticks(range(len(shown)), [WORDS_OF_PAIRS[name] for name in shown], fontsize=style.SMALL)
     style.panel(axes, "what becomes of a pair", xlim=(0.0, 1.15), xlabel="share of the trials, 95 % interval")
 
 

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
+from numpy.typing import NDArray
 
 from limitsets.base import arguments_checked
+from limitsets.base.arrays import Array
+from limitsets.cell.trays import TrayFill
 from limitsets.face.plot import style
 from limitsets.face.plot.throwing import about_centre, turned
+from limitsets.feeder.engine.depression import Pose
 from limitsets.parameters.noise.sampling import binomial_interval
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from numpy.typing import NDArray
-
-    from limitsets.cell.trays import TrayFill
-    from limitsets.feeder.engine.depression import Pose
-
 
 # Marks on a curve at each pass, for so many passes at most.
 MARKS = 9
@@ -60,10 +57,9 @@ def _short(state: str) -> str:
     return state.replace("leaning, vertex ", "leaning, P").replace(" lowest", "")
 
 
-def _placed(filling: TrayFill, pose: Pose, share: float = 1.0) -> NDArray[np.float64]:
+def _placed(filling: TrayFill, pose: Pose, share: float = 1.0) -> Array:
     """Places of the vertices, or of points between the centre of mass and the vertices."""
-    corners = turned(share * about_centre(filling.scene), pose.angle)
-    corners += pose.x, pose.y
+    corners: Array = turned(share * about_centre(filling.scene), pose.angle) + np.array([pose.x, pose.y])
     return corners
 
 
@@ -108,9 +104,8 @@ def _curve(axes: Axes, filling: TrayFill) -> None:
     for each in filling.histories:
         marker, colour, words = looks[each.returning]
         shares, ends = each.filled[places], np.array([each.interval(int(k)) for k in places])
-        look = {"marker": marker, "ms": 4, "color": colour}
-        look["label"] = f"{each.after_pass.shape[0]} histories: {words}"
-        _with_ends(axes, places * (1.06 if each.returning else 1.0), shares, ends, **look)
+        look = {"marker": marker, "color": colour, "label": f"{each.after_pass.shape[0]} histories: {words}"}
+        _with_ends(axes, places * (1.06 if each.returning else 1.0), shares, ends, ms=4, **look)
     _crowds(axes, filling, places)
     axes.set_xscale("symlog", linthresh=1.0)
     axes.xaxis.set_major_formatter("{x:g}")
@@ -125,9 +120,7 @@ def _curve(axes: Axes, filling: TrayFill) -> None:
     )
 
 
-def _with_ends(
-    axes: Axes, x: NDArray[Any], shares: NDArray[np.float64], ends: NDArray[np.float64], **look: Any
-) -> None:
+def _with_ends(axes: Axes, x: NDArray[Any], shares: Array, ends: Array, **look: Any) -> None:
     """Draw shares with the ends of their intervals, shape (n, 2)."""
     axes.errorbar(x, shares, np.abs(ends - shares[:, None]).T, ls="", lw=0.9, **look)
 
@@ -180,12 +173,8 @@ def _kicks(axes: Axes, filling: TrayFill) -> None:
     shares /= shares.sum(axis=1, keepdims=True)
     axes.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
     for (row, column), share in np.ndenumerate(shares):
-        look: dict[str, Any] = {
-            "ha": "center",
-            "va": "center",
-            "color": "white" if share > 0.6 else style.INK,
-        }
-        axes.text(column, row, f"{share:.2f}", fontsize=style.SMALL, **look)
+        colour = "white" if share > 0.6 else style.INK
+        axes.text(column, row, f"{share:.2f}", fontsize=style.SMALL, ha="center", va="center", color=colour)
     for axis, states in ((axes.xaxis, numbers), (axes.yaxis, counts.met)):
         names = [_short(counts.states[k]) for k in states]
         axis.set_ticks(range(len(names)), names, fontsize=style.SMALL)
@@ -195,10 +184,9 @@ def _kicks(axes: Axes, filling: TrayFill) -> None:
 
 def _memory(axes: Axes, filling: TrayFill) -> None:
     rows = [("captured rightly\nafter misses", "captures"), ("released\nafter kicks it stood", "releases")]
-    words, height = ("0", "1", "2 or more"), 0.0
-    names = {}
+    names, height = {}, 0.0
     for title, method in rows:
-        for past in range(3):
+        for past, words in enumerate(("0", "1", "2 or more")):
             for each in filling.histories:
                 count, of = getattr(each, method)()[past]
                 share = count / of if of else math.nan
@@ -207,7 +195,7 @@ def _memory(axes: Axes, filling: TrayFill) -> None:
                 at = height - (0.14 if each.returning else -0.14)
                 bars = np.array([[share - low], [high - share]])
                 axes.errorbar([share], [at], xerr=bars, marker=marker, ms=4.5, lw=1.0, color=colour)
-            names[height] = f"{title}: {words[past]}" if past == 0 else words[past]
+            names[height] = words if past else f"{title}: {words}"
             height -= 1.0
         height -= 0.5
     axes.set_yticks(list(names), list(names.values()), fontsize=style.SMALL)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, Patch, Polygon
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
@@ -14,19 +16,14 @@ from limitsets.base import arguments_checked
 from limitsets.face.plot import style
 from limitsets.face.plot.style import Extents, Subject, subject_of
 from limitsets.feeder.goals import OrientedBeyond
+from limitsets.feeder.scene import Scene
+from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.maps import ROLL, Orbit, critical_points, images
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from limitsets.feeder.scene import Scene
-    from limitsets.systems.graph import TransitionGraph
-
 
 BAR = 0.085  # half the height of a bar; lanes are 1 apart
 HOP = 0.36  # height of a jog's arc
 SAMPLES_OF_ARROWS = 400
+AGAIN: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
 BAND: dict[str, Any] = {"facecolor": "#e9e9e9", "edgecolor": "#cfcfcf"}
 START: dict[str, Any] = {"marker": "o", "ls": "", "mfc": "white", "mec": style.INK, "ms": 5}
 FLIPPED: dict[str, Any] = {"color": style.FLIP, "ls": style.FLIP_LINE}
@@ -97,11 +94,10 @@ def _lanes_of(about: Subject) -> int:
 
 
 def _bars(axes: Axes, extents: Extents, number: int, count: int) -> None:
-    again: dict[str, Any] = {"facecolor": "white", "edgecolor": style.INK, "ls": ":"}
     for side, parts in extents.items():
         style.bars(axes, parts, -side, BAR, zorder=3, gid="limit set", **style.of_set(number))
         if side == 0 and count:
-            style.bars(axes, parts, -count, BAR, zorder=3, gid="limit set again", **again)
+            style.bars(axes, parts, -count, BAR, zorder=3, gid="limit set again", **AGAIN)
 
 
 def _bands(axes: Axes, about: Subject, extents: Extents) -> None:
@@ -157,9 +153,8 @@ def _critical(axes: Axes, about: Subject) -> list[float]:
             ends = [-side - 0.2, -side + 0.2]
             axes.plot([point.x] * 2, ends, color=style.INK, lw=1.6, zorder=6, gid="critical point")
             words = f"{_name(side, number)} = {point.x:.2f}"
-            style.name(
-                axes, words, (point.x, ends[0]), (-3, -1), zorder=7, bbox=style.PLATE | {"alpha": 0.85}
-            )
+            plate = style.PLATE | {"alpha": 0.85}
+            style.name(axes, words, (point.x, ends[0]), (-3, -1), zorder=7, bbox=plate)
             marked.append(point.x)
     return marked
 
@@ -174,11 +169,9 @@ def _frame_lanes(axes: Axes, about: Subject, sets: list[Extents], marked: list[f
     lo, hi = min(ends), max(ends)
     margin = 0.06 * (hi - lo)
     last = min(hi + margin, about.most) if hi < about.most else hi
-    axes.set(xlim=(lo - 1.8 * margin, last), ylim=(0.65 - _lanes_of(about), 0.62))
-    place = f"x of the centre of mass from the joint{about.in_brackets}"
-    axes.set_xlabel(place if about.thrown else "x")
-    again = {-about.sides: "side 0\nagain"}
-    names = {-side: f"side {side}" for side in range(about.sides)} | again
+    place = f"x of the centre of mass from the joint{about.in_brackets}" if about.thrown else "x"
+    axes.set(xlim=(lo - 1.8 * margin, last), ylim=(0.65 - _lanes_of(about), 0.62), xlabel=place)
+    names = {-side: f"side {side}" for side in range(about.sides)} | {-about.sides: "side 0\nagain"}
     style.lanes(axes, names if about.sides > 1 else {0: ""}, style.TEXT)
     for side in range(about.sides):
         parts = [pair for extents in sets for pair in extents.get(side, ())]
@@ -252,8 +245,8 @@ def map(scene: Scene | TransitionGraph, found: Any = None) -> Figure:  # noqa: A
     size = 3.45 if count > 1 else 4.8
     columns = count if count < 4 else math.ceil(count / 2)
     step = "throw" if about.thrown else "step"
-    below = f"x before the {step}{about.in_brackets}"
-    figure, panels = style.panels(count, columns, (size, size), (0.4, 1.35), below)
+    before, after = (f"x {when} the {step}{about.in_brackets}" for when in ("before", "after"))
+    figure, panels = style.panels(count, columns, (size, size), (0.4, 1.35), before)
     critical, flags = critical_points(about.map, about.domain), about.flags
     path = style.stretch(about, sets[0], throws=10) if sets else None
     for side, axes in enumerate(panels):
@@ -273,7 +266,7 @@ def map(scene: Scene | TransitionGraph, found: Any = None) -> Figure:  # noqa: A
     for k, axes in enumerate(panels):
         style.keep_apart(axes, 0.13)
         if k % columns == 0:
-            axes.set_ylabel(f"x after the {step}{about.in_brackets}")
+            axes.set_ylabel(after)
     words = f"Map of {about.name}: one {step}" + (", from each side" if count > 1 else "")
     handles = _legend_of_panels(about, panels, sets, path, _visible(panels[0], flags))
     return style.finished(figure, words, handles, 4 if columns > 1 else 2)
@@ -292,11 +285,9 @@ def _branches(axes: Axes, about: Subject, side: int) -> None:
 
 def _cobweb(axes: Axes, path: Orbit, side: int) -> None:
     """Draw the part of an orbit that lies on one side: up to the branch, across to the diagonal."""
-    arriving = True
     for k in np.flatnonzero(path.side[:-1] == side):
         x, to = float(path.x[k]), float(path.x[k + 1])
-        arriving = k == 0 or path.side[k - 1] != side
-        if arriving:
+        if k == 0 or path.side[k - 1] != side:
             axes.plot([x], [x], zorder=6, gid="arrival", **ARRIVAL)
         stays = path.side[k + 1] == side
         axes.plot([x, x, to if stays else x], [x, to, to], color=style.INK, lw=0.8, zorder=5, gid="cobweb")

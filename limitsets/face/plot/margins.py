@@ -3,51 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches
+from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import parsed_deviation
-from limitsets.parameters.margins.margin_result import bound
+from limitsets.feeder.scene.units import exact_factor
+from limitsets.parameters.margins.margin_result import Margin, bound
+from limitsets.parameters.margins.single import MarginsBeyond
+from limitsets.proofs.auditing import Audit
 from limitsets.systems.maps import orbit as orbit_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from limitsets.feeder.scene import Scene
-    from limitsets.parameters.margins.margin_result import Margin
-    from limitsets.parameters.margins.single import MarginsBeyond
-    from limitsets.proofs.auditing import Audit
-
 
 SAFE: dict[str, Any] = {"facecolor": "#9BD1B8", "edgecolor": "#2F6B52", "lw": 0.7}
 OPEN: dict[str, Any] = {"facecolor": "#F4F4F4", "edgecolor": "#9A9A9A", "hatch": "....", "lw": 0.6}
 BOX: dict[str, Any] = {"facecolor": "none", "edgecolor": style.FLIP, "ls": (0, (4, 2)), "lw": 1.2}
 FAILS: dict[str, Any] = {"color": style.FLIP, "marker": "D", "ms": 5.0, "ls": "none"}
 READINGS = {"fixed": "", "per-throw": ", every throw"}
-# Right ends of the two columns of numbers, from the axes [points].
+# Right ends of the two columns of numbers, from the axes [points], and how a number stands there.
 COLUMNS = (66, 138)
+NUMBER: dict[str, Any] = {
+    "xycoords": ("axes fraction", "data"),
+    "ha": "right",
+    "va": "center",
+    "annotation_clip": False,
+    "gid": "number",
+}
 
 
 def _percent(margin: Margin, size: float) -> tuple[float, str]:
     """Give a size in percent, and the words for its reference."""
     if margin.unit == "%":
         return size, ""
-    nominal = margin.nominal
-    if nominal:
-        return 100.0 * size / abs(nominal), ""
-    from limitsets.feeder.scene.units import exact_factor
-
-    least = float(margin.scene.sides.length.min())
-    return 100.0 * size * float(
-        exact_factor(margin.unit, margin.scene.unit)
-    ) / least, " (of the shortest side)"
+    if margin.nominal:
+        return 100.0 * size / abs(margin.nominal), ""
+    length = 100.0 * size * float(exact_factor(margin.unit, margin.scene.unit))
+    return length / float(margin.scene.sides.length.min()), " (of the shortest side)"
 
 
 @arguments_checked
@@ -81,9 +79,9 @@ def tornado(margins: Sequence[Margin]) -> Figure:
         _beside(axes, at, -0.75, words)
     names = [each.quantity + READINGS[each.reading] + _percent(each, 0.0)[1] for each in single]
     style.lanes(axes, dict(enumerate(names)))
-    axes.set(ylim=(len(single) - 0.4, -0.6), xscale="log", xlim=(low, high))
+    below = "deviation to either side [% of the value], logarithmic"
+    axes.set(ylim=(len(single) - 0.4, -0.6), xscale="log", xlim=(low, high), xlabel=below)
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_xlabel("deviation to either side [% of the value], logarithmic")
     handles = [
         Patch(label="proved safe", **SAFE),
         style.key("shown to fail from here", **FAILS),
@@ -109,8 +107,7 @@ def _bar(axes: Axes, margin: Margin, row: int, low: float, high: float) -> None:
 
 def _beside(axes: Axes, at: int, row: float, words: str) -> None:
     """Write into a column to the right of the axes."""
-    how: dict[str, Any] = {"ha": "right", "va": "center", "annotation_clip": False, "gid": "number"}
-    style.note(axes, words, (1.0, row), (at, 0), xycoords=("axes fraction", "data"), **how)
+    style.note(axes, words, (1.0, row), (at, 0), **NUMBER)
 
 
 @arguments_checked
@@ -174,8 +171,8 @@ def tolerance_box(margin: Margin) -> Figure:
         axes.annotate(words, (0, row), ha="center", va="center", fontsize=style.SMALL, zorder=4)
     style.lanes(axes, dict(enumerate(texts)))
     wide = 1.1 * max(margin.proved, margin.refuted or 0.0, 1e-9)
-    axes.set(xlim=(-wide, wide), ylim=(len(texts) - 0.3, -0.7))
-    axes.set_xlabel("deviation as a factor of the tolerance")
+    below = "deviation as a factor of the tolerance"
+    axes.set(xlim=(-wide, wide), ylim=(len(texts) - 0.3, -0.7), xlabel=below)
     handles = [Patch(label="proved safe, all at once", **SAFE)]
     if margin.refuted is not None:
         high, middle = margin.refuted, 0.5 * (len(texts) - 1)
@@ -250,18 +247,17 @@ def counterexample(
         mine = [k for k, on in enumerate(sides) if on == side]
         axes.plot([throws[k] for k in mine], [x[k] for k in mine], zorder=3, **_mark(side))
     if onward:
-        after = range(throws[-1], throws[-1] + len(onward) + 1)
-        axes.plot(
-            after, [x[-1], *(place for place, _ in onward)], color=style.FAINT, lw=0.9, ls=":", zorder=2
-        )
+        places = [x[-1], *(place for place, _ in onward)]
+        after = range(throws[-1], throws[-1] + len(places))
+        axes.plot(after, places, color=style.FAINT, lw=0.9, ls=":", zorder=2)
         for k, (place, side) in enumerate(onward, start=1):
             axes.plot(throws[-1] + k, place, zorder=3, gid="thrown on", **{**_mark(side), "mfc": "white"})
     heights = [*x, *(place for place, _ in onward)]
     goal = [violated.x] if isinstance(violated, OrientedBeyond | Reaches) else []
     low, high = min(heights), max([*heights, *goal])
     span = max(high - low, 1e-3 * scene.arm_length)
-    axes.set(xlabel="throws", ylabel=f"x at rest [{scene.unit}]")
-    axes.set_ylim(low - 0.12 * span, high + 0.22 * span)
+    limits = low - 0.12 * span, high + 0.22 * span
+    axes.set(xlabel="throws", ylabel=f"x at rest [{scene.unit}]", ylim=limits)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     handles = [
         *(style.key(f"on side {side}", **_mark(side)) for side in sorted({*sides, *(s for _, s in onward)})),
@@ -341,10 +337,10 @@ def audit(found: Audit) -> Figure:
     figure, panels = style.panels(count, min(count, 3), size, (1.9, 1.15), below)
     names = {row: finding.about.name for row, finding in enumerate(rows)}
     for side, axes in enumerate(panels):
-        reach = [(float(scene.sides.a[side]), scene.arm_length)]
+        reach = float(scene.sides.a[side]), scene.arm_length
         for row, finding in enumerate(rows):
             gid, look = ("cannot tell", UNKNOWN) if finding.missing else ("holds", HOLDS)
-            style.bars(axes, reach, row, HALF, gid=gid, zorder=2, **look)
+            style.bars(axes, [reach], row, HALF, gid=gid, zorder=2, **look)
             style.bars(axes, finding.ranges.get(side, ()), row, HALF, gid="broken", zorder=2, **BROKEN)
         for lo, hi in found.extents.get(side, ()):
             axes.axvspan(lo, hi, facecolor="none", edgecolor=style.JOG, lw=1.4, zorder=3, gid="limit set")

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from limitsets.base import AnswerError, arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.face.plot import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from numpy.typing import NDArray
-
-    from limitsets.parameters.fitting import Fit
-    from limitsets.parameters.noise.sampling import SampledStatistics
-    from limitsets.parameters.noise.statistics import Levels, NoiseStatistics
-
+from limitsets.parameters.fitting import Fit
+from limitsets.parameters.noise.sampling import SampledStatistics
+from limitsets.parameters.noise.statistics import Levels, NoiseStatistics
 
 BAR = "#C9DCEA"
 LINES = ("-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 1.5, 1.2, 1.5)))
@@ -59,8 +55,9 @@ def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = Non
         Every part leaves: there is no density.
     """
     if not found.classes:
-        remedy = "nothing stays: nothing to draw"
-        raise AnswerError("the classes of the noisy scene", "none", "one at least", remedy)
+        raise AnswerError(
+            "the classes of the noisy scene", "none", "one at least", "nothing stays: nothing to draw"
+        )
     part = max(found.classes, key=lambda noisy: len(noisy.cells))
     sides = sorted(part.sides)
     figure, panels = style.canvas(3.5 * min(len(sides), 4) + 0.6, 3.4, 1, len(sides), sharey=True)
@@ -77,9 +74,9 @@ def noise_density(found: NoiseStatistics, thrown: SampledStatistics | None = Non
         label = f"X = {found.goal[0]:g} {found.unit}"
         axes.axvline(found.goal[0], color=style.GOAL, lw=1.0, ls=(0, (4, 2)), label=label)
         words = f"side {side}: {100 * part.sides[side]:.2f} % of the rests"
-        height_of = f"share of the rests per {found.unit}" if side == sides[0] else ""
-        style.panel(axes, words, small_ticks=True, xlabel=f"x [{found.unit}]", ylabel=height_of)
+        style.panel(axes, words, small_ticks=True, xlabel=f"x [{found.unit}]")
         axes.xaxis.set_major_locator(MaxNLocator(5))
+    panels[0].set_ylabel(f"share of the rests per {found.unit}")
     words = f"{found.scene}: where the part rests under noise"
     return style.finished(figure, words, panels[-1].get_legend_handles_labels()[0])
 
@@ -185,7 +182,7 @@ def _against_level(axes: Axes, levels: Levels, names: Sequence[str], unit: float
     """Draw the numbers of one panel; shares that are too small are marks on the axis."""
     x, none = levels.factors * unit, np.zeros(levels.factors.size, dtype=bool)
     for name, colour, line in zip(names, COLOURS, LINES, strict=False):
-        values: NDArray[np.float64] = levels.numbers.get(name, np.full(x.size, np.nan))
+        values: Array = levels.numbers.get(name, np.full(x.size, np.nan))
         some = values > LEAST
         if not some.any():
             continue
@@ -227,6 +224,7 @@ def fit_residuals(found: Fit) -> Figure:
     misread = np.isin(rows.throws.row, [row for row, *_ in found.misread])
     strange = np.isin(rows.throws.row, found.misfit.strange)
     width = min(3.4 * len(sides) + 0.8, 12.0)
+    before = f"{'left corner' if rows.throws.corner else 'x'} before [{unit}]"
     figure, panels = style.canvas(width, 3.6, 1, len(sides), sharex=True, sharey=True)
     for side, axes in zip(sides, panels, strict=True):
         own = rows.side == side
@@ -239,10 +237,8 @@ def fit_residuals(found: Fit) -> Figure:
         for some, marker, size in ((own & misread, "s", 10.0), (own & strange, "x", 9.0)):
             look: dict[str, Any] = {"mfc": "none", "mec": style.INK, "mew": 1.1}
             axes.plot(x[some], found.residuals[some], ls="", marker=marker, ms=size, zorder=4, **look)
-        before = f"{'left corner' if rows.throws.corner else 'x'} before [{unit}]"
-        landing = f"landing, measured less predicted [{unit}]" if side == sides[0] else ""
-        words = f"side {side}: {int(own.sum())} throws"
-        style.panel(axes, words, small_ticks=True, xlabel=before, ylabel=landing)
+        style.panel(axes, f"side {side}: {int(own.sum())} throws", small_ticks=True, xlabel=before)
+    panels[0].set_ylabel(f"landing, measured less predicted [{unit}]")
     keys = [
         *(style.key(word, ls="", marker=marker, color=colour, ms=4.5) for _, marker, colour, word in KINDS),
         style.key("two standard deviations", color=BARS, lw=1.4),

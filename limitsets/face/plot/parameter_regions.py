@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.face.plot.basin import ATTRACTORS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 UNDECIDED, PROVED, REFUTED = range(3)
 EDGE: dict[str, Any] = {"edgecolor": "#777777", "lw": 0.25}
@@ -101,11 +98,8 @@ def _words(kind: tuple[int, int]) -> str:
 
 def _borders(raster: Any, ends: list[Any]) -> list[Any]:
     """Give the lines between smallest boxes of different regions, or of a region and none."""
-    lines = []
-    for k, (one, other) in enumerate(pairwise(raster)):
-        lines += [[(ends[0][k + 1], ends[1][j]), (ends[0][k + 1], ends[1][j + 1])]
-                  for j in np.flatnonzero(one != other)]  # fmt: skip
-    for k, (one, other) in enumerate(pairwise(raster.T)):
-        lines += [[(ends[0][j], ends[1][k + 1]), (ends[0][j + 1], ends[1][k + 1])]
-                  for j in np.flatnonzero(one != other)]  # fmt: skip
-    return lines
+    x, y = ends
+    return [
+        *([(x[i + 1], y[j]), (x[i + 1], y[j + 1])] for i, j in np.argwhere(raster[1:] != raster[:-1])),
+        *([(x[i], y[j + 1]), (x[i + 1], y[j + 1])] for j, i in np.argwhere(raster.T[1:] != raster.T[:-1])),
+    ]

@@ -4,28 +4,21 @@ from __future__ import annotations
 
 import math
 import textwrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon
-from numpy.typing import NDArray
 
 from limitsets.base import AnswerError, arguments_checked
+from limitsets.base.arrays import Array
 from limitsets.face.plot import style
-from limitsets.face.plot.throwing import angle_on_side, motion, outline, throws_of, turned
+from limitsets.face.plot.throwing import Motion, Throw, angle_on_side, motion, outline, throws_of, turned
 from limitsets.feeder.geometry import side_ends
+from limitsets.feeder.scene import Scene, Sketch
 from limitsets.feeder.thrower import trace
 from limitsets.systems.maps import codes
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from limitsets.face.plot.throwing import Motion, Throw
-    from limitsets.feeder.scene import Scene, Sketch
-
-
-Array = NDArray[np.float64]
 
 CENTRE: dict[str, Any] = {"marker": "o", "ms": 9, "mfc": "white", "mec": style.INK, "mew": 1.6, "ls": ""}
 MASS: dict[str, Any] = {"marker": "D", "ms": 8, "color": style.FLIP, "ls": ""}
@@ -128,8 +121,7 @@ def refused_part(sketch: Sketch, why: str) -> Figure:
     if sketch.centre is not None:
         axes.plot(*sketch.centre, zorder=5, gid="centre of mass", **CENTRE)
         style.note(axes, "centre of mass", sketch.centre, (9, 0), va="center", zorder=5)
-    reason = "\n".join(textwrap.wrap(why, 92))
-    axes.set_xlabel(f"x [{sketch.unit}]\n\n{reason}", fontsize=style.SMALL)
+    axes.set_xlabel("\n".join([f"x [{sketch.unit}]", "", *textwrap.wrap(why, 92)]), fontsize=style.SMALL)
     axes.set_ylabel(f"y [{sketch.unit}]")
     return style.finished(figure, f"{sketch.name}: the part as it is written, which is refused")
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from limitsets.base import AnswerError, arguments_checked
 from limitsets.face.plot import style
 from limitsets.feeder.scene import BeyondSensor
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from limitsets.proofs.policies import Policy, Synthesis
-
+from limitsets.proofs.policies import Policy, Synthesis
 
 # Largest number of rows with names; largest height of a row, and of all rows [inches].
 MOST, ROW, TALL = 60, 0.26, 16.0
@@ -55,8 +51,7 @@ def policy(found: Synthesis) -> Figure:
     x, wanted = found.goal
     for side, axes in enumerate(panels):
         for k, belief in enumerate(beliefs):
-            throw = int(table.throw[k])
-            look = STOP if throw < 0 else _look(throw) | {"lw": 0.0}
+            look = STOP if table.throw[k] < 0 else _look(int(table.throw[k])) | {"lw": 0.0}
             axes.axhline(k, color=style.FAINT, lw=0.4, zorder=0)
             style.bars(axes, belief.get(side, []), float(k), 0.28, **look)
         if side == wanted:

@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
 from limitsets.base import AnswerError
-from limitsets.feeder.goals import OrientedBeyond
+from limitsets.base.arrays import Array
+from limitsets.feeder.goals import Goal, OrientedBeyond
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.analysis import other_vertex_first
+from limitsets.systems.cells import Domain
 from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.maps import Orbit, orbit
 from limitsets.systems.maps.contract import kind_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from limitsets.feeder.goals import Goal
-    from limitsets.systems.cells import Domain
-
 
 # ----------------------------------------------------------------
 # The subject of a figure: a scene, or a user's map with its domain, as a transition graph has them.
@@ -61,7 +56,7 @@ class Subject(NamedTuple):
     unit: str
     map: Any
     domain: Domain
-    least: NDArray[np.float64]
+    least: Array
     most: float
     goal: Goal | None
     branches: tuple[str, ...]
@@ -87,8 +82,8 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
     AnswerError
         A map in more than one dimension.
     """
+    branches = kind_of(source.map).branches
     if isinstance(source, Scene):
-        branches, flags = kind_of(source.map).branches, other_vertex_first(source)
         return Subject(
             source.name,
             source.unit,
@@ -98,7 +93,7 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
             most=source.arm_length,
             goal=source.goal,
             branches=branches,
-            flags=flags,
+            flags=other_vertex_first(source),
             thrown=True,
         )
     domain = source.grid.domain
@@ -107,7 +102,6 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
             "the dimension of the map", source.grid.dimension, "1", "draw its basins, or a section of it"
         )
     domain.require_ends("the grid of a picture of the map, or of a limit set")
-    kind = kind_of(source.map)
     return Subject(
         type(source.map).__name__,
         "",
@@ -116,7 +110,7 @@ def subject_of(source: Scene | TransitionGraph) -> Subject:
         least=domain.lo[:, 0],
         most=float(domain.hi.max()),
         goal=None,
-        branches=kind.branches,
+        branches=branches,
         flags={},
         thrown=False,
     )
@@ -161,8 +155,7 @@ def canvas(
 ) -> tuple[Figure, list[Axes]]:
     """Make a figure of `rows` times `columns` axes [inches]; the axes row by row."""
     figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.06), dpi=110)
-    grid = figure.subplots(rows, columns, squeeze=False, **options)
-    return figure, list(grid.ravel())
+    return figure, list(figure.subplots(rows, columns, squeeze=False, **options).ravel())
 
 
 def panels(

@@ -9,27 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from limitsets.base.arrays import Array
 from limitsets.feeder.geometry import side_ends
+from limitsets.feeder.scene import Scene
+from limitsets.feeder.thrower import Trace
 from limitsets.systems.maps import codes
-
-if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
-    from limitsets.feeder.thrower import Trace
-
 
 # ----------------------------------------------------------------
 # Places of a part's vertices: lying on a side, and in flight.  Figures and animations place the part by the same
 # functions.
 #
 # A pose is the centre of mass (x, y) and the angle by which the part has turned from the frame of the scene's vertices.
-
-
-Array = NDArray[np.float64]
 
 
 def about_centre(scene: Scene) -> Array:
@@ -57,15 +51,6 @@ def turned(points: Array, angle: float) -> Array:
     cosine, sine = math.cos(angle), math.sin(angle)
     images: Array = points @ np.array([[cosine, sine], [-sine, cosine]])
     return images
-
-
-def centre_in_flight(
-    scene: Scene, x: float, side: int, phi: float | Array, kappa: float | None = None
-) -> Array:
-    """Centre of mass in flight after the part has turned by phi (docs/model.md, flight); shape (..., 2)."""
-    h, d, fall = scene.surface_height, float(scene.sides.d[side]), scene.kappa if kappa is None else kappa
-    at = np.asarray(phi)
-    return np.stack([x - (h + d) * at, h + d + x * at - 0.5 * fall * at * at], axis=-1)
 
 
 # ----------------------------------------------------------------
@@ -209,9 +194,7 @@ def pendulum_until(
 
 def _ends(corners: Array, vertex: int) -> tuple[float, float]:
     """Angles by which the part can turn about a vertex: clockwise (at most 0) and counterclockwise."""
-    n = len(corners)
-    before, after = corners[(vertex - 1) % n], corners[(vertex + 1) % n]
-    here = corners[vertex % n]
+    before, here, after = (corners[(vertex + k) % len(corners)] for k in (-1, 0, 1))
     onward, back = after - here, here - before
     # each angle is less than half a turn; it is 0, up to rounding, for a side that lies on the arm already
     clockwise = math.atan2(float(onward[1]), float(onward[0]))
@@ -219,55 +202,41 @@ def _ends(corners: Array, vertex: int) -> tuple[float, float]:
     return -max(clockwise, 0.0), max(counter, 0.0)
 
 
-def turned_to_rest(
-    hit: Impact,
-    rest: tuple[Array, float],
-    sides: int,
-    rho: float,
-    gravity: tuple[float, float],
-    *,
-    pendulum: bool,
-    rolls: bool,
-    scatters: bool,
+def _turned_to_rest(
+    scene: Scene, throw: Throw, hit: Impact, rest: tuple[Array, float], gravity: tuple[float, float]
 ) -> Turning:
     """Find the motion from an impact to rest.
 
     Parameters
     ----------
+    scene, throw : Scene, Throw
+        The scene, and the throw that ends so.
     hit : Impact
         The impact.
     rest : tuple of (ndarray, float)
         Place of rest of the centre of mass [length], and angle by which the part turns until then [rad].
-    sides : int
-        Number of sides by which the part turns, counterclockwise, from the side of the throw.
-    rho : float
-        Radius of gyration [length].
     gravity : tuple of (float, float)
         Gravity over the squared rate of the throw, along the arm and away from it [length].
-    pendulum : bool
-        Whether the striking vertex is held, and the part turns over as a pendulum does.
-    rolls : bool
-        Whether the part can roll on.
-    scatters : bool
-        Whether the landing has noise.
     """
-    pieces = _pendulums(hit, sides, rho, gravity, rolls) if pendulum else None
+    by_contact = any(getattr(scene.effects, name) for name in CONTACTS)
+    # the striking vertex is held, and the part turns over as a pendulum does
+    held = scene.flight == "exact" and scene.flip == "signed" and not by_contact
+    pieces = _pendulums(scene, hit, throw.turned, gravity) if held else None
     if pieces is not None:
         last = pieces[-1]
         off = rest[0] - last.pose(np.array([last.begin + last.time]))[0, :2]
         size = float(np.abs(hit.corners - hit.centre).max())
-        shift = float(off[0]) if scatters else 0.0
+        shift = float(off[0]) if throw.scatters else 0.0
         if max(abs(float(off[0]) - shift), abs(float(off[1]))) <= SAME * size:
             aside = np.array([shift, 0.0])
             return _joined([piece._replace(vertex=piece.vertex + aside) for piece in pieces], rest, shift)
     return _drawn(hit, rest)
 
 
-def _pendulums(
-    hit: Impact, sides: int, rho: float, gravity: tuple[float, float], rolls: bool
-) -> list[_Piece] | None:
+def _pendulums(scene: Scene, hit: Impact, sides: int, gravity: tuple[float, float]) -> list[_Piece] | None:
+    """Turn about one vertex after another until the part has turned by so many sides; None if it does not."""
     corners, centre, vertex, total = hit.corners, hit.centre, hit.struck, 0.0
-    n, pieces, time = len(corners), [], 0.0
+    n, pieces, time, rho = len(corners), [], 0.0, scene.radius_of_gyration
     arm = centre - corners[vertex % n]
     rate = _struck_rate(rho, arm, hit.velocity)
     for _ in range(MOST_FACES):
@@ -282,7 +251,7 @@ def _pendulums(
         total += turn
         if counter - vertex == sides:
             return pieces
-        if not rolls:
+        if not scene.effects.roll:
             return None
         corners = turned(corners - place, turn) + place
         centre = turned(arm, turn) + place
@@ -309,10 +278,9 @@ def _joined(pieces: list[_Piece], rest: tuple[Array, float], shift: float) -> Tu
         poses[share >= 1.0] = (*rest[0], rest[1])
         return poses
 
-    later = pieces[1:]
     faces = tuple(
         (piece.begin / time if time else 1.0, float(piece.vertex[0]), float(piece.vertex[1]))
-        for piece in later
+        for piece in pieces[1:]
     )
     return Turning(time, pose, faces, shift, drawn=False)
 
@@ -457,9 +425,7 @@ def motion(scene: Scene, throw: Throw) -> Motion:
     """Give the motion of the part in one throw, at rate 1."""
     kappa, lean = throw.kappa, stroke_of(scene)
     gravity = -kappa * math.sin(lean), -kappa * math.cos(lean)
-    exact = scene.flight == "exact"
-    by_contact = [name for name in CONTACTS if getattr(scene.effects, name)]
-    path = partial(_exact_flight if exact else _small_flight, scene, throw)
+    path = partial(_exact_flight if scene.flight == "exact" else _small_flight, scene, throw)
     struck, corners = lands(scene, throw), outline(scene, throw.side)
     start = angle_on_side(scene, throw.side)
 
@@ -471,16 +437,7 @@ def motion(scene: Scene, throw: Throw) -> Motion:
     way = sum(float(corner[k % len(corners)]) for k in range(first, last))
     way -= sum(float(corner[k % len(corners)]) for k in range(last, first))
     rest = np.array([throw.after, h + float(scene.sides.d[throw.side_after])]), way - throw.phi
-    turning = turned_to_rest(
-        hit,
-        rest,
-        throw.turned,
-        scene.radius_of_gyration,
-        gravity,
-        pendulum=exact and scene.flip == "signed" and not by_contact,
-        rolls=bool(scene.effects.roll),
-        scatters=throw.scatters,
-    )
+    turning = _turned_to_rest(scene, throw, hit, rest, gravity)
     shift, at_impact = turning.shift, start + throw.phi
     foot = hit.corners[struck % len(corners)]
     return Motion(
@@ -492,10 +449,12 @@ def motion(scene: Scene, throw: Throw) -> Motion:
 
 
 def _exact_flight(scene: Scene, throw: Throw, share: Array) -> Array:
-    phi, lean = throw.phi * np.asarray(share), stroke_of(scene)
-    centre = centre_in_flight(scene, throw.x, throw.side, phi, throw.kappa * math.cos(lean))
-    along = -throw.kappa * math.sin(lean)
-    return np.stack([centre[:, 0] + 0.5 * along * phi * phi, centre[:, 1], phi], axis=-1)
+    """Move the centre of mass as docs/model.md says (flight); gravity leans where the stroke is simulated."""
+    h, d, lean = scene.surface_height, float(scene.sides.d[throw.side]), stroke_of(scene)
+    along, fall = -throw.kappa * math.sin(lean), throw.kappa * math.cos(lean)
+    phi = throw.phi * np.asarray(share)
+    x = throw.x - (h + d) * phi + 0.5 * along * phi * phi
+    return np.stack([x, h + d + throw.x * phi - 0.5 * fall * phi * phi, phi], axis=-1)
 
 
 def _small_flight(scene: Scene, throw: Throw, share: Array) -> Array:

@@ -26,7 +26,7 @@ from limitsets.feeder.goals import (
     order_of,
     unknown_goal,
 )
-from limitsets.parameters.analysis import in_limit_sets
+from limitsets.parameters.analysis import Analysis, GoalOutcome, in_limit_sets
 from limitsets.parameters.fitting.misfit import MOST_MISREAD
 from limitsets.proofs.prover.parameters import simulated
 
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from limitsets.feeder.scene import Scene
-    from limitsets.parameters.analysis import Analysis, GoalOutcome
     from limitsets.parameters.fitting import Fit
     from limitsets.proofs.prover import Proof
 
@@ -56,11 +55,8 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     |---|---|
     | 0 | 1.5 |
     """
-
-    def line(cells: Sequence[object]) -> str:
-        return "| " + " | ".join(str(cell) for cell in cells) + " |"
-
-    return "\n".join([line(heads), "|" + "---|" * len(heads), *(line(row) for row in rows)])
+    head, *lines = (f"| {' | '.join(map(str, cells))} |" for cells in (heads, *rows))
+    return "\n".join([head, "|" + "---|" * len(heads), *lines])
 
 
 def percent(share: float) -> str:

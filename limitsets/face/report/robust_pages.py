@@ -71,32 +71,29 @@ def robustness_page(sheet: Robustness, figures: Mapping[str, str]) -> str:
     """
     first, noise = shown(sheet), sheet.noise
     own = next((goal for goal in sheet.goals if isinstance(goal, OrientedBeyond | Reaches)), None)
-    proofs = [name for margin in sheet.entries for name in margin.files]
-    return (
-        words(
-            "robustness",
-            figures,
-            **_told(sheet),
-            scene=sheet.scene,
-            heads=HEADS,
-            rows=lines_of(sheet),
-            none_holds=none_holds,
-            first=first,
-            states=first and _states(first, sheet),
-            deviation_of=deviation_of,
-            parsed_deviation=parsed_deviation,
-            own=own,
-            beyond=own and OrientedBeyond(own.x, own.side),
-            places=sheet.curve and _places(sheet.curve),
-            laws=noise
-            and [law_words(name, getattr(noise.scatter, name), noise.unit) for name in noise.scatter.given()],
-            numbers=noise and _numbers(noise, len(sheet.scene.sides), sheet.scene.world.throw_rate),
-            changes=noise and _changes(noise),
-            files=list(dict.fromkeys(proofs)),
-            proved_some=any(margin.holds for margin in sheet.entries),
-        )
-        + "\n"
+    page = words(
+        "robustness",
+        figures,
+        **_told(sheet),
+        scene=sheet.scene,
+        heads=HEADS,
+        rows=lines_of(sheet),
+        none_holds=none_holds,
+        first=first,
+        states=first and _states(first, sheet),
+        deviation_of=deviation_of,
+        parsed_deviation=parsed_deviation,
+        own=own,
+        beyond=own and OrientedBeyond(own.x, own.side),
+        places=sheet.curve and _places(sheet.curve),
+        laws=noise
+        and [law_words(name, getattr(noise.scatter, name), noise.unit) for name in noise.scatter.given()],
+        numbers=noise and _numbers(noise, len(sheet.scene.sides), sheet.scene.world.throw_rate),
+        changes=noise and _changes(noise),
+        files=list(dict.fromkeys(name for margin in sheet.entries for name in margin.files)),
+        proved_some=any(margin.holds for margin in sheet.entries),
     )
+    return f"{page}\n"
 
 
 def answer(sheet: Robustness) -> str:
@@ -143,9 +140,7 @@ def _room(margin: Margin, sheet: Robustness) -> tuple[int, float]:
 
 def _share(margin: Margin, sheet: Robustness) -> float:
     share = percent_of(margin, margin.proved)
-    if share is None:
-        return 100.0 * margin.proved / float(sheet.scene.sides.length.min())
-    return share
+    return 100.0 * margin.proved / float(sheet.scene.sides.length.min()) if share is None else share
 
 
 def lines_of(sheet: Robustness) -> list[list[str]]:
@@ -180,9 +175,8 @@ def none_holds(sheet: Robustness) -> str:
 
 def shown(sheet: Robustness) -> Margin | None:
     """Return the margin whose orbit is shown: the tightest one, or the first with an orbit."""
-    first = tightest(sheet)
-    candidates = [] if first is None else [first]
-    return next((margin for margin in [*candidates, *sheet.entries] if margin.counterexample), None)
+    candidates = tightest(sheet), *sheet.entries
+    return next((margin for margin in candidates if margin and margin.counterexample), None)
 
 
 def deviation_of(margin: Margin) -> str:
@@ -214,8 +208,7 @@ def _states(margin: Margin, sheet: Robustness) -> Table:
     heads = ["throws", f"x [{unit}]", "side"]
     heads += ["kappa of the next throw [%]"] * scattered + [f"it lands off by [{unit}]"] * lands
     rows = []
-    first = max(len(orbit) - LAST, 0)
-    for number, state in enumerate(orbit[first:], first):
+    for number, state in list(enumerate(orbit))[-LAST:]:
         thrown: Mapping[str, Any] = state["parameters"] or {}
         row = [str(number), f"{state['x']:.6f}", str(state["side"])]
         if scattered:
@@ -230,8 +223,8 @@ def _kappa_off(thrown: Mapping[str, Any], sheet: Robustness) -> str:
     given = thrown.get("throw.kappa")
     if given is None:
         return ""
-    text = given if isinstance(given, str) else given[0]
-    return f"{100.0 * (float(text.split()[0]) / sheet.scene.kappa - 1.0):+.4f}"
+    kappa = float((given if isinstance(given, str) else given[0]).split()[0])
+    return f"{100.0 * (kappa / sheet.scene.kappa - 1.0):+.4f}"
 
 
 def _places(curve: MarginsBeyond) -> Table:

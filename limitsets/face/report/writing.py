@@ -7,20 +7,16 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
 
 from limitsets.base import AnswerError, LimitsetsError, Progress, as_json, replaced
 from limitsets.face import plot
 from limitsets.face.plot.style import stretch
 from limitsets.face.report.pages import as_html, as_uri, page, percent, words
+from limitsets.parameters.analysis import Analysis
+from limitsets.proofs.auditing import Audit, Finding
 from limitsets.systems.maps import FLIP
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from limitsets.parameters.analysis import Analysis
-    from limitsets.proofs.auditing import Audit, Finding
-
 
 DPI = 150
 FIGURES = ("part", "limit-set", "map", "basins", "morse", "flight")
@@ -214,10 +210,13 @@ def write(
             yield kind, shown
         tell("report.md", len(FIGURES), count)
 
-    def texts(figures: dict[str, str]) -> dict[str, str]:
-        return {"report.md": page(analysis, figures), "analysis.json": as_json(analysis)}
-
-    return laid(folder, drawn(), texts, form, html=html)
+    return laid(
+        folder,
+        drawn(),
+        lambda figures: {"report.md": page(analysis, figures), "analysis.json": as_json(analysis)},
+        form,
+        html=html,
+    )
 
 
 # ----------------------------------------------------------------
@@ -237,12 +236,10 @@ def _measured(finding: Finding, value: float | None, unit: str) -> str:
 
 def _share(finding: Finding) -> str:
     """Say which of the throws on the limit set are concerned."""
-    parts = []
-    kinds = (("jog", finding.jogs), ("flip", finding.flips), ("roll", finding.others))
-    for name, (hit, of) in kinds:
-        if hit:
-            parts.append(f"every {name}" if hit == of else f"{percent(hit / of)} of {name}s")
-    return " and ".join(parts)
+    kinds = (("jog", *finding.jogs), ("flip", *finding.flips), ("roll", *finding.others))
+    return " and ".join(
+        f"every {name}" if hit == of else f"{percent(hit / of)} of {name}s" for name, hit, of in kinds if hit
+    )
 
 
 def _verdict(finding: Finding) -> str:
@@ -278,11 +275,9 @@ def _needed(finding: Finding, unit: str) -> str:
     if at is None:
         fall = finding.missing == "restitution"
         return f"falls from {_measured(finding, finding.worst, unit)}" if fall else "never matters"
-    if finding.missing == "stroke":
-        return f"matters from {math.degrees(at):.2g} deg"
-    if finding.missing == "scatter":
-        return f"matters from {100 * at:.2g} % of the speed"
-    return f"matters {'below' if finding.missing == 'bounce_threshold' else 'from'} {at:.2g}"
+    sizes = {"stroke": f"{math.degrees(at):.2g} deg", "scatter": f"{100 * at:.2g} % of the speed"}
+    way = "below" if finding.missing == "bounce_threshold" else "from"
+    return f"matters {way} {sizes.get(finding.missing, f'{at:.2g}')}"
 
 
 def lines_of(audit: Audit) -> list[list[str]]:
@@ -326,8 +321,8 @@ def audit_page(audit: Audit, figures: Mapping[str, str] | None = None) -> str:
     >>> audit_page(ls.audit("paper-designed")).splitlines()[0]
     '# paper-designed: what the model leaves out'
     """
-    told = {"summary": summary(audit), "heads": HEADS, "rows": lines_of(audit)}
-    return words("audit", figures or {}, audit=audit, **told) + "\n"
+    rows = lines_of(audit)
+    return words("audit", figures, audit=audit, summary=summary(audit), heads=HEADS, rows=rows) + "\n"
 
 
 def write_audit(audit: Audit, folder: str | Path, form: str = "png") -> list[Path]:
