@@ -13,7 +13,8 @@ cells.  For every cell it says how the throw decides, where the images lie and w
 proves each of these anew, for all x in the cell and all parameters allowed, and follows the integers to the claims.
 A certificate of any other map holds its formulas, as data.
 
-A function that checks a statement returns "" where it proves the statement, and else the reason in words for people.
+A function that checks a statement returns where it proves the statement, and else raises UnprovedError with the reason
+in words for people; whoever reports it is the only one to catch that.
 The files follow docs/certificates.md, and each imports only from those before it:
 
     balls        the arithmetic of every proof

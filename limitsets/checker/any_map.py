@@ -14,8 +14,8 @@ from flint import arb
 
 from .balls import ZERO, Arb, Pair
 from .cells import Failure
-from .file import plain, read_side, require, rows, table
-from .program import Formulas, Program, in_words, is_whole, named, number, rational, read_formulas
+from .file import is_whole, plain, read_side, require, rows, table
+from .program import Formulas, Program, in_words, named, number, rational, read_formulas
 
 MOST_PIECES_OF_CELL = 4_000  # of one cell: a certificate that needs more is refused
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.]{0,40}")

@@ -5,6 +5,8 @@ their numbers.
 """
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any
 
@@ -19,13 +21,31 @@ HALF, ZERO, ONE = arb(0.5), arb(0), arb(1)
 
 
 class UnprovedError(Exception):
-    """A section says something that was not proved."""
+    """A file says something that was not proved; the text is the reason, in words for people."""
 
 
 def prove(condition: bool, message: str) -> None:
     """Raise UnprovedError unless the condition holds."""
     if not condition:
         raise UnprovedError(message)
+
+
+@contextmanager
+def about(what: str) -> Iterator[None]:
+    """Name what a proof is about, before the reason why it fails."""
+    try:
+        yield
+    except UnprovedError as error:
+        raise UnprovedError(f"{what}: {error}") from None
+
+
+def reason_of(check: Callable[..., object], *more: Any) -> str:
+    """Return the reason why a check fails; "" if it proves its statement."""
+    try:
+        check(*more)
+    except UnprovedError as error:
+        return str(error)
+    return ""
 
 
 def exact(value: Fraction) -> Arb:
@@ -50,6 +70,13 @@ def float_below(value: Arb) -> float:
 def float_above(value: Arb) -> float:
     """Round a ball up, to a float that is not below any of its numbers."""
     return -float_below(-value)
+
+
+def float_of(value: Fraction, *, up: bool) -> float:
+    """Round a rational number, up or down where it is no float."""
+    x = float(value)
+    wrong = Fraction(x) < value if up else Fraction(x) > value
+    return math.nextafter(x, math.inf if up else -math.inf) if wrong else x
 
 
 def sine_cosine(phi: Arb) -> tuple[Arb, Arb]:

@@ -6,7 +6,6 @@ within those claimed.
 
 import itertools
 import math
-from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -14,7 +13,8 @@ import numpy as np
 from flint import arb
 
 from .averages import INFLATE, OUTERMOST, Mesh, Rows, Spread, mean_rows
-from .balls import Array, exact
+from .balls import Array, UnprovedError, exact, prove
+from .cells import Progress
 from .file import (
     LENGTHS,
     Arrays,
@@ -28,6 +28,7 @@ from .file import (
     rows,
     section_alone,
     table,
+    whole_number,
 )
 from .landings import MOST_PLACE, Chain, Noisy
 from .links import ABSORBED, HARD, LIVE, chain_of
@@ -78,8 +79,7 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     # far nodes hold where throws land at all, and what is not followed lies off the arm on both branches
     near = all(bool(abs(side.shift) < MOST_PLACE / 2) for side in scene.sides)
     require(near and landing < MOST_PLACE, "landings are too far out")
-    strata = section["strata"]
-    require(type(strata) is int and 1 <= strata <= MOST_STRATA, f"strata is not from 1 to {MOST_STRATA}")
+    strata = whole_number(section["strata"], 1, MOST_STRATA, f"strata is not from 1 to {MOST_STRATA}")
     noisy = Noisy(still.sides, still.k_lo.union(still.k_hi), speed.lo, landing, strata)
     places = {
         plain(name): read_places(some, name, scene)
@@ -281,41 +281,45 @@ def mean_above(row: Rows, values: Array) -> float:
     return float(row.times(values)[0]) + row.off * float(np.abs(values).max())
 
 
-def check_within(chain: Chain, row: Rows, name: str, said: Array) -> tuple[str, Array]:
-    """Check the brackets of one name; "" or the reason, and the brackets found."""
+def brackets_of(chain: Chain, row: Rows, name: str, count: int) -> Array:
+    """Prove brackets of one name after 0, 1, ... throws, so many in all."""
     value = {each: float(name in (ANY, each)) for each in chain.absorbed}
     fixed = [chain.fixed({each: sign * v for each, v in value.items()}) for sign in (-1.0, 1.0)]
     bound = [chain.first(each) for each in fixed]
-    brackets = np.empty(said.shape)
-    for n in range(len(said)):
+    brackets = np.empty((count, 2))
+    for n in range(count):
         if n:
             bound = [chain.above(values, each) for values, each in zip(bound, fixed, strict=True)]
         brackets[n] = -mean_above(row, bound[0]), mean_above(row, bound[1])
     # to have ended is for ever: a lower bound holds later on, an upper one earlier
     brackets[:, 0] = np.maximum(np.maximum.accumulate(brackets[:, 0]), 0.0)
     brackets[:, 1] = np.minimum(np.minimum.accumulate(brackets[::-1, 1])[::-1], 1.0)
+    return brackets
+
+
+def check_within(name: str, said: Array, brackets: Array) -> None:
+    """Check that the brackets claimed of one name hold those that are proved."""
     wrong = np.flatnonzero(~((said[:, 0] <= brackets[:, 0]) & (brackets[:, 1] <= said[:, 1])))
-    if not len(wrong):
-        return "", brackets
-    n = int(wrong[0])
-    lo, hi = rounded(float(brackets[n, 0]), up=False), rounded(float(brackets[n, 1]), up=True)
-    claimed = f"[{float(said[n, 0])!r}, {float(said[n, 1])!r}]"
-    return f"P({plain(name)} within {n} throws): {claimed} is claimed, [{lo}, {hi}] is proved", brackets
+    if len(wrong):
+        n = int(wrong[0])
+        lo, hi = rounded(float(brackets[n, 0]), up=False), rounded(float(brackets[n, 1]), up=True)
+        claimed = f"[{float(said[n, 0])!r}, {float(said[n, 1])!r}]"
+        what = f"P({plain(name)} within {n} throws)"
+        raise UnprovedError(f"{what}: {claimed} is claimed, [{lo}, {hi}] is proved")
 
 
-def check_quantiles(c: Chances, brackets: dict[str, Array]) -> str:
-    """Check the quantiles by the brackets found; "" or the reason."""
+def check_quantiles(c: Chances, brackets: dict[str, Array]) -> None:
+    """Check the quantiles by the brackets that are proved."""
     for name, share, lo, hi in c.quantiles:
         low, high = brackets[name].T
         none_before = lo == 0 or (lo <= len(high) and Fraction(float(high[lo - 1])) < share)
         there = hi < len(low) and Fraction(float(low[hi])) >= share
-        if not (none_before and there):
-            return f"the quantile of {float(share):.6g}, {lo} to {hi} throws, is not proved"
-    return ""
+        quantile = f"the quantile of {float(share):.6g}, {lo} to {hi} throws, is not proved"
+        prove(none_before and there, quantile)
 
 
-def check_mean(chain: Chain, row: Rows, said: tuple[float, float]) -> str:
-    """Check the bounds of the mean number of throws; "" or the reason.
+def check_mean(chain: Chain, row: Rows, said: tuple[float, float]) -> None:
+    """Check the bounds of the mean number of throws.
 
     From below it is at least the mean of the lesser of T and n.  From above: with V >= 0 and 1 + K V <= U <= V + c on
     the cells from which throws are made, V / (1 - c) is a bound.
@@ -329,10 +333,10 @@ def check_mean(chain: Chain, row: Rows, said: tuple[float, float]) -> str:
         low = max(low, -mean_above(row, below))
         if not float((before - below).max()) > 1e-9:
             break
-    if low < said[0]:
-        return f"the mean is at least {said[0]!r}: only {rounded(low, up=False)} is proved"
+    proved = f"the mean is at least {said[0]!r}: only {rounded(low, up=False)} is proved"
+    prove(low >= said[0], proved)
     if said[1] == math.inf:
-        return ""
+        return
     made = np.unique(np.concatenate([chain.live, chain.live + 1, chain.hard.at, chain.hard.at + 1]))
     above, best = chain.first(none), math.inf
     for _ in range(MOST_MEAN):
@@ -343,11 +347,11 @@ def check_mean(chain: Chain, row: Rows, said: tuple[float, float]) -> str:
         if best <= said[1] or growth <= 1e-9 or not float(after.max()) < 1e6:
             break
         above = after
-    return "" if best <= said[1] else f"the mean is at most {said[1]!r}: only {best!r} is proved"
+    prove(best <= said[1], f"the mean is at most {said[1]!r}: only {best!r} is proved")
 
 
-def check_chances(c: Chances, progress: Callable[[int, int], None] | None) -> tuple[str, int]:
-    """Check everything that is claimed; "" or the reason, and the number of cells."""
+def check_chances(c: Chances, progress: Progress) -> None:
+    """Check everything that is claimed."""
     mesh = mesh_of(c.edges)
     kinds, absorbed = kinds_of(c, mesh)
     work, done = len(mesh.place) + len(c.within) * len(mesh.place), 0
@@ -360,15 +364,12 @@ def check_chances(c: Chances, progress: Callable[[int, int], None] | None) -> tu
 
     chain, row = chain_of(c.noisy, mesh, kinds, absorbed, advance), start_row(c, mesh)
     brackets: dict[str, Array] = {}
-    bad = ""
     for name, said in c.within.items():
-        bad, brackets[name] = check_within(chain, row, name, said)
+        brackets[name] = brackets_of(chain, row, name, len(said))
         advance(len(mesh.place))
-        if bad:
-            break
-    bad = bad or check_quantiles(c, brackets)
-    if not bad and c.mean is not None:
-        bad = check_mean(chain, row, c.mean)
+        check_within(name, said, brackets[name])
+    check_quantiles(c, brackets)
+    if c.mean is not None:
+        check_mean(chain, row, c.mean)
     if progress is not None:
         progress(work, work)
-    return bad, sum(len(e) - 1 for e in c.edges)

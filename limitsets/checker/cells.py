@@ -8,7 +8,7 @@ import math
 import multiprocessing
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -19,7 +19,7 @@ import flint
 import numpy as np
 from flint import arb
 
-from .balls import HALF, PRECISION, ZERO, Arb, Array, Pair
+from .balls import HALF, PRECISION, ZERO, Arb, Array, Pair, UnprovedError, float_of, prove, reason_of
 from .file import Cells, rounded
 from .model import (
     FULL_TURN,
@@ -38,6 +38,7 @@ MOST_BOXES = 20_000  # pieces of one cell: a certificate that needs more is refu
 CHUNK = 2_000  # cells handed to a worker at once
 SMALL = 20_000  # up to so many cells no other process is started
 Targets = tuple[Pair, Pair]  # the ends of the target cells of a jog and of a flip
+Progress = Callable[[int, int], None] | None  # called with the number of cells done and the number of all
 
 
 def marked(ranges: Array, n: int) -> Array:
@@ -51,64 +52,80 @@ def targets_of(ways: list[Array], cells: Array) -> Array:
     return marked(np.concatenate([way[cells & (way[:, 0] >= 0)] for way in ways]), len(cells))
 
 
-def leading_into(c: Cells, cells: Array) -> Array:
-    """Find the cells from which a throw may lead to some cells."""
+def leading_by(ways: list[Array], cells: Array) -> Array:
+    """Find the cells from which a throw along some of the ways may lead to some cells."""
     count, leading = np.concatenate([[0], np.cumsum(cells)]), np.zeros(len(cells), dtype=bool)
-    for way in (c.jog, c.flip):
+    for way in ways:
         q = np.flatnonzero(way[:, 0] >= 0)
         leading[q] |= count[way[q, 1] + 1] > count[way[q, 0]]
     return leading
 
 
-def check_structure(c: Cells, scene: Scene) -> str:
-    """Check order of the edges, brackets, branches and targets, which every claim needs; "" or the reason."""
-    n_sides = len(c.edges)
+def leading_into(c: Cells, cells: Array) -> Array:
+    """Find the cells from which a throw may lead to some cells."""
+    return leading_by([c.jog, c.flip], cells)
+
+
+def grown(cells: Array, more: Callable[[Array], Array]) -> Array:
+    """Add to some cells what leads to them or is led to, again and again, until no more is added."""
+    count = -1
+    while count != int(cells.sum()):
+        count = int(cells.sum())
+        cells = cells | more(cells)
+    return cells
+
+
+def bracketed(c: Cells) -> Array:
+    """Mark the cells whose bracket of phi is one."""
+    lo, hi = c.phi.T
+    return np.asarray((lo > 0) & (lo < hi) & (hi <= FULL_TURN))
+
+
+def with_targets(c: Cells, branch: int) -> tuple[Array, Array]:
+    """Mark the cells whose targets along a branch are cells of the side it leads to, and those that have none."""
+    first, last = (c.jog, c.flip)[branch].T
+    side = (c.side + branch) % len(c.edges)
+    inside = (first >= c.start[side]) & (first <= last) & (last < c.start[side + 1])
+    return inside, (first == -1) & (last == -1)
+
+
+def check_structure(c: Cells, scene: Scene) -> None:
+    """Check order of the edges, brackets, branches and targets, which every claim needs."""
     for i, edges in enumerate(c.edges):
-        if not (np.diff(edges) > 0).all():
-            return f"side {i}: the edges of the cells do not ascend"
-        if not arb(float(edges[0])) > scene.sides[i].a:
-            return f"side {i}: the cells begin left of a_{i}"
-    lo, hi = c.phi[:, 0], c.phi[:, 1]
-    checks = [
-        ((lo > 0) & (lo < hi) & (hi <= FULL_TURN), "the bracket of phi is not one"),
-        ((c.branch >= 0) & (c.branch <= 2), "the branch is not 0, 1 or 2"),
-        (c.component >= -1, "the component is below -1"),
-        (c.rank >= -1, "the rank is below -1"),
-    ]
-    for array, mine, target in ((c.jog, 0, c.side), (c.flip, 1, (c.side + 1) % n_sides)):
-        first, last = array[:, 0], array[:, 1]
-        inside = (first >= c.start[target]) & (first <= last) & (last < c.start[target + 1])
-        fits = np.where((c.branch == mine) | (c.branch == 2), inside, (first == -1) & (last == -1))
-        checks.append((fits, f"its branch and the target cells of a {('jog', 'flip')[mine]} do not fit"))
-    return first_bad(c, checks)
+        prove(bool((np.diff(edges) > 0).all()), f"side {i}: the edges of the cells do not ascend")
+        prove(bool(arb(float(edges[0])) > scene.sides[i].a), f"side {i}: the cells begin left of a_{i}")
+    c.prove_all(bracketed(c), "the bracket of phi is not one")
+    c.prove_all((c.branch >= 0) & (c.branch <= 2), "the branch is not 0, 1 or 2")
+    c.prove_all(c.component >= -1, "the component is below -1")
+    c.prove_all(c.rank >= -1, "the rank is below -1")
+    for branch, what in enumerate(("jog", "flip")):
+        inside, none = with_targets(c, branch)
+        fits = np.where((c.branch == branch) | (c.branch == 2), inside, none)
+        c.prove_all(fits, f"its branch and the target cells of a {what} do not fit")
 
 
-def first_bad(c: Cells, checks: list[tuple[Array, str]]) -> str:
-    """Name the first cell at which one of the checks does not hold."""
-    for good, what in checks:
-        if not good.all():
-            return f"{c.name(int(np.argmin(good)))}: {what}"
-    return ""
-
-
-def check_components(c: Cells) -> str:
-    """Check that component cells, of which there are some, map into their own component; "" or the reason."""
+def check_components(c: Cells) -> None:
+    """Check that component cells, of which there are some, map into their own component."""
     attracting = c.component >= 0
-    return c.check_components(attracting) if attracting.any() else "there are no attracting cells"
+    prove(bool(attracting.any()), "there are no attracting cells")
+    c.check_components(attracting)
 
 
-def check_ranks(c: Cells, scene: Scene, max_rank: int) -> str:
-    """Check that the cells reach to the arm's end and the rank falls off the components; "" or the reason."""
-    for i, edges in enumerate(c.edges):
-        if Fraction(float(edges[-1])) < scene.arm[1]:
-            return f"side {i}: the cells end before arm.length"
+def check_reach(c: Cells, scene: Scene, side: int) -> None:
+    """Check that the cells of a side reach to the end of the longest arm."""
+    whole = Fraction(float(c.edges[side][-1])) >= scene.arm[1]
+    prove(whole, f"side {side}: the cells end before arm.length")
+
+
+def check_ranks(c: Cells, scene: Scene, max_rank: int) -> None:
+    """Check that the cells reach to the arm's end and the rank falls off the components."""
+    for i in range(len(c.edges)):
+        check_reach(c, scene, i)
     inside = c.component >= 0
-    checks = [
-        (~inside | (c.rank == 0), "a cell of a component has a rank above 0"),
-        (c.rank >= 0, "nothing is claimed of starts in it: its rank is -1"),
-        (c.rank <= max_rank, f"its rank is above max_rank = {max_rank}"),
-    ]
-    return first_bad(c, checks) or c.check_falling("rank", c.rank, ~inside)
+    c.prove_all(~inside | (c.rank == 0), "a cell of a component has a rank above 0")
+    c.prove_all(c.rank >= 0, "nothing is claimed of starts in it: its rank is -1")
+    c.prove_all(c.rank <= max_rank, f"its rank is above max_rank = {max_rank}")
+    c.check_falling("rank", c.rank, ~inside)
 
 
 def extents(c: Cells, some: Array, *, inward: bool = False) -> str:
@@ -172,13 +189,12 @@ class Box(NamedTuple):
         return self._replace(scene=scene, low=low, high=high, in_s=self.in_s + 1)
 
 
-def check_bracket(s: Side, box: "Box") -> str:
+def check_bracket(s: Side, box: Box) -> None:
     """Check a bracket of phi at two corners of a box, which is enough: f rises with x and falls with kappa."""
     if not positive_until(s, box.x0, box.k1, box.low):
-        return f"f > 0 up to phi = {float(box.low.p)!r} is not proved at x = {float(box.x0)!r}"
+        raise UnprovedError(f"f > 0 up to phi = {float(box.low.p)!r} is not proved at x = {float(box.x0)!r}")
     if not flight(box.x1, box.k0, box.high) < 0:
-        return f"f < 0 at phi = {float(box.high.p)!r} is not proved at x = {float(box.x1)!r}"
-    return ""
+        raise UnprovedError(f"f < 0 at phi = {float(box.high.p)!r} is not proved at x = {float(box.x1)!r}")
 
 
 def check_cell(
@@ -204,9 +220,11 @@ def check_cell(
         in_k=0,
         in_s=0,
     )
-    bad = check_bracket(s, first)
+    bad = reason_of(check_bracket, s, first)
     if bad and scene.loose > 0:
-        bad = check_by_halves(scene, lambda half: check_bracket(half.sides[side], first.of(half, side)))
+        bad = reason_of(
+            check_by_halves, scene, lambda half: check_bracket(half.sides[side], first.of(half, side))
+        )
     if bad:
         return Failure("image", bad), 1
     stack, boxes = [first], 0
@@ -288,25 +306,42 @@ class Task(NamedTuple):
     least: float | None
 
 
-# Balls cannot be sent to another process: each process keeps the JSON of the scenes and the noise, and reads the scenes
-# that it needs.
+Checked = tuple[
+    int, Failure | None, int
+]  # the first cell not proved (-1 for none), why, and the boxes looked at
+# Balls cannot be sent to another process: each process keeps the texts of all boxes of parameters, with what reads the
+# scene or the map of one of them, and that of the box that it is at.
 SETUP: list[Any] = []
-SCENES: dict[int, Scene] = {}
+AT_HAND: dict[int, Any] = {}
 
 
-def prepare(raw: list[object], noise: object) -> None:
+def prepare(read: Callable[..., Any], *texts: Any) -> None:
     """Set up a process that checks cells."""
     flint.ctx.prec = PRECISION
-    SETUP[:] = raw, noise
-    SCENES.clear()
+    SETUP[:] = read, texts
+    AT_HAND.clear()
 
 
-def check_task(task: Task) -> tuple[int, Failure | None, int]:
-    """Return the first cell of a task that is not proved (-1 if there is none), the reason, and the number of boxes."""
-    if task.box not in SCENES:
-        SCENES.clear()  # together with their halves
-        SCENES[task.box] = read_scene(SETUP[0][task.box], SETUP[1])
-    scene = SCENES[task.box]
+def of_box(box: int) -> Any:
+    """Return the scene or the map of a box of parameters."""
+    if box not in AT_HAND:
+        AT_HAND.clear()  # together with the halves of a scene
+        AT_HAND[box] = SETUP[0](box, *SETUP[1])
+    return AT_HAND[box]
+
+
+def scene_of_box(box: int, raw: list[object], noise: object) -> Scene:
+    """Read the scene of a box of parameters."""
+    return read_scene(raw[box], noise)
+
+
+def check_task(task: Task) -> Checked:
+    """Check the cells of a task."""
+    return check_cells_of(of_box(task.box), task)
+
+
+def check_cells_of(scene: Scene, task: Task) -> Checked:
+    """Check the cells of a task for one scene."""
     least = None if task.least is None else arb(task.least)
     total = 0
     for cell, (x0, x1, p0, p1, j0, j1, f0, f1) in zip(task.cells.tolist(), task.rows.tolist(), strict=True):
@@ -321,9 +356,7 @@ def check_task(task: Task) -> tuple[int, Failure | None, int]:
 def tasks_of(c: Cells, scene: Scene, box: int, chosen: Array, least: float | None) -> Iterator[Task]:
     """Cut the chosen cells, which ascend, into tasks of one side each."""
     lower, upper = c.lower(), c.upper()
-    short, long = (float(end) for end in scene.arm)
-    short = short if Fraction(short) <= scene.arm[0] else math.nextafter(short, -math.inf)
-    long = long if Fraction(long) >= scene.arm[1] else math.nextafter(long, math.inf)
+    short, long = float_of(scene.arm[0], up=False), float_of(scene.arm[1], up=True)
     for side in range(len(c.edges)):
         own = chosen[c.side[chosen] == side]
         for part in np.array_split(own, max(1, -(-len(own) // CHUNK))):
@@ -352,34 +385,39 @@ def workers_ignore_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
 
+class UnprovedSlopeError(UnprovedError):
+    """The slope on a cell is not proved to be as large as claimed; its image is."""
+
+
 class Crew:
     """The processes that check cells: this one alone, and others too for large certificates.
 
-    Each process is set up by `prepare(*setup)` and does tasks, which have `cells`, by `check`.
+    Each process is set up by `prepare(*setup)` and does tasks, which have `cells`, by `check`; `work` counts the cells
+    of all tasks, for `progress`.
     """
 
     def __init__(
         self,
         setup: tuple[Any, ...],
         workers: int,
-        progress: Callable[[int], None] | None,
-        *,
-        prepare: Callable[..., None] = prepare,
-        check: Callable[[Any], tuple[int, Failure | None, int]] = check_task,
+        progress: Progress,
+        work: int,
+        check: Callable[[Any], Checked] = check_task,
     ):
-        self.setup, self.workers, self.progress = setup, workers, progress
-        self.prepare, self.check = prepare, check
+        self.setup, self.workers, self.check = setup, workers, check
+        self.progress, self.work = progress, work
         self.done = self.boxes = 0
         self.pool: ProcessPoolExecutor | None = None
         prepare(*setup)
 
-    def run(self, tasks: list[Any]) -> tuple[int, Failure] | None:
-        """Return the first cell that is not proved, in the order of the tasks, and the reason; or None."""
+    def run(self, name: Callable[[int], str], tasks: Iterable[Any]) -> None:
+        """Do some tasks; the reason of a failure names the first cell that fails, in the order of the tasks."""
+        tasks = list(tasks)
         if self.workers > 1 and self.pool is None and sum(len(t.cells) for t in tasks) > SMALL:
             # never by fork, which copies locks that other threads hold
             method = multiprocessing.get_start_method(allow_none=True)
             context = multiprocessing.get_context("forkserver" if method == "forkserver" else "spawn")
-            self.pool = ProcessPoolExecutor(self.workers, context, self.prepare, self.setup)
+            self.pool = ProcessPoolExecutor(self.workers, context, prepare, self.setup)
         try:
             with workers_ignore_interrupts():
                 results = map(self.check, tasks) if self.pool is None else self.pool.map(self.check, tasks)
@@ -387,14 +425,14 @@ class Crew:
                 self.done += len(task.cells)
                 self.boxes += boxes
                 if failure is not None:
-                    return cell, failure
+                    kind = UnprovedSlopeError if failure.kind == "slope" else UnprovedError
+                    raise kind(f"{name(cell)}: {failure.text}")
                 if self.progress is not None:
-                    self.progress(self.done)
+                    self.progress(min(self.done, self.work), self.work)
         except BrokenProcessPool:  # they cannot be started here, as in a script without a main guard
             self.close()
             self.workers = 1
-            return self.run(tasks)
-        return None
+            self.run(name, tasks)
 
     def close(self) -> None:
         """End the other processes."""

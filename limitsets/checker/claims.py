@@ -4,17 +4,18 @@ docs/certificates.md, "What is claimed", and the end of "Goals, end points, orbi
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .cells import Crew, check_components, check_ranks, check_structure, tasks_of
+from .balls import UnprovedError, reason_of
+from .cells import Crew, UnprovedSlopeError, check_components, check_ranks, check_structure, tasks_of
 from .end_points import check_ends, ends_statement, read_ends
 from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
 from .file import Cells, hex_float, plain, read_sections, require, rounded, table
-from .goals import GOALS, check_goal, is_laid, read_goal_claim, statement_of_goal
-from .near_hinge import check_below_cells, fixed_points_in_words, read_near_hinge
+from .goals import GOALS, check_goal, read_goal_claim, speaks_of_all, statement_of_goal
+from .near_hinge import check_below_cells, check_near_joint, fixed_points_in_words, read_near_hinge
 from .refutations import (
     check_orbits,
     check_refuted,
@@ -23,9 +24,9 @@ from .refutations import (
     read_refutation,
     statement_of_refutation,
 )
-from .scene import Scene, check_by_halves
+from .scene import Scene
 
-Failed = tuple[list[str], str]  # the claims that fail, and the reason
+Failed = dict[str, str]  # by claim the reason why it fails
 
 
 def read_claims(value: object, n_sides: int) -> tuple[dict[str, dict[str, Any]], list[tuple[str, str, str]]]:
@@ -63,87 +64,70 @@ def read_expanding(section: dict[str, Any], _: int) -> dict[str, Any]:
 
 def check_box_claims(
     scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]], crew: Crew
-) -> list[Failed]:
-    """Check all claims for one box; return those that fail, with the reason."""
-    failed: list[Failed] = []
+) -> Failed:
+    """Check all claims for one box; return those that fail, with the first reason of each."""
+    failed: Failed = {}
     if "refuted" in claims:
-        bad = check_refuted(scene, claims["refuted"])
-        failed += [(["refuted"], bad)] if bad else []
+        failed |= failing(["refuted"], check_refuted, scene, claims["refuted"])
     if "feeds" in claims:
-        bad = check_feeds(scene, c, box, claims["feeds"], crew)
-        failed += [(["feeds"], bad)] if bad else []
+        failed |= failing(["feeds"], check_feeds, scene, c, box, claims["feeds"], crew)
     others = {name: section for name, section in claims.items() if name not in ("refuted", "feeds")}
-    return failed + (check_cell_claims(scene, c, box, others, crew) if others else [])
+    return failed | (check_cell_claims(scene, c, box, others, crew) if others else {})
+
+
+def failing(names: Iterable[str], check: Callable[..., None], *more: Any) -> Failed:
+    """Check what some claims need; if it fails, all of these fail for the same reason."""
+    reason = reason_of(check, *more)
+    return dict.fromkeys(names, reason) if reason else {}
 
 
 def check_cell_claims(
     scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]], crew: Crew
-) -> list[Failed]:
-    """Check the claims about cells: first by integers, then decision, images and slope of the cells concerned."""
-    goal, attracts = claims.get("goal"), claims.get("attracts-all")
-    bad = check_structure(c, scene) or check_components(c)
-    if bad:
-        return [(list(claims), bad)]
-    failed: list[Failed] = []
-    # claims about throws from all cells, and from those that have a rank
-    about: tuple[list[str], list[str]] = ([], [])
-    if goal is not None:
-        bad = check_goal(c, scene, goal)
-        if bad:
-            failed.append((["goal"], bad))
-        else:
-            everywhere = goal["anywhere"] and goal["kind"] != "attracts_all" and not is_laid(goal)
-            about[not everywhere].append("goal")
-    if attracts is not None:
-        bad = check_attracts_all(c, scene, attracts)
-        if bad:
-            failed.append((["attracts-all"], bad))
-        else:
-            about[0].append("attracts-all")
-    return failed + check_throws_of_cells(scene, c, box, claims, about, crew)
+) -> Failed:
+    """Check the claims about cells: first by integers, then decision, images and slope of the cells concerned.
 
-
-def check_attracts_all(c: Cells, scene: Scene, section: dict[str, Any]) -> str:
-    """Check ranks and the starts near the joint; "" or the reason."""
-    bad = check_ranks(c, scene, section["max_rank"])
-    if bad:
-        return bad
-    for i, (q, said) in enumerate(zip(section["q"], section["fixed"], strict=True)):
-        edge = float(c.edges[i][0])
-        near = check_by_halves(scene, check_below_cells, i, edge, q, said)
-        if near:
-            return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
-    return ""
-
-
-def check_throws_of_cells(
-    scene: Scene, c: Cells, box: int, claims: dict[str, dict[str, Any]],
-    about: tuple[list[str], list[str]], crew: Crew,
-) -> list[Failed]:  # fmt: skip
-    """Check the throws from the attracting cells, then those from the others that some claim needs.
-
-    `about`: the claims about all cells, and the claims about the cells with a rank.  Images are proved to lie strictly
-    inside the union of their target cells (or at most at the arm's length), so that "invariant" gives "trapping".
+    Images are proved to lie strictly inside the union of their target cells (or at most at the arm's length), so that
+    "invariant" gives "trapping".
     """
-    failed: list[Failed] = []
-    least = claims["expanding"]["least"] if "expanding" in claims else None
+    failed = failing(claims, check_structure, c, scene) or failing(claims, check_components, c)
+    if failed:
+        return failed
+    if "goal" in claims:
+        failed |= failing(["goal"], check_goal, c, scene, claims["goal"])
+    if "attracts-all" in claims:
+        failed |= failing(["attracts-all"], check_attracts_all, c, scene, claims["attracts-all"])
+    outside = {"goal", "attracts-all"} & set(claims) - set(failed)
     inside = np.flatnonzero(c.component >= 0)
-    failure = crew.run(list(tasks_of(c, scene, box, inside, least)))
-    if failure is not None and failure[1].kind == "slope":
-        failed.append((["expanding"], f"{c.name(failure[0])}: {failure[1].text}"))
-        failure = crew.run(list(tasks_of(c, scene, box, inside, None)))
-    if failure is not None:
-        return [*failed, (list(claims), f"{c.name(failure[0])}: {failure[1].text}")]
-    for name, check in (("end-points", check_ends), ("cycles", check_orbits)):
-        bad = check(scene, c, claims[name]) if name in claims else ""
-        failed += [([name], bad)] if bad else []
-    wide, some = about
-    for names, mask in ((wide + some, c.rank >= 0), (wide, c.rank < 0)):
+    least = claims["expanding"]["least"] if "expanding" in claims else None
+    images: Failed = {}
+    try:
+        crew.run(c.name, tasks_of(c, scene, box, inside, least))
+    except UnprovedSlopeError as error:
+        failed["expanding"] = str(error)
+        images = failing(claims, crew.run, c.name, tasks_of(c, scene, box, inside, None))
+    except UnprovedError as error:
+        images = dict.fromkeys(claims, str(error))
+    if images:
+        return images | failed
+    if "end-points" in claims:
+        failed |= failing(["end-points"], check_ends, scene, c, claims["end-points"])
+    if "cycles" in claims:
+        failed |= failing(["cycles"], check_orbits, scene, c, claims["cycles"])
+    # the cells with a rank, and those without one that some claims are about too
+    wide = {name for name in outside if name != "goal" or speaks_of_all(claims["goal"])}
+    for names, mask in ((outside, c.rank >= 0), (wide, c.rank < 0)):
         chosen = np.flatnonzero((c.component < 0) & mask)
-        failure = crew.run(list(tasks_of(c, scene, box, chosen, None))) if names else None
-        if failure is not None:
-            return [*failed, (names, f"{c.name(failure[0])}: {failure[1].text}")]
+        images = failing(names, crew.run, c.name, tasks_of(c, scene, box, chosen, None)) if names else {}
+        if images:
+            return images | failed
     return failed
+
+
+def check_attracts_all(c: Cells, scene: Scene, section: dict[str, Any]) -> None:
+    """Check ranks and the starts near the joint."""
+    check_ranks(c, scene, section["max_rank"])
+    for i, (q, said) in enumerate(zip(section["q"], section["fixed"], strict=True)):
+        check_near_joint(c, scene, i, check_below_cells, q, said)
 
 
 def attracts_all_statement(section: dict[str, Any], noisy: bool) -> str:

@@ -17,12 +17,11 @@ from .balls import (
     ZERO,
     Arb,
     Pair,
-    UnprovedError,
     float_above,
     float_below,
     prove,
 )
-from .file import Cells, hex_float, read_side, require, rows, table
+from .file import Cells, hex_float, read_side, require, rows, table, whole_number
 from .model import FULL_TURN, Angle, at_angle, flight, guess_root, over_angles, slope_over
 from .scene import Scene, Side
 
@@ -50,8 +49,7 @@ class Piece(NamedTuple):
 
 def read_ends(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     """Read the section of end-points: two unions of intervals, the inner one inside the outer one, and the pieces."""
-    images = section["images"]
-    require(type(images) is int and 0 < images <= MOST_IMAGES, "images is not a number of images")
+    images = whole_number(section["images"], 1, MOST_IMAGES, "images is not a number of images")
     outer, inner = read_outer_and_inner(section["ends"], n_sides)
     pieces = read_pieces(section["pieces"], n_sides)
     return {"images": images, "outer": outer, "inner": inner, "pieces": pieces}
@@ -207,6 +205,12 @@ def first_outside(union: Intervals, within: Intervals) -> str:
     return ""
 
 
+def prove_within(union: Intervals, within: Intervals, what: str) -> None:
+    """Prove that all intervals lie in those of another union; the reason names the first that does not."""
+    outside = first_outside(union, within)
+    prove(not outside, f"{outside}: {what}")
+
+
 def attracting(c: Cells) -> Intervals:
     """Return the attracting cells as intervals."""
     union: Intervals = []
@@ -216,20 +220,25 @@ def attracting(c: Cells) -> Intervals:
     return union
 
 
-def prove_piece(throws: Throws, piece: Piece) -> None:
-    """Prove branch and sign of the slope on a piece, by halves in x and in kappa where the whole is too wide."""
-    stack = [(arb(piece.lo), arb(piece.hi), throws.scene.k_lo, throws.scene.k_hi)]
+def unproved_of(throws: Throws, piece: Piece, most: int = MOST_THROWN) -> str:
+    """Prove branch and sign of the slope on a piece; "" or which of them is not proved.
+
+    Where the whole is too wide it is halved in x and in kappa, until `most` boxes are thrown.
+    """
+    stack, thrown = [(arb(piece.lo), arb(piece.hi), throws.scene.k_lo, throws.scene.k_hi)], 0
     while stack:
         x0, x1, k0, k1 = stack.pop()
+        thrown += 1
         t = throws.box(piece.side, x0, x1, k0, k1)
         steep = bool(piece.sign == 0 or (t.slope is not None and piece.sign * t.slope > 0))
         if piece.branch in (2, t.decision) and steep:
             continue
         wrong = piece.branch != 2 and t.decision == 1 - piece.branch
-        halves = [] if wrong else halved_box(x0, x1, k0, k1)
-        what = "branch" if piece.branch not in (2, t.decision) else "sign of the slope"
-        prove(bool(halves), f"{piece.name()}: the {what} is not proved")
+        halves = [] if wrong or thrown > most else halved_box(x0, x1, k0, k1)
+        if not halves:
+            return "branch" if piece.branch not in (2, t.decision) else "sign of the slope"
         stack += halves
+    return ""
 
 
 def halved_box(x0: Arb, x1: Arb, k0: Arb, k1: Arb) -> list[tuple[Arb, Arb, Arb, Arb]]:
@@ -306,40 +315,33 @@ def image_inward(throws: Throws, union: Intervals, pieces: list[list[Piece]]) ->
     return [joined(intervals) for intervals in images]
 
 
-def check_ends(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
-    """Prove the end points from the attracting cells N, which are invariant; "" or the reason.
+def check_ends(scene: Scene, c: Cells, section: dict[str, Any]) -> None:
+    """Prove the end points from the attracting cells N, which are invariant.
 
     Outer: A(0) = N, A(n+1) = F(A(n)) & A(n), rounded outward, holds the image of N under n + 1 throws, whatever kappas
     of the noise they have.  Inner: B lies in N and in its own image F(B), for each kappa: so in every image of N.
     """
     cells, outer, inner, pieces = attracting(c), section["outer"], section["inner"], section["pieces"]
     for side, s in enumerate(scene.sides):
-        if not s.concave:
-            return f"side {side}: kappa > ell is not proved, so that there may be several impacts"
-        if joined([(piece.lo, piece.hi) for piece in pieces[side]]) != cells[side]:
-            return f"side {side}: the pieces do not make up the attracting cells"
-    bad = first_outside(inner, cells)
-    if bad:
-        return f"{bad}: not in the attracting cells"
+        once = f"side {side}: kappa > ell is not proved, so that there may be several impacts"
+        prove(s.concave, once)
+        made_up = joined([(piece.lo, piece.hi) for piece in pieces[side]]) == cells[side]
+        prove(made_up, f"side {side}: the pieces do not make up the attracting cells")
+    prove_within(inner, cells, "not in the attracting cells")
     throws = Throws(scene)
-    try:
-        for piece in itertools.chain(*pieces):
-            prove_piece(throws, piece)
-        bad = first_outside(inner, image_inward(throws, inner, pieces))
-        if bad:
-            return f"{bad}: it is not proved that all of it is reached again"
-        union, taken = cells, 0
-        while first_outside(union, outer):
-            images = image_outward(throws, union, pieces)
-            smaller = [meeting(one, other) for one, other in zip(images, union, strict=True)]
-            taken += 1
-            if smaller == union or taken > section["images"]:
-                after = f"after {taken - 1} images of the attracting cells"
-                return f"{first_outside(union, outer)}: not proved to lie within the outer ends {after}"
-            union = smaller
-    except UnprovedError as error:
-        return str(error)
-    return ""
+    for piece in itertools.chain(*pieces):
+        unproved = unproved_of(throws, piece)
+        prove(not unproved, f"{piece.name()}: the {unproved} is not proved")
+    again = image_inward(throws, inner, pieces)
+    prove_within(inner, again, "it is not proved that all of it is reached again")
+    union, taken = cells, 0
+    while first_outside(union, outer):
+        images = image_outward(throws, union, pieces)
+        smaller = [meeting(one, other) for one, other in zip(images, union, strict=True)]
+        if smaller == union or taken == section["images"]:
+            after = f"after {taken} images of the attracting cells"
+            prove_within(union, outer, f"not proved to lie within the outer ends {after}")
+        union, taken = smaller, taken + 1
 
 
 def ends_statement(section: dict[str, Any], noisy: bool) -> str:

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb
 
-from .balls import Array, UnprovedError, exact, float_above, float_below, prove
-from .cells import Crew, Task, check_structure, extents, first_bad, leading_into, tasks_of
-from .file import Cells, by_side, decimal, hex_float, read_side, require, table
+from .balls import Array, UnprovedError, about, exact, float_above, float_below, prove, reason_of
+from .cells import Crew, Task, check_structure, extents, grown, leading_into, tasks_of
+from .file import Cells, by_side, decimal, hex_float, read_side, require, table, whole_number
 from .near_hinge import (
     check_all_jog,
     check_null,
@@ -24,13 +24,14 @@ from .near_hinge import (
     near_landing,
     not_arriving,
 )
-from .refutations import lies_within, periodic, read_orbits, read_passing, thrown_again
+from .refutations import is_laid_down, periodic, read_orbits, read_passing, thrown_again
 from .scene import Scene
 from .starts import (
     MOST_COUNTED,
     Span,
     cells_of_ranges,
     led_to,
+    length_within,
     ranges_in_words,
     read_laid,
     share_of_ranges,
@@ -117,7 +118,7 @@ def cells_ahead(end: ArmEnd, scene: Scene, side: int) -> Array | None:
     s, c = scene.sides[side], end.c
     edge = float(c.edges[side][0])
     bound = near_angle(s, scene.k_lo, scene.k_hi, edge)
-    if not bound < 1 or check_all_jog(s, scene.k_lo.union(scene.k_hi), arb(edge), bound):
+    if not bound < 1 or reason_of(check_all_jog, s, scene.k_lo.union(scene.k_hi), arb(edge), bound):
         return None
     far = near_landing(s, scene.k_lo, scene.k_hi, edge)
     ahead: Array = (c.side == side) & (c.lower() <= (float_above(far) if far.is_finite() else math.inf))
@@ -135,28 +136,22 @@ def thrown_into(end: ArmEnd, places: Array, gaps: list[bool]) -> Array:
 def late_within(end: ArmEnd, throws: int) -> Array:
     """Find the cells from which parts are not proved to come to rest at X or beyond within so many throws."""
     c = end.c
-    late: Array = not_arriving(c, [c.jog, c.flip], ~end.leaving, end.fed, throws) | end.leaving
+    late: Array = not_arriving([c.jog, c.flip], ~end.leaving, end.fed, throws) | end.leaving
     return late
 
 
 def cells_that_may_leave(end: ArmEnd) -> Array:
     """Find the cells from which a part may come to one that may leave, and these."""
-    leaves, count = end.leaving.copy(), -1
-    while count != int(leaves.sum()):
-        count = int(leaves.sum())
-        leaves |= thrown_into(end, leaves, [False] * len(end.inward))
-    return leaves
+    return grown(end.leaving, lambda known: leading_into(end.c, known))
 
 
 def share_of(end: ArmEnd, scene: Scene, some: Array) -> float:
     """Bound from below the share of the starts x < X in some cells."""
-    x, claimed, whole = float_below(exact(end.x)), 0.0, 0.0
-    for i, (s, edges) in enumerate(zip(scene.sides, end.c.edges, strict=True)):
-        own = some[end.c.start[i] : end.c.start[i + 1]]
-        widths = np.clip(np.minimum(edges[1:], x) - edges[:-1], 0.0, None)
-        claimed += float(widths[own].sum())
-        whole += float_above(exact(end.x)) - float_below(s.a)
-    return claimed / whole * (1 - 2.0**-30)  # against the rounding of these sums
+    x, claimed, length = exact(end.x), 0.0, 0.0
+    for i, s in enumerate(scene.sides):
+        claimed += length_within(end.c, some, i, -math.inf, float_below(x))
+        length += float_above(x) - float_below(s.a)
+    return claimed / length * (1 - 2.0**-30)  # against the rounding of these sums
 
 
 # ----------------------------------------------------------------
@@ -178,14 +173,14 @@ def read_feeds(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     for name, every, count in (("progress", "every", "throws"), ("almost", "almost-every", "thinning")):
         if name in section:
             part = table(section[name], f"feeds.{name}", f"starts {count}")
-            starts, number = part["starts"], part[count]
+            starts = part["starts"]
             if isinstance(starts, dict):
                 since = by_side(table(starts, "feeds: starts", "from")["from"], "from", n_sides)
                 starts = [hex_float(x, "from") for x in since]
             known = starts == every or (isinstance(starts, list) and feeds["laid"] is None)
             require(known, f"feeds.{name}: starts that are not known")
-            fits = type(number) is int and 0 <= number < MOST_COUNTED
-            require(fits, f"feeds.{name}.{count} is not a whole number as it should be")
+            what = f"feeds.{name}.{count} is not a whole number as it should be"
+            number = whole_number(part[count], 0, MOST_COUNTED - 1, what)
             feeds[name] = (None if starts == every else starts, number)
     if "wrong" in section:
         orbit = table(section["wrong"], "feeds.wrong", "start throws")
@@ -196,130 +191,101 @@ def read_feeds(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     return feeds
 
 
-def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: Crew) -> str:
-    """Check all parts of the claim; "" or the reason.  Shares and intervals of starts are kept for the report."""
+def check_feeds(scene: Scene, c: Cells, box: int, feeds: dict[str, Any], crew: Crew) -> None:
+    """Check all parts of the claim.  Shares and intervals of starts are kept for the report."""
     if scene.end is None:
-        return "the scene has no cavity"
-    bad = check_structure(c, scene)
+        raise UnprovedError("the scene has no cavity")
+    check_structure(c, scene)
     for i, edges in enumerate(c.edges):
-        if not (bad or float(edges[0]) < scene.end < float(edges[-1])):
-            bad = f"side {i}: the cells do not reach from before the end of the arm to beyond"
-    if bad:
-        return bad
+        around = float(edges[0]) < scene.end < float(edges[-1])
+        prove(around, f"side {i}: the cells do not reach from before the end of the arm to beyond")
     feeds["x"] = f"{decimal(scene.end)} {scene.unit}"
     feeds["begin"] = None
     if feeds["laid"] is not None:
-        feeds["begin"], bad = cells_of_ranges(c, scene, feeds["laid"])
-        if any(Fraction(hi) > scene.end for ranges in feeds["laid"] for _, hi in ranges):
-            bad = bad or "starts are claimed that lie beyond the end of the arm"
-        if bad:
-            return bad
+        feeds["begin"] = cells_of_ranges(c, scene, feeds["laid"])
+        on = all(Fraction(hi) <= scene.end for ranges in feeds["laid"] for _, hi in ranges)
+        prove(on, "starts are claimed that lie beyond the end of the arm")
     feeds["shares"] = {}
     end, used = arm_end(c, scene), np.zeros(len(c.side), dtype=bool)
-    for check in (check_safety, check_progress, check_almost):
-        bad, some = check(end, scene, feeds)
-        if bad:
-            return bad
-        used |= some
-    return check_shown(end, scene, feeds) or check_images_used(end, scene, box, used, crew)
+    for part, check in (("safety", check_safety), ("progress", check_progress), ("almost", check_almost)):
+        if part in feeds:
+            used |= check(end, scene, feeds)
+    with about("an orbit"):
+        check_shown(end, scene, feeds)
+    # the throws from the cells on which something rests
+    tasks = tasks_of(end.c, scene, box, np.flatnonzero(used), None)
+    crew.run(c.name, (with_open_borders(end.c, task) for task in tasks))
 
 
-def check_images_used(end: ArmEnd, scene: Scene, box: int, used: Array, crew: Crew) -> str:
-    """Check the throws from the cells on which something rests; "" or the reason."""
-    tasks = [
-        with_open_borders(end.c, task) for task in tasks_of(end.c, scene, box, np.flatnonzero(used), None)
-    ]
-    failure = crew.run(tasks)
-    return "" if failure is None else f"{end.c.name(failure[0])}: {failure[1].text}"
-
-
-def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
-    """Check that from the starts named the first rest at X or beyond is on the wanted side."""
-    none = np.zeros_like(end.before)
-    if "safety" not in feeds:
-        return "", none
+def check_safety(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> Array:
+    """Check that from the starts named the first rest at X or beyond is on the wanted side; return the safe cells."""
     bad, gaps = unsafe_starts(end, scene, feeds["side"])
     safe, begin = end.before & ~bad, feeds["begin"]
     if feeds["safety"] == "every":
         what = f"a part may come to rest beyond the end of the arm on another side than {feeds['side']}"
-        if begin is not None:
-            feeds["shares"]["safety"] = 1.0
-            return first_bad(end.c, [(safe | ~begin | end.fed, what)]), safe
-        for i, gap in enumerate(gaps):
-            if gap:
-                return f"side {i}, before the first cell: {what}", none
+        for i, gap in enumerate(gaps if begin is None else ()):
+            prove(not gap, f"side {i}, before the first cell: {what}")
+        named = end.before if begin is None else end.before & begin
+        end.c.prove_all(safe | ~named, what)
         feeds["shares"]["safety"] = 1.0
-        return first_bad(end.c, [(safe | end.fed, what)]), safe
+        return safe
     feeds["shares"]["safety"] = share_of(end, scene, safe)
     if begin is not None:
         feeds["shares"]["safety"] = share_of_ranges(end.c, feeds["laid"], safe, math.inf)
-    whole = end.c.upper() <= float_below(exact(end.x))  # not the cell that X lies in
-    feeds["safe"] = extents(end.c, safe & whole, inward=True)
-    return "", safe
+    ahead = end.c.upper() <= float_below(exact(end.x))  # not the cell that X lies in
+    feeds["safe"] = extents(end.c, safe & ahead, inward=True)
+    return safe
 
 
-def check_progress(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
-    """Check that every start that is named comes to rest at X or beyond within so many throws."""
-    if "progress" not in feeds:
-        return "", np.zeros_like(end.before)
+def check_progress(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> Array:
+    """Check that every start that is named comes to rest at X or beyond within so many throws; return where from."""
     since, throws = feeds["progress"]
     late = late_within(end, throws)
-    what = f"{throws} throws are not proved to be enough"
-    bad = check_named(end, scene, since, late, what, feeds["begin"])
-    if not bad:
-        feeds["shares"]["progress"] = share_from(end, scene, since)
-    return bad, end.before & ~late
+    check_named(end, scene, since, late, f"{throws} throws are not proved to be enough", feeds["begin"])
+    feeds["shares"]["progress"] = share_from(end, scene, since)
+    return end.before & ~late
 
 
-def check_almost(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> tuple[str, Array]:
+def check_almost(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> Array:
     """Check that almost every start that is named comes to rest at X or beyond: the others thin out.
 
     Orbits from cells that cannot lead to one that may leave go on in such cells.  Those from which some number of
     throws is enough lead to cells of the same kind only; the starts that stay in the others for ever have length zero.
     """
-    if "almost" not in feeds:
-        return "", np.zeros_like(end.before)
     since, rounds = feeds["almost"]
     leaves = cells_that_may_leave(end)
     begin = feeds["begin"]
-    bad = check_named(end, scene, since, leaves, "a part may leave the arm", begin)
+    check_named(end, scene, since, leaves, "a part may leave the arm", begin)
     stay = late_within(end, len(leaves)) & ~leaves
     if begin is not None:
         stay &= led_to(end.c, begin)
-    elif not bad and since is None:  # before the first cells
-        bad = check_null(end.c, scene, np.zeros_like(leaves), True)
-    if not bad:
-        bad = check_thinning(end.c, scene, stay, rounds, np.zeros(len(leaves), dtype=np.int32))
-    if not bad:
-        feeds["shares"]["almost"] = share_from(end, scene, since)
-    return bad, end.before & ~leaves
+    elif since is None:  # before the first cells
+        check_null(end.c, scene, np.zeros_like(leaves), True)
+    check_thinning(end.c, scene, stay, rounds, np.zeros(len(leaves), dtype=np.int32))
+    feeds["shares"]["almost"] = share_from(end, scene, since)
+    return end.before & ~leaves
 
 
 def check_named(
     end: ArmEnd, scene: Scene, since: list[float] | None, late: Array, what: str, begin: Array | None
-) -> str:
-    """Check that the starts that are named, beyond some x on each side or all, lie in no bad cell; "" or the reason.
+) -> None:
+    """Check that the starts that are named, beyond some x on each side or all, lie in no bad cell.
 
     Where parts are laid down these are the starts in the cells `begin`.
     """
     c = end.c
     if begin is not None:
-        return first_bad(c, [(~(begin & end.before & late), what)])
+        c.prove_all(~(begin & end.before & late), what)
+        return
     for i, edges in enumerate(c.edges):
-        own = slice(int(c.start[i]), int(c.start[i + 1]))
-        needed = end.before[own].copy()
+        needed = end.before & (c.side == i)
         if since is None:
-            bad = check_thrown_out(scene, i, float(edges[0]))
-            if bad:
-                return f"side {i}, near the joint, x in (a, {float(edges[0])!r}]: {bad}"
+            with about(f"side {i}, near the joint, x in (a, {float(edges[0])!r}]"):
+                check_thrown_out(scene, i, float(edges[0]))
         else:
-            if not since[i] >= edges[0]:
-                return f"side {i}: starts are claimed that lie before the cells"
-            needed &= edges[1:] > since[i]
-        some = np.flatnonzero(needed & late[own])
-        if some.size:
-            return f"{c.name(int(c.start[i]) + int(some[0]))}: {what}"
-    return ""
+            prove(bool(since[i] >= edges[0]), f"side {i}: starts are claimed that lie before the cells")
+            needed &= c.upper() > since[i]
+        c.prove_all(~(needed & late), what)
 
 
 def share_from(end: ArmEnd, scene: Scene, since: list[float] | None) -> float:
@@ -330,26 +296,20 @@ def share_from(end: ArmEnd, scene: Scene, since: list[float] | None) -> float:
     return share_of(end, scene, some)
 
 
-def check_shown(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> str:
-    """Check the orbit that comes to rest on another side, and the one that never comes to X; "" or the reason."""
+def check_shown(end: ArmEnd, scene: Scene, feeds: dict[str, Any]) -> None:
+    """Check the orbit that comes to rest on another side, and the one that never comes to X."""
     x, laid = exact(end.x), feeds["laid"]
-    try:
-        if "wrong" in feeds:
-            *states, (side, lo, hi) = thrown_again(scene, feeds["wrong"])
-            prove(laid is None or lies_within(laid, states[0]), "no part is laid down where it starts")
-            prove(
-                all(each[2] < x for each in states), "it may come to rest beyond the end of the arm earlier"
-            )
-            beyond = side != feeds["side"] and bool(lo > x) and bool(hi <= scene.sides[side].arm)
-            prove(beyond, "it is not proved to come to rest beyond the end of the arm on another side")
-        if "never_fed" in feeds:
-            states = periodic(scene, feeds["never_fed"])
-            lies = laid is None or any(lies_within(laid, state) for state in states)
-            prove(lies, "no part is laid down at a place of the periodic orbit")
-            prove(all(each[2] < x for each in states), "the periodic orbit may come to the end of the arm")
-    except UnprovedError as error:
-        return f"an orbit: {error}"
-    return ""
+    if "wrong" in feeds:
+        *states, (side, lo, hi) = thrown_again(scene, feeds["wrong"])
+        prove(is_laid_down(laid, states[:1]), "no part is laid down where it starts")
+        earlier = "it may come to rest beyond the end of the arm earlier"
+        prove(all(each[2] < x for each in states), earlier)
+        beyond = side != feeds["side"] and bool(lo > x) and bool(hi <= scene.sides[side].arm)
+        prove(beyond, "it is not proved to come to rest beyond the end of the arm on another side")
+    if "never_fed" in feeds:
+        states = periodic(scene, feeds["never_fed"])
+        prove(is_laid_down(laid, states), "no part is laid down at a place of the periodic orbit")
+        prove(all(each[2] < x for each in states), "the periodic orbit may come to the end of the arm")
 
 
 def verdict_of_feeds(feeds: dict[str, Any], most_open: float) -> tuple[str, str]:

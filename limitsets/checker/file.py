@@ -182,11 +182,27 @@ def by_side(value: object, where: str, n_sides: int) -> list[Any]:
     return [known[name] for name in names]
 
 
+def is_whole(value: object, least: int, most: int) -> bool:
+    """Whether a value of a header is an integer, not true or false, from `least` to `most`."""
+    return type(value) is int and least <= int(str(value)) <= most
+
+
+def whole_number(value: object, least: int, most: int, what: str) -> int:
+    """Read an integer from `least` to `most`; `what` says what a value is not that is none."""
+    require(is_whole(value, least, most), what)
+    return int(str(value))
+
+
 def read_side(value: object, n_sides: int) -> int:
     """Read the number of a side."""
-    require(type(value) is int and 0 <= value < n_sides, "a side is not a number of one")
-    assert isinstance(value, int)
-    return value
+    return whole_number(value, 0, n_sides - 1, "a side is not a number of one")
+
+
+def one_length(value: object, where: str) -> Quantity:
+    """Read a length that is no interval."""
+    length = quantity(value, "length", where)
+    require(length.lo == length.hi, f"{where} is not one number")
+    return length
 
 
 def hex_float(text: object, where: str) -> float:

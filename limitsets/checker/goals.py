@@ -3,15 +3,14 @@
 docs/certificates.md, "Goals", and what `goal` rests on in "Goals, end points, orbits".
 """
 
-import math
-from fractions import Fraction
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from .cells import first_bad, leading_into, targets_of
-from .file import LENGTHS, Cells, quantity, require, rows, table
-from .labels import range_max
+from .balls import float_of, prove
+from .cells import grown, leading_into, targets_of
+from .file import LENGTHS, Cells, one_length, require, rows, table, whole_number
 from .near_hinge import check_everywhere, check_thinning, near_landing, not_arriving
 from .scene import Scene
 from .starts import (
@@ -48,20 +47,17 @@ def read_goal_claim(section: object, n_sides: int) -> dict[str, Any]:
 def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
     """Read a goal; its entry `all` is true if it is about throws from all cells, not from the attracting ones alone."""
 
-    def whole(value: object, least: int, most: int, what: str) -> int:
-        fits = type(value) is int and least <= value < most
-        require(fits, f"goal.{what} is not a whole number as it should be")
-        return int(str(value))
+    def count(value: object, most: int, what: str) -> int:
+        return whole_number(value, 0, most - 1, f"goal.{what} is not a whole number as it should be")
 
     kind, anywhere = section["kind"], section.get("from_anywhere", False)
     require(isinstance(anywhere, bool), "goal.from_anywhere is neither true nor false")
     goal = {"kind": kind, "anywhere": anywhere, "all": anywhere or kind == "attracts_all"}
     if "x" in section:
-        x = quantity(section["x"], "length", "goal.x")
-        require(x.lo == x.hi, "goal.x is not one number")
-        goal |= {"x": x, "text": str(x), "side": whole(section["side"], 0, n_sides, "side")}
+        x = one_length(section["x"], "goal.x")
+        goal |= {"x": x, "text": str(x), "side": count(section["side"], n_sides, "side")}
     if kind == "oriented_beyond":
-        goal["throws"] = whole(section.get("throws", 0), 0, 3, "throws")
+        goal["throws"] = count(section.get("throws", 0), 3, "throws")
         require(
             goal["throws"] in (0, 2) and not (anywhere and goal["throws"]), "goal.throws is neither 0 nor 2"
         )
@@ -69,11 +65,11 @@ def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
         require(isinstance(section["every_orbit"], bool), "goal.every_orbit is neither true nor false")
         goal |= {
             "every": section["every_orbit"],
-            "throws": whole(section["throws"], 0, MOST_COUNTED, "throws"),
+            "throws": count(section["throws"], MOST_COUNTED, "throws"),
         }
     if kind == "flip_order":
-        order = [whole(i, 0, n_sides, "order") for i in rows(section["order"], "goal.order", 1, 64)]
-        goal |= {"order": order, "jogs": whole(section["jogs"], 0, MOST_COUNTED, "jogs")}
+        order = [count(i, n_sides, "order") for i in rows(section["order"], "goal.order", 1, 64)]
+        goal |= {"order": order, "jogs": count(section["jogs"], MOST_COUNTED, "jogs")}
     return goal
 
 
@@ -100,30 +96,19 @@ def goal_of_scene(scene: dict[str, Any], n_sides: int) -> dict[str, Any] | None:
 def content_of_goal(goal: dict[str, Any]) -> tuple[Any, ...]:
     """Return what a goal asks, for comparison: kind, x in metres, side, and the rest."""
     x = goal["x"].lo if "x" in goal else None
-    words = (goal.get("side"), goal.get("every"), goal.get("order"))
-    return (goal["kind"], goal["all"], x, *words)
+    return goal["kind"], goal["all"], x, goal.get("side"), goal.get("every"), goal.get("order")
 
 
-def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
-    """Check a goal by the integers, given that all images are what the certificate says; "" or the reason."""
-    starts, laid = goal["starts"], is_laid(goal)
-    if laid:  # the goal is asked of what these starts can come to
-        c, bad = laid_down(c, scene, starts)
-        if bad:
-            return bad
-    everywhere = goal["anywhere"] and goal["kind"] != "attracts_all" and not laid
-    bad = (check_everywhere(c, scene) if everywhere else "") or check_starts(c, scene, goal, starts)
-    if bad:
-        return bad
-    if goal["kind"] == "oriented_beyond":
-        return check_oriented(c, scene, goal)
-    if goal["kind"] == "reaches":
-        return check_reaches(c, scene, goal)
-    if goal["kind"] == "attracts_all":
-        return check_one_component(c)
-    if goal["kind"] == "flip_order":
-        return check_flip_order(c, goal)
-    return ""  # stays_on_arm says only that images lie in cells
+def check_goal(c: Cells, scene: Scene, goal: dict[str, Any]) -> None:
+    """Check a goal by the integers, given that all images are what the certificate says."""
+    if is_laid(goal):  # the goal is asked of what these starts can come to
+        c = laid_down(c, scene, goal["starts"])
+    if speaks_of_all(goal):
+        check_everywhere(c, scene)
+    check_starts(c, scene, goal, goal["starts"])
+    check = CHECKS.get(goal["kind"])
+    if check is not None:
+        check(c, scene, goal)
 
 
 def is_laid(goal: dict[str, Any]) -> bool:
@@ -131,76 +116,78 @@ def is_laid(goal: dict[str, Any]) -> bool:
     return goal["starts"].laid is not None
 
 
-def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
-    """Check that no attracting cell, or no target of any cell, of another side reaches beyond x; "" or the reason."""
+def speaks_of_all(goal: dict[str, Any]) -> bool:
+    """Whether the goal is claimed for the throws from everywhere on the arm."""
+    return bool(goal["anywhere"]) and goal["kind"] != "attracts_all" and not is_laid(goal)
+
+
+def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> None:
+    """Check that no attracting cell, or no target of any cell, of another side reaches beyond x."""
     beyond = goal["x"].lo / LENGTHS[scene.unit]
-    x = float(beyond)
-    if Fraction(x) > beyond:
-        x = math.nextafter(x, -math.inf)  # the largest float that is not above
+    x = float_of(beyond, up=False)
     wrong = (c.side != goal["side"]) & (c.upper() > x)
     if not goal["anywhere"]:
         wrong &= c.component >= 0
         if goal["throws"] and wrong.any():
-            return check_two_throws(c, scene, wrong, x)
-        return first_bad(
-            c, [(~wrong, f"an attracting cell of another side reaches beyond x = {float(beyond)!r}")]
-        )
-    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
-        q = np.flatnonzero(array[:, 0] >= 0)
-        good = np.ones(len(wrong), dtype=bool)
-        good[q] = range_max(wrong.astype(np.int64), array[q, 0], array[q, 1]) == 0
-        bad = first_bad(c, [(good, f"a {what} may end beyond x = {float(beyond)!r} on another side")])
-        if bad:
-            return bad
+            check_two_throws(c, scene, wrong, x)
+            return
+        c.prove_all(~wrong, f"an attracting cell of another side reaches beyond x = {float(beyond)!r}")
+        return
+    for what, q, _, most in c.targets(wrong.astype(np.int64), np.ones_like(wrong)):
+        good = np.ones_like(wrong)
+        good[q] = most == 0
+        c.prove_all(good, f"{what} may end beyond x = {float(beyond)!r} on another side")
     for i, edges in enumerate(c.edges if not is_laid(goal) else ()):
-        edge = float(edges[0])
-        if i != goal["side"] and not near_landing(scene.sides[i], scene.k_lo, scene.k_hi, edge) <= x:
-            return f"side {i}, near the joint: a throw may end beyond x = {float(beyond)!r}"
-    return ""
+        if i != goal["side"]:
+            near = near_landing(scene.sides[i], scene.k_lo, scene.k_hi, float(edges[0]))
+            prove(near <= x, f"side {i}, near the joint: a throw may end beyond x = {float(beyond)!r}")
 
 
-def check_reaches(c: Cells, scene: Scene, goal: dict[str, Any]) -> str:
-    """Check that orbits come to rest at x or beyond on the side, every one or almost every one; "" or the reason."""
-    least = goal["x"].lo / LENGTHS[scene.unit]
-    x = float(least)
-    if Fraction(x) < least:
-        x = math.nextafter(x, math.inf)  # the smallest float that is not below
-    wanted = (c.side == goal["side"]) & (c.lower() >= x)
+def check_reaches(c: Cells, scene: Scene, goal: dict[str, Any]) -> None:
+    """Check that orbits come to rest at x or beyond on the side, every one or almost every one."""
+    least = float_of(goal["x"].lo / LENGTHS[scene.unit], up=True)
+    wanted = (c.side == goal["side"]) & (c.lower() >= least)
     inside = c.component >= 0
     if goal["every"]:
         cells = c.rank >= 0 if goal["anywhere"] else inside
-        late = not_arriving(c, [c.jog, c.flip], cells, wanted, goal["throws"])
-        return first_bad(c, [(~late, f"{goal['throws']} throws are not proved to be enough")])
-    return check_thinning(c, scene, inside & ~wanted, goal["throws"], np.zeros(len(inside), dtype=np.int32))
+        late = not_arriving([c.jog, c.flip], cells, wanted, goal["throws"])
+        c.prove_all(~late, f"{goal['throws']} throws are not proved to be enough")
+    else:
+        alike = np.zeros(len(inside), dtype=np.int32)
+        check_thinning(c, scene, inside & ~wanted, goal["throws"], alike)
 
 
-def check_one_component(c: Cells) -> str:
-    """Check that each attracting cell leads to every other through targets; "" or the reason."""
+def check_one_component(c: Cells, _: Scene, __: dict[str, Any]) -> None:
+    """Check that each attracting cell leads to every other through targets."""
     inside = c.component >= 0
     start = np.zeros(len(inside), dtype=bool)
     start[np.argmax(inside)] = True
-    forward, backward = start.copy(), start.copy()
-    while True:
-        before = int(forward.sum()) + int(backward.sum())
-        forward |= targets_of([c.jog, c.flip], forward & inside)
-        backward |= leading_into(c, backward) & inside
-        if int(forward.sum()) + int(backward.sum()) == before:
-            break
-    connected = ~inside | (forward & backward)
-    return first_bad(c, [(connected, "an attracting cell is not of one component with the first")])
+    forward = grown(start, lambda known: targets_of([c.jog, c.flip], known & inside))
+    backward = grown(start, lambda known: leading_into(c, known) & inside)
+    c.prove_all(~inside | (forward & backward), "an attracting cell is not of one component with the first")
 
 
-def check_flip_order(c: Cells, goal: dict[str, Any]) -> str:
+def check_flip_order(c: Cells, _: Scene, goal: dict[str, Any]) -> None:
     """Check that orbits from the attracting cells come to the sides in the order asked, again and again."""
     order, n, inside = goal["order"], len(c.edges), c.component >= 0
     if len(order) == 1 and not goal["anywhere"]:
-        return first_bad(c, [(~inside | (c.side == order[0]), "an attracting cell lies on another side")])
+        c.prove_all(~inside | (c.side == order[0]), "an attracting cell lies on another side")
+        return
     follows = all((a + 1) % n == b for a, b in zip(order, order[1:] + order[:1], strict=True))
-    if len(order) != n or not follows:
-        return "the order is not that in which flips lead from side to side"
+    right = len(order) == n and follows
+    prove(right, "the order is not that in which flips lead from side to side")
     # one more than the jogs in a row: the throw after them is a flip, or there is none
-    late = not_arriving(c, [c.jog], inside, np.zeros(len(inside), dtype=bool), goal["jogs"] + 1)
-    return first_bad(c, [(~late, f"{goal['jogs'] + 1} jogs in a row are not excluded")])
+    late = not_arriving([c.jog], inside, np.zeros(len(inside), dtype=bool), goal["jogs"] + 1)
+    c.prove_all(~late, f"{goal['jogs'] + 1} jogs in a row are not excluded")
+
+
+CHECKS: dict[str, Callable[[Cells, Scene, dict[str, Any]], None]] = {
+    "oriented_beyond": check_oriented,
+    "reaches": check_reaches,
+    "attracts_all": check_one_component,
+    "flip_order": check_flip_order,
+}
+"""What each goal asks of the cells; `stays_on_arm` says only that images lie in cells."""
 
 
 def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .balls import Array
+from .balls import Array, UnprovedError
 
 
 def box_max(table: Array, first: Array, last: Array) -> Array:
@@ -67,21 +67,24 @@ class Labelled:
         """Return the ways to target cells."""
         raise NotImplementedError  # jog and flip, or branches
 
-    def check_components(self, cells: Array) -> str:
-        """Check that some cells of components map into cells of their own component; "" or the reason."""
-        for way, chosen, least, most in self.targets(self.component, cells):
-            bad = chosen[(least != self.component[chosen]) | (most != self.component[chosen])]
-            if len(bad):
-                return f"{self.name(int(bad[0]))}: {way} may lead out of its component"
-        return ""
+    def prove_all(self, good: Array, what: str) -> None:
+        """Prove something of all cells, by cell; the reason names the first of which it is not known."""
+        if not good.all():
+            raise UnprovedError(f"{self.name(int(np.argmin(good)))}: {what}")
 
-    def check_falling(self, what: str, label: Array, cells: Array) -> str:
-        """Check that a label falls along every way from some cells, to targets that have one; "" or the reason."""
+    def check_components(self, cells: Array) -> None:
+        """Check that some cells of components map into cells of their own component."""
+        for way, chosen, least, most in self.targets(self.component, cells):
+            stays = np.ones(len(cells), dtype=bool)
+            stays[chosen] = (least == self.component[chosen]) & (most == self.component[chosen])
+            self.prove_all(stays, f"{way} may lead out of its component")
+
+    def check_falling(self, what: str, label: Array, cells: Array) -> None:
+        """Check that a label falls along every way from some cells, to targets that have one."""
         for way, chosen, least, most in self.targets(label, cells):
-            bad = chosen[(least < 0) | (most >= label[chosen])]
-            if len(bad):
-                return f"{self.name(int(bad[0]))}: the {what} does not fall along {way}"
-        return ""
+            falls = np.ones(len(cells), dtype=bool)
+            falls[chosen] = (least >= 0) & (most < label[chosen])
+            self.prove_all(falls, f"the {what} does not fall along {way}")
 
     def targets(self, label: Array, cells: Array) -> Iterator[tuple[str, Array, Array, Array]]:
         """Give by way the cells, of some, from which it is possible, and the extremes of a label among targets."""

@@ -53,9 +53,8 @@ class Collected:
         return np.array([row[at] for row in self.rows], dtype=kind)
 
 
-def collected(*columns: str) -> Collected:
-    """Return a table that is empty."""
-    return Collected(columns)
+LANDING = ("at", "much", "side", "lo", "hi", "side2", "lo2", "hi2")
+BEND = ("at", "least", "most", "side", "lo", "hi")
 
 
 @dataclass
@@ -68,18 +67,12 @@ class Parts:
     known than where their throws may land.
     """
 
-    at_cells: Collected = field(
-        default_factory=lambda: collected("at", "much", "side", "lo", "hi", "side2", "lo2", "hi2")
-    )
-    at_nodes: Collected = field(
-        default_factory=lambda: collected("at", "much", "side", "lo", "hi", "side2", "lo2", "hi2")
-    )
-    hard: Collected = field(
-        default_factory=lambda: collected("at", "much", "side", "lo", "hi", "side2", "lo2", "hi2", "node")
-    )
-    ends: Collected = field(default_factory=lambda: collected("at", "least", "most", "side", "lo", "hi"))
-    inner: Collected = field(default_factory=lambda: collected("at", "much", "side", "lo", "hi"))
-    turns: Collected = field(default_factory=lambda: collected("at", "least", "most", "side", "lo", "hi"))
+    at_cells: Collected = field(default_factory=lambda: Collected(LANDING))
+    at_nodes: Collected = field(default_factory=lambda: Collected(LANDING))
+    hard: Collected = field(default_factory=lambda: Collected((*LANDING, "node")))
+    ends: Collected = field(default_factory=lambda: Collected(BEND))
+    inner: Collected = field(default_factory=lambda: Collected(("at", "much", "side", "lo", "hi")))
+    turns: Collected = field(default_factory=lambda: Collected(BEND))
 
 
 class Reach:
@@ -116,27 +109,22 @@ class Bent:
         return np.minimum.reduce(some), np.maximum.reduce(some)
 
 
-@dataclass
 class Chain:
-    """The chain on its mesh; `live` are the cells of which throws are made, by their left nodes.
+    """The chain on its mesh: `live` are the cells of which throws are made, by their left nodes.
 
-    `absorbed`: by name the nodes of the cells that absorb; the exits are one of the names.
+    `absorbed`: by name the nodes of the cells that absorb; the exits are one of the names.  `beside`: by hard cell the
+    node whose mean may serve for it.  `curved`, `turned`: the live cells with `ends`, and with `turns`.
     """
 
-    mesh: Mesh
-    rows: Rows
-    live: Array
-    absorbed: dict[str, Array]
-    table: Table
-    cells: Reach
-    nodes: Reach
-    hard: Reach
-    beside: Array  # by hard cell the node whose mean may serve for it
-    ends: Bent
-    inner: Bent
-    turns: Bent
-    curved: Array  # live cells with `ends`, by their left nodes
-    turned: Array  # live cells with `turns`
+    def __init__(self, mesh: Mesh, rows: Rows, absorbed: dict[str, Array], parts: Parts, e: float):
+        self.mesh, self.rows, self.absorbed, self.table = mesh, rows, absorbed, Table(mesh, e)
+        self.live = np.sort(parts.at_cells.array("at", np.int64))
+        self.cells, self.nodes = Reach(self.table, parts.at_cells), Reach(self.table, parts.at_nodes)
+        self.hard, self.beside = Reach(self.table, parts.hard), parts.hard.array("node", np.int64)
+        self.ends, self.inner, self.turns = (
+            Bent(self.table, some) for some in (parts.ends, parts.inner, parts.turns)
+        )
+        self.curved, self.turned = np.unique(self.ends.at), np.unique(self.turns.at)
 
     def fixed(self, value: dict[str, float]) -> Array:
         """Return the largest value on places that absorb, -inf where there is none."""

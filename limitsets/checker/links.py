@@ -17,7 +17,6 @@ from .averages import (
     Mesh,
     Slopes,
     Spread,
-    Table,
     advance_over,
     guess_angles,
     kappa_at,
@@ -25,7 +24,7 @@ from .averages import (
     slopes_over,
 )
 from .balls import Arb, Array, exact
-from .landings import MOST_PLACE, Bent, Border, Chain, Landings, Noisy, Parts, Reach, both_ends, upper
+from .landings import MOST_PLACE, Border, Chain, Landings, Noisy, Parts, both_ends, upper
 from .model import over_angles
 
 ABSORBED, LIVE, HARD = 0, 1, 2  # what a cell is: all of it absorbs, none of it does, or anything else
@@ -273,28 +272,7 @@ def chain_of(
         links.run(advance)
         spread += links.spread
     e = float(noisy.landing)
-    table = Table(mesh, e)
     kinds_of_columns = (np.int64, float, np.int64, float, float)
     columns = [np.array([put[k] for put in spread], dtype=kind) for k, kind in enumerate(kinds_of_columns)]
     rows = mean_rows(len(mesh.place), mesh, Spread(*columns), e)
-    live = np.sort(parts.at_cells.array("at", np.int64))
-    cells, nodes, hard = (Reach(table, some) for some in (parts.at_cells, parts.at_nodes, parts.hard))
-    ends, inner, turns = (Bent(table, some) for some in (parts.ends, parts.inner, parts.turns))
-    curved, turned = np.unique(ends.at), np.unique(turns.at)
-    beside = parts.hard.array("node", np.int64)
-    return Chain(
-        mesh,
-        rows,
-        live,
-        absorbed=absorbed,
-        table=table,
-        cells=cells,
-        nodes=nodes,
-        hard=hard,
-        beside=beside,
-        ends=ends,
-        inner=inner,
-        turns=turns,
-        curved=curved,
-        turned=turned,
-    )
+    return Chain(mesh, rows, absorbed, parts, e)

@@ -8,15 +8,14 @@ import itertools
 import math
 import operator
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import flint
 import numpy as np
 from flint import arb
 
 from .any_map import Bound, CellClaim, Map, Shape, check_map_cell, floats_around, period_of
-from .balls import PRECISION, ZERO, Arb, Array, Pair
-from .cells import CHUNK, Failure
+from .balls import ZERO, Arb, Array, Pair, prove
+from .cells import CHUNK, Checked, of_box
 from .file import Arrays, require
 from .labels import Labelled, Way, box_max
 
@@ -153,23 +152,21 @@ class MapCells(Labelled):
             most[own[met]] = box_max(table, first[met], last[met])
         return least, most
 
-    def check_labels(self, final: Array) -> str:
-        """Check the two rules by whole numbers, off the final cells; "" or the reason.
+    def check_labels(self, final: Array) -> None:
+        """Check the two rules by whole numbers, off the final cells.
 
         Every target of an attracting cell is of its component; of every other cell with a rank it has a smaller one.
         """
         attracting, checked = self.component >= 0, (self.rank >= 0) & ~final
-        high = np.flatnonzero(attracting & (self.rank != 0))
-        if len(high):
-            return f"{self.name(int(high[0]))}: it has a component, and a rank that is not 0"
-        return self.check_components(checked & attracting) or self.check_falling(
-            "rank", self.rank, checked & ~attracting
-        )
+        self.prove_all(~attracting | (self.rank == 0), "it has a component, and a rank that is not 0")
+        self.check_components(checked & attracting)
+        self.check_falling("rank", self.rank, checked & ~attracting)
 
-    def check_exits(self) -> str:
-        """Check that the exit falls along every target inside the domain; "" or the reason."""
+    def check_exits(self) -> None:
+        """Check that the exit falls along every target inside the domain."""
         has_exit = self.exit >= 0
-        return self.check_falling("exit", self.exit, has_exit) if has_exit.any() else "no cell has an exit"
+        prove(bool(has_exit.any()), "no cell has an exit")
+        self.check_falling("exit", self.exit, has_exit)
 
 
 # ----------------------------------------------------------------
@@ -239,33 +236,24 @@ def ends_of_targets(edges: list[Array], rows: Array, closed: Array) -> tuple[Arr
     return ends, beyond
 
 
-# Balls cannot be sent to another process: each keeps the texts of all boxes, and the map of the box that it is at.
-MAP_SETUP: list[Any] = []
-MAPS: dict[int, Map] = {}
+def map_of_box(box: int, shape: Shape, parameters: list[dict[str, tuple[str, str]]]) -> Map:
+    """Return the map of a box of parameters."""
+    return Map(shape, parameters[box])
 
 
-def prepare_map(shape: Shape, parameters: list[dict[str, tuple[str, str]]]) -> None:
-    """Set up a process that checks cells of a map."""
-    flint.ctx.prec = PRECISION
-    MAP_SETUP[:] = shape, parameters
-    MAPS.clear()
-
-
-def check_map_task(task: MapTask) -> tuple[int, Failure | None, int]:
-    """Return the first cell of a task that is not proved (-1 if all are), the reason, and the number of pieces."""
-    if task.box not in MAPS:
-        MAPS.clear()
-        MAPS[task.box] = Map(MAP_SETUP[0], MAP_SETUP[1][task.box])
+def check_map_task(task: MapTask) -> Checked:
+    """Check the cells of a task."""
+    the_map: Map = of_box(task.box)
     total = 0
     for i, cell in enumerate(task.cells.tolist()):
         ends, least = task.ends[i].tolist(), float(task.least[i])
         pairs = zip(task.targets, task.strict, strict=True)
         bounds = [bounds_of(target[i].tolist(), bool(strict[i])) for target, strict in pairs]
         box = list(zip(ends[::2], ends[1::2], strict=True))
-        if MAP_SETUP[0].closes:
-            bounds = [turned(MAPS[task.box], (task.side, b), box, each) for b, each in enumerate(bounds)]
+        if the_map.shape.closes:
+            bounds = [turned(the_map, (task.side, b), box, each) for b, each in enumerate(bounds)]
         claimed = CellClaim(task.side, box, bounds, arb(least) if least > 0 else None)
-        failure, pieces = check_map_cell(MAPS[task.box], claimed)
+        failure, pieces = check_map_cell(the_map, claimed)
         total += pieces
         if failure is not None:
             return cell, failure, total

@@ -12,10 +12,9 @@ import numpy as np
 from flint import arb, arb_mat
 
 from .any_map import Map, Shape, floats_around, possible
-from .balls import ONE, ZERO, Arb, Pair
-from .file import hex_float, read_side, require, rounded, rows, table
+from .balls import ONE, ZERO, Arb, Pair, UnprovedError, about, prove
+from .file import hex_float, is_whole, read_side, require, rounded, rows, table
 from .map_cells import MapCells
-from .program import is_whole
 
 MOST_CYCLES, MOST_POINTS, MOST_TURNS = 1_000, 200, 2**53
 WORST_MATRIX = 1e12  # condition of Newton's matrix, above which it is taken for singular
@@ -110,17 +109,17 @@ def matrix(entries: list[list[Any]]) -> Matrix:
     return arb_mat(len(entries), len(entries[0]), [v for row in entries for v in row])
 
 
-def slopes_along(the_map: Map, listed: Listed, boxes: Boxes) -> tuple[list[list[list[Arb]]], str]:
-    """Enclose the matrix of derivatives on each box of an orbit, whose sides and branches are proved; or the reason."""
+def slopes_along(the_map: Map, listed: Listed, boxes: Boxes) -> list[list[list[Arb]]]:
+    """Enclose the matrix of derivatives on each box of an orbit, whose sides and branches are proved."""
     slopes = []
     for k, (side, branch, box) in enumerate(zip(listed.side, listed.branch, boxes, strict=True)):
         piece = the_map.piece(box)
         leads = the_map.shape.to[side, branch] == listed.side[(k + 1) % len(boxes)]
-        if not leads or possible(the_map, side, piece)[0] != (branch,):
-            return [], f"side or branch of point {k} is not proved"
+        alone = leads and possible(the_map, side, piece)[0] == (branch,)
+        prove(alone, f"side or branch of point {k} is not proved")
         gradients = the_map.image[side, branch].gradients(piece.balls)
         slopes.append([gradient[: the_map.dimension] for gradient in gradients])
-    return slopes, ""
+    return slopes
 
 
 class Cycle:
@@ -133,30 +132,27 @@ class Cycle:
         self.inverses: list[Matrix] = []
         self.hulls: list[tuple[int, list[Pair]]] = []  # side and box around each ball
 
-    def prove(self) -> str:
-        """Prove existence, period and, where claimed, that it attracts or is unstable; "" or the reason."""
-        slopes, bad = slopes_along(self.map, self.listed, self.listed.boxes)
-        bad = bad or self.krawczyk(slopes)
-        if bad:
-            return bad
-        if not all(map(self.is_off_the_seams, self.listed.side, self.points)):
-            return "that its points lie in the domain, off the seam, is not proved"
+    def prove(self) -> None:
+        """Prove existence, period and, where claimed, that it attracts or is unstable."""
+        slopes = slopes_along(self.map, self.listed, self.listed.boxes)
+        self.krawczyk(slopes)
+        off = all(map(self.is_off_the_seams, self.listed.side, self.points))
+        prove(off, "that its points lie in the domain, off the seam, is not proved")
         first = self.points[0]
         for k in range(1, self.period):
             again = self.period % k == 0 and self.listed.side[k] == self.listed.side[0]
-            if again and meet(first, self.points[k]):
-                return f"that its period is not {k} is not proved"
+            prove(not (again and meet(first, self.points[k])), f"that its period is not {k} is not proved")
         try:
             self.inverses = [frame.inv() for frame in self.frames]
         except ZeroDivisionError:
-            return "a frame is singular"
-        if self.listed.attracts and not math.prod(self.stretches(slopes), start=ONE) < 1:
-            return "that it attracts is not proved"
+            raise UnprovedError("a frame is singular") from None
+        attracts = not self.listed.attracts or math.prod(self.stretches(slopes), start=ONE) < 1
+        prove(attracts, "that it attracts is not proved")
         unstable = not self.listed.unstable or self.has_multiplier_above_one(slopes)
-        return "" if unstable else "that it is unstable is not proved"
+        prove(unstable, "that it is unstable is not proved")
 
-    def krawczyk(self, slopes: list[list[list[Arb]]]) -> str:
-        """Prove that K(X), of all points together, lies in the interior of X, and store it; "" or the reason."""
+    def krawczyk(self, slopes: list[list[list[Arb]]]) -> None:
+        """Prove that K(X), of all points together, lies in the interior of X, and store it."""
         d, boxes = self.map.dimension, self.listed.boxes
         after = [*self.listed.side[1:], self.listed.side[0]]
         turned = [
@@ -165,12 +161,10 @@ class Cycle:
             for k, period in zip(turns, self.map.periods[side], strict=True)
         ]
         entries = newton_image(self.map, (self.listed.side, self.listed.branch), boxes, slopes, turned)
-        if not entries:
-            return "Newton's matrix is singular, or nearly so"
-        if not all(v > lo and v < hi for v, (lo, hi) in zip(entries, itertools.chain(*boxes), strict=True)):
-            return "that K(X) lies in the interior of X is not proved"
+        prove(bool(entries), "Newton's matrix is singular, or nearly so")
+        inside = all(v > lo and v < hi for v, (lo, hi) in zip(entries, itertools.chain(*boxes), strict=True))
+        prove(inside, "that K(X) lies in the interior of X is not proved")
         self.points = [entries[k * d : k * d + d] for k in range(self.period)]
-        return ""
 
     def is_off_the_seams(self, side: int, box: list[Arb]) -> bool:
         """Whether it is proved that the states of a box lie between both ends of each axis that closes.
@@ -207,26 +201,26 @@ class Cycle:
             for side, point in zip(self.listed.side, self.points, strict=True)
         )
 
-    def contract(self) -> str:
-        """Prove that the map contracts the balls |S_k^-1 (x - x_k)| < r around the orbit; "" or the reason."""
+    def contract(self) -> None:
+        """Prove that the map contracts the balls |S_k^-1 (x - x_k)| < r around the orbit."""
         r, self.hulls = arb(self.listed.radius), []
         for side, point, frame in zip(self.listed.side, self.points, self.frames, strict=True):
             reach = [r * sum((v * v for v in row), ZERO).sqrt() for row in frame.tolist()]
             ball = [(v - far).union(v + far) for v, far in zip(point, reach, strict=True)]
-            if not self.is_off_the_seams(side, ball):
-                return "that its balls lie in the domain, off the seam, is not proved"
+            off = self.is_off_the_seams(side, ball)
+            prove(off, "that its balls lie in the domain, off the seam, is not proved")
             self.hulls.append((side, [floats_around(v) for v in ball]))
-        slopes, bad = slopes_along(self.map, self.listed, [hull for _, hull in self.hulls])
-        contracts = not bad and all(stretch < 1 for stretch in self.stretches(slopes))
-        return "" if contracts else f"that its balls are contracted is not proved{f': {bad}' if bad else ''}"
+        with about("that its balls are contracted is not proved"):
+            slopes = slopes_along(self.map, self.listed, [hull for _, hull in self.hulls])
+        contracts = all(stretch < 1 for stretch in self.stretches(slopes))
+        prove(contracts, "that its balls are contracted is not proved")
 
-    def check_drawn(self, c: MapCells, cells: list[int]) -> str:
-        """Prove that some cells lie in these balls, by their corners; "" or the reason."""
+    def check_drawn(self, c: MapCells, cells: list[int]) -> None:
+        """Prove that some cells lie in these balls, by their corners."""
         for cell in cells:
             side, box = c.box(cell)
             if not any(self.holds(k, box) for k in range(self.period) if self.listed.side[k] == side):
-                return f"{c.name(cell)}: that it lies in a ball of its cycle is not proved"
-        return ""
+                raise UnprovedError(f"{c.name(cell)}: that it lies in a ball of its cycle is not proved")
 
     def holds(self, k: int, box: list[Pair]) -> bool:
         """Whether all corners of a box, hence the box, are proved to lie in the k-th ball."""

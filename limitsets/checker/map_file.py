@@ -7,12 +7,22 @@ from typing import Any, NamedTuple
 
 from .any_map import Shape, read_map, read_parameters
 from .balls import Pair
-from .file import Arrays, hex_float, read_boxes, read_sections, read_side, require, rows, table
+from .file import (
+    Arrays,
+    hex_float,
+    is_whole,
+    read_boxes,
+    read_sections,
+    read_side,
+    require,
+    rows,
+    table,
+    whole_number,
+)
 from .map_cells import MapCells
 from .map_cycles import Begins, Listed, read_begins, read_box, read_cycles
 from .map_orbits import Every, read_every
 from .map_plane import ParameterAxis, RegionPlace, read_axes, read_region_boxes
-from .program import is_whole
 
 CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "cycles": "cycles",
@@ -149,8 +159,8 @@ def read_numbers(known: dict[str, Any], shape: Shape, where: str) -> dict[str, A
     """Read the numbers of `attracts-all` and `expanding`, 0 where these are not claimed."""
     numbers: dict[str, Any] = {"max_rank": 0, "least": 0.0}
     if "attracts-all" in known:
-        numbers["max_rank"] = known["attracts-all"]["max_rank"]
-        require(is_whole(numbers["max_rank"], 0, 2**31), f"{where}: max_rank is not a whole number")
+        max_rank = known["attracts-all"]["max_rank"]
+        numbers["max_rank"] = whole_number(max_rank, 0, 2**31, f"{where}: max_rank is not a whole number")
     if "expanding" in known:
         numbers["least"] = hex_float(known["expanding"]["least"], f"{where}: least")
         above = shape.dimension == 1 and numbers["least"] > 1

@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 from flint import arb
 
 from .any_map import Map, Shape, floats_around, possible
-from .balls import Pair
-from .file import read_side, require, rows, table
+from .balls import Pair, UnprovedError, about, prove
+from .file import read_side, require, rows, table, whole_number
 from .map_cycles import MOST_POINTS, Boxes, Cycle, newton_image, read_box
-from .program import is_whole
 
 MOST_TUBES = 500_000  # of one period: a certificate that needs more is refused
 OPEN = -1  # a side or a branch that is not known yet
@@ -44,46 +43,40 @@ class Tube(NamedTuple):
 
 def read_every(section: dict[str, Any], shape: Shape, where: str) -> Every:
     """Read the claim."""
-    require(
-        is_whole(section["period"], 1, MOST_POINTS),
-        f"{where}: the period of all-cycles is not a whole number of 1 to {MOST_POINTS}",
-    )
+    what = f"{where}: the period of all-cycles is not a whole number of 1 to {MOST_POINTS}"
+    period = whole_number(section["period"], 1, MOST_POINTS, what)
     listed = [
         table(one, f"{where}: domain", "side box")
         for one in rows(section["domain"], f"{where}: domain", shape.sides, shape.sides)
     ]
     ordered = [read_side(one["side"], shape.sides) for one in listed] == list(range(shape.sides))
     require(ordered, f"{where}: the domain of all-cycles has not one box on each side, in order")
-    return Every(section["period"], [read_box(one["box"], shape.dimension, where) for one in listed])
+    return Every(period, [read_box(one["box"], shape.dimension, where) for one in listed])
 
 
-def check_every(the_map: Map, every: Every, cycles: list[Cycle]) -> str:
-    """Prove that proved cycles are all; "" or the reason."""
+def check_every(the_map: Map, every: Every, cycles: list[Cycle]) -> None:
+    """Prove that proved cycles are all."""
     for k, cycle in enumerate(cycles):
-        if cycle.period > every.period:
-            return f"cycle {k} has a longer period than all-cycles is about"
+        prove(cycle.period <= every.period, f"cycle {k} has a longer period than all-cycles is about")
         for side, point in zip(cycle.listed.side, cycle.points, strict=True):
             pairs = zip(point, every.domain[side], strict=True)
-            if not all(v >= lo and v <= hi for v, (lo, hi) in pairs):
-                return f"that cycle {k} lies in the domain is not proved"
+            inside = all(v >= lo and v <= hi for v, (lo, hi) in pairs)
+            prove(inside, f"that cycle {k} lies in the domain is not proved")
     # an orbit of period q is one of each multiple of q
     for period in range(every.period // 2 + 1, every.period + 1):
-        bad = check_period(the_map, every.domain, period, cycles)
-        if bad:
-            return f"period {period}: {bad}"
-    return ""
+        with about(f"period {period}"):
+            check_period(the_map, every.domain, period, cycles)
 
 
-def check_period(the_map: Map, domain: Boxes, period: int, cycles: list[Cycle]) -> str:
-    """Prove that every orbit of F^period = x in the domain is a listed one; "" or the reason."""
+def check_period(the_map: Map, domain: Boxes, period: int, cycles: list[Cycle]) -> None:
+    """Prove that every orbit of F^period = x in the domain is a listed one."""
     stack, tried = [], 0
     hull = [(min(lo for lo, _ in along), max(hi for _, hi in along)) for along in zip(*domain, strict=True)]
     for side, box in enumerate(domain):
         stack.append(Tube([box, *[hull] * (period - 1)], [side, *[OPEN] * (period - 1)], [OPEN] * period))
     while stack:
         tried += 1
-        if tried > MOST_TUBES:
-            return f"more than {MOST_TUBES} tubes would be needed"
+        prove(tried <= MOST_TUBES, f"more than {MOST_TUBES} tubes would be needed")
         tube: Tube | None = stack.pop()
         for _ in range(ROUNDS):
             tube = None if tube is None else narrowed(the_map, tube)
@@ -97,9 +90,8 @@ def check_period(the_map: Map, domain: Boxes, period: int, cycles: list[Cycle]) 
             continue
         k, axis, share = widest(tube.boxes, hull)
         if share < LEAST:
-            return f"near {tube.boxes[0]} orbits are not told apart from the listed ones"
+            raise UnprovedError(f"near {tube.boxes[0]} orbits are not told apart from the listed ones")
         stack += halves(tube, k, axis)
-    return ""
 
 
 def meet_of(one: Pair, other: Pair) -> Pair:

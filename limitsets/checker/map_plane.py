@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .file import plain, require, rows, table
-from .program import is_whole, named, rational
+from .file import is_whole, plain, require, rows, table
+from .program import named, rational
 
 MOST_PARAMETER_BORDERS = 100_000  # along an axis
 MOST_SMALLEST_BOXES = 10_000_000  # between the borders of all axes
@@ -71,10 +71,11 @@ def read_region_boxes(
 
 def volume(axes: list[ParameterAxis], place: RegionPlace) -> Fraction:
     """Return the share of the region in which a box lies, exactly."""
-    share = Fraction(1)
-    for axis, (low, high) in zip(axes, place, strict=True):
-        share *= (axis.values[high] - axis.values[low]) / (axis.values[-1] - axis.values[0])
-    return share
+    pairs = zip(axes, place, strict=True)
+    return math.prod(
+        ((a.values[high] - a.values[low]) / (a.values[-1] - a.values[0]) for a, (low, high) in pairs),
+        start=Fraction(1),
+    )
 
 
 def region_in_words(

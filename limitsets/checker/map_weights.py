@@ -27,7 +27,7 @@ import itertools
 import numpy as np
 
 from .any_map import Map, floats_around
-from .balls import Array
+from .balls import Array, UnprovedError
 from .map_cells import MapCells
 
 SMALLEST, LARGEST = (
@@ -37,21 +37,17 @@ SMALLEST, LARGEST = (
 ROOM = 1.0 - 2.0**-20  # sums of at most 2^31 quotients are right to 2^-21
 
 
-def check_weights(the_map: Map, c: MapCells) -> str:
-    """Check that the cells without a rank receive less than their weights; "" or the reason."""
+def check_weights(the_map: Map, c: MapCells) -> None:
+    """Check that the cells without a rank receive less than their weights."""
     received, fits = np.zeros(len(c.rank)), (c.weight >= SMALLEST) & (c.weight <= LARGEST)
-    if not fits[c.thin].all():
-        return f"{c.name(int(np.argmax(c.thin & ~fits)))}: its weight is not between 2^-500 and 2^500"
+    c.prove_all(~c.thin | fits, "its weight is not between 2^-500 and 2^500")
     for branch, side in itertools.product(range(len(c.target)), range(len(c.edges))):
-        bad = add_received(the_map, c, (side, branch), received)
-        if bad:
-            return bad
-    heavy = np.flatnonzero(c.thin & ~(received < c.weight * ROOM))
-    return f"{c.name(int(heavy[0]))}: it may receive as much as its weight" if len(heavy) else ""
+        add_received(the_map, c, (side, branch), received)
+    c.prove_all(~c.thin | (received < c.weight * ROOM), "it may receive as much as its weight")
 
 
-def add_received(the_map: Map, c: MapCells, key: tuple[int, int], received: Array) -> str:
-    """Add what the cells of a side receive on a branch, the largest of each run; "" or the reason."""
+def add_received(the_map: Map, c: MapCells, key: tuple[int, int], received: Array) -> None:
+    """Add what the cells of a side receive on a branch, the largest of each run."""
     side, branch = key
     begin, count = int(c.start[c.to[branch][side]]), int(c.counts[c.to[branch][side]][0])
     runs: list[list[tuple[int, int, float]]] = []
@@ -65,7 +61,8 @@ def add_received(the_map: Map, c: MapCells, key: tuple[int, int], received: Arra
         slope = the_map.image[key].gradients(the_map.piece(c.box(cell)[1]).balls)[0][0]
         least = floats_around(abs(slope))[0]
         if not ((slope > 0 or slope < 0) and least >= SMALLEST):
-            return f"{c.name(cell)}: that the slope on branch {branch} has one sign is not proved"
+            why = f"that the slope on branch {branch} has one sign is not proved"
+            raise UnprovedError(f"{c.name(cell)}: {why}")
         if before != (cell - 1, bool(slope > 0)):
             runs.append([])
         runs[-1].append((first, last, float(c.weight[cell]) / min(least, LARGEST)))
@@ -77,4 +74,3 @@ def add_received(the_map: Map, c: MapCells, key: tuple[int, int], received: Arra
             part = slice(low - first, high + 1 - first)
             largest[part] = np.maximum(largest[part], density)
         received[first : last + 1] += largest
-    return ""

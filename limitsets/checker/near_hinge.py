@@ -5,14 +5,14 @@ docs/certificates.md, "What it rests on", number 6 (near the joint), and "The su
 
 import itertools
 import math
-from fractions import Fraction
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 from flint import arb
 
-from .balls import HALF, ONE, ZERO, Arb, Array, Pair
-from .cells import first_bad
+from .balls import HALF, ONE, ZERO, Arb, Array, Pair, UnprovedError, about, prove
+from .cells import check_reach
 from .file import Cells, by_side, hex_float, require, rounded, rows, table
 from .model import (
     Ratios,
@@ -66,8 +66,8 @@ def near_landing(s: Side, k_lo: Arb, k_hi: Arb, edge: float) -> Arb:
     return arb(edge) + abs(s.h) * bound + HALF * s.a * bound**2 + s.landing
 
 
-def check_near_hinge(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float) -> str:
-    """Prove on (a, edge] that a throw is a decided jog and R' - a >= q (R - a), R' <= arm; "" or the reason.
+def check_near_hinge(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float) -> None:
+    """Prove on (a, edge] that a throw is a decided jog and R' - a >= q (R - a), R' <= arm.
 
     f = (R - a) phi + a (phi - sin phi) + d (1 - cos phi) - (kappa/2) phi^2 and both brackets are >= 0, so f > 0 for
     phi < 2 (R - a)/kappa: the impact comes later than that.  f rises with R, so f(bound) < 0 at the edge bounds it
@@ -75,52 +75,48 @@ def check_near_hinge(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float) -> st
     and <= -h phi + a phi^2/2.  Small angles: phi = 2 (R - a)/(kappa - small_d) and R' - R = -h phi.
     """
     x, height = arb(edge), -s.h
-    if not s.landing <= 0:
-        return "with noise of the landing place a part near the joint may land at x <= a"
-    if not height > 0:
-        return "the arm's surface is not below the joint"
-    if not x > s.a:
-        return "the cells begin left of a"
+    prove(s.landing <= 0, "with noise of the landing place a part near the joint may land at x <= a")
+    prove(height > 0, "the arm's surface is not below the joint")
+    prove(x > s.a, "the cells begin left of a")
     bound = near_angle(s, k_lo, k_hi, edge)
-    if not bound < 1:
-        return "the impact angle is not bounded"
-    if s.exact and not HALF * s.a - s.a * bound**2 / 24 - s.d * bound / 6 > 0:
-        return "a (1 - cos phi) >= d (phi - sin phi) is not proved"
-    if not (q > 1 and q <= 1 + 2 * height / (k_hi - s.small_d)):
-        return f"R' - a >= q (R - a) is not proved for q = {q!r}"
-    if not x + height * bound + HALF * (s.a if s.exact else ZERO) * bound**2 <= s.arm:
-        return "R' <= arm.length is not proved"
-    return check_all_jog(s, k_lo.union(k_hi), x, bound)
+    prove(bound < 1, "the impact angle is not bounded")
+    rises = not s.exact or HALF * s.a - s.a * bound**2 / 24 - s.d * bound / 6 > 0
+    prove(rises, "a (1 - cos phi) >= d (phi - sin phi) is not proved")
+    grows = q > 1 and q <= 1 + 2 * height / (k_hi - s.small_d)
+    prove(grows, f"R' - a >= q (R - a) is not proved for q = {q!r}")
+    last = x + height * bound + HALF * (s.a if s.exact else ZERO) * bound**2
+    prove(last <= s.arm, "R' <= arm.length is not proved")
+    check_all_jog(s, k_lo.union(k_hi), x, bound)
 
 
-def check_all_jog(s: Side, kappa: Arb, x: Arb, bound: Arb) -> str:
-    """Prove that throws from (a, x] with impact angles up to the bound are jogs; "" or the reason."""
+def check_all_jog(s: Side, kappa: Arb, x: Arb, bound: Arb) -> None:
+    """Prove that throws from (a, x] with impact angles up to the bound are jogs."""
     R, pieces = s.a.union(x), 64
     for k in range(pieces):
         phi = (bound * k / pieces).union(bound * (k + 1) / pieces)
-        if over_angles(s, phi, R, kappa)[0] != 0:
-            return "a jog is not proved"
-    return ""
+        prove(over_angles(s, phi, R, kappa)[0] == 0, "a jog is not proved")
 
 
-def check_everywhere(c: Cells, scene: Scene) -> str:
-    """Check that every start on the arm is in a cell, or near the joint and thrown outward; "" or the reason."""
-    for i, edges in enumerate(c.edges):
-        if Fraction(float(edges[-1])) < scene.arm[1]:
-            return f"side {i}: the cells end before arm.length"
-        edge = float(edges[0])
-        near = check_by_halves(scene, check_thrown_out, i, edge)
-        if near:
-            return f"side {i}, near the joint, x in (a, {edge!r}]: {near}"
-    return ""
+def check_everywhere(c: Cells, scene: Scene) -> None:
+    """Check that every start on the arm is in a cell, or near the joint and thrown outward."""
+    for i in range(len(c.edges)):
+        check_reach(c, scene, i)
+        check_near_joint(c, scene, i, check_thrown_out)
 
 
-def check_thrown_out(scene: Scene, side: int, edge: float) -> str:
-    """Check that starts up to the edge are thrown outward, by any factor above 1; "" or the reason."""
+def check_near_joint(c: Cells, scene: Scene, side: int, check: Callable[..., None], *more: Any) -> None:
+    """Check something of the starts before the first cell of a side."""
+    edge = float(c.edges[side][0])
+    with about(f"side {side}, near the joint, x in (a, {edge!r}]"):
+        check_by_halves(scene, check, side, edge, *more)
+
+
+def check_thrown_out(scene: Scene, side: int, edge: float) -> None:
+    """Check that starts up to the edge are thrown outward, by any factor above 1."""
     s = scene.sides[side]
     gain = -2 * s.h / (scene.k_hi - s.small_d)
     q = float((1 + gain * (1 - 2.0**-20)).lower())
-    return check_near_hinge(s, scene.k_lo, scene.k_hi, edge, q)
+    check_near_hinge(s, scene.k_lo, scene.k_hi, edge, q)
 
 
 def fixed_angles(s: Side) -> tuple[Ratios, Ratios] | None:
@@ -161,8 +157,8 @@ def last_angle(s: Side, x: float, k_lo: Arb) -> Ratios | None:
     return None
 
 
-def check_fixed_point(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float, said: tuple[float, float]) -> str:
-    """Prove the claims about starts up to the edge where the arm's surface is above the joint; "" or the reason.
+def check_fixed_point(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float, said: Pair) -> None:
+    """Prove the claims about starts up to the edge where the arm's surface is above the joint.
 
     The claims are: on (a, edge] a throw is a jog; the jog has one fixed point R* there, with said[0] <= R* <= said[1];
     starts in (a, R*) tend to a; and R' - R* >= q (R - R*), R' <= arm on (R*, edge].
@@ -171,26 +167,22 @@ def check_fixed_point(s: Side, k_lo: Arb, k_hi: Arb, edge: float, q: float, said
     first, and they grow together: the angle tells everything.  dE/dp > 0 with E < 0 at one angle and E > 0 at a later
     one leaves one zero p* between, R* = R(p*); E has the sign of p - p*.
     """
-    if not s.exact:
-        return "every jog goes inward in this flight, where the arm's surface is above the joint"
+    prove(s.exact, "every jog goes inward in this flight, where the arm's surface is above the joint")
     angles, last = fixed_angles(s), last_angle(s, edge, k_lo)
     if angles is None or last is None:
-        return "the fixed point of the jog is not found"
+        raise UnprovedError("the fixed point of the jog is not found")
     before, after = angles
     least, most = landing_at(s, before, k_lo), landing_at(s, after, k_hi)
-    if not (before.p < after.p and after.p < last.p and most < arb(edge)):
-        return "the cells do not begin beyond the fixed point of the jog"
-    if not (least >= arb(said[0]) and most <= arb(said[1])):
-        return f"the fixed point of the jog is not proved to lie in [{said[0]!r}, {said[1]!r}]"
-    bad = check_jogs_up_to(s, k_lo, k_hi, last.p) or check_growth_beyond(s, k_hi, before.p, last.p, q)
-    if bad:
-        return bad
-    if not arb(edge) + at_angle(s, last.p).D <= s.arm:
-        return "R' <= arm.length is not proved"
-    return ""
+    ordered = before.p < after.p and after.p < last.p and most < arb(edge)
+    prove(ordered, "the cells do not begin beyond the fixed point of the jog")
+    within = least >= arb(said[0]) and most <= arb(said[1])
+    prove(within, f"the fixed point of the jog is not proved to lie in [{said[0]!r}, {said[1]!r}]")
+    check_jogs_up_to(s, k_lo, k_hi, last.p)
+    check_growth_beyond(s, k_hi, before.p, last.p, q)
+    prove(arb(edge) + at_angle(s, last.p).D <= s.arm, "R' <= arm.length is not proved")
 
 
-def check_jogs_up_to(s: Side, k_lo: Arb, k_hi: Arb, top: Arb) -> str:
+def check_jogs_up_to(s: Side, k_lo: Arb, k_hi: Arb, top: Arb) -> None:
     """Check for all angles in (0, top] that dR/dp > 0, dE/dp > 0, R' > a, and that the throw is a jog.
 
     (R' - a)/p = kappa/2 - h + a (V - W) p - d (V + 1 - sin p/p) > 0 keeps a jog right of a: below R* starts fall and
@@ -201,41 +193,41 @@ def check_jogs_up_to(s: Side, k_lo: Arb, k_hi: Arb, top: Arb) -> str:
     for k in range(pieces):
         ends = ratios(top * k / pieces), ratios(top * (k + 1) / pieces)
         r = ratios(ends[0].p.union(ends[1].p))
-        if not (landing_slope(s, r, k_lo) > 0 and gain_slope(s.a, s.d, r) > 0):
-            return "the fixed point of the jog is not proved to be the only one"
-        if not HALF * k_lo - s.h + s.a * (r.V - r.W) * r.p - s.d * (r.V + ONE - r.sine) > 0:
-            return "R' > a is not proved"
+        alone = landing_slope(s, r, k_lo) > 0 and gain_slope(s.a, s.d, r) > 0
+        prove(alone, "the fixed point of the jog is not proved to be the only one")
+        right = HALF * k_lo - s.h + s.a * (r.V - r.W) * r.p - s.d * (r.V + ONE - r.sine)
+        prove(right > 0, "R' > a is not proved")
         R = landing_at(s, ends[0], k_lo).union(landing_at(s, ends[1], k_hi))
-        if over_angles(s, r.p, R, kappa)[0] != 0:
-            return "a jog is not proved"
-    return ""
+        prove(over_angles(s, r.p, R, kappa)[0] == 0, "a jog is not proved")
 
 
-def check_growth_beyond(s: Side, k_hi: Arb, first: Arb, top: Arb, q: float) -> str:
+def check_growth_beyond(s: Side, k_hi: Arb, first: Arb, top: Arb, q: float) -> None:
     """Check on [first, top] that dD/dR = (dD/dp)/(dR/dp) >= q - 1, with R' - R = D(p) and D = 0 at R*."""
     pieces = 16
     for k in range(pieces):
         r = ratios((first + (top - first) * k / pieces).union(first + (top - first) * (k + 1) / pieces))
         rise = rise_of_jog(s, *r.p.sin_cos())
-        if not (q > 1 and rise > 0 and rise >= (arb(q) - 1) * landing_slope(s, r, k_hi)):
-            return f"R' - R* >= q (R - R*) is not proved for q = {q!r}"
-    return ""
+        grows = q > 1 and rise > 0 and rise >= (arb(q) - 1) * landing_slope(s, r, k_hi)
+        prove(grows, f"R' - R* >= q (R - R*) is not proved for q = {q!r}")
 
 
-def check_below_cells(
-    scene: Scene, side: int, edge: float, q: float, said: tuple[float, float] | None
-) -> str:
-    """Check the claims about starts before the first cell, which depend on the sign of h; "" or the reason."""
+def check_below_cells(scene: Scene, side: int, edge: float, q: float, said: Pair | None) -> None:
+    """Check the claims about starts before the first cell, which depend on the sign of h."""
     s = scene.sides[side]
     if s.h > 0:
         if said is None:
-            return "the arm's surface is above the joint, and no fixed point of the jog is given"
-        if not s.landing <= 0:
-            return "with noise of the landing place a part may come to either side of the jog's fixed point"
-        return check_fixed_point(s, scene.k_lo, scene.k_hi, edge, q, said)
-    if said is not None:
-        return "a fixed point of the jog is given, but the arm's surface is not above the joint"
-    return check_near_hinge(s, scene.k_lo, scene.k_hi, edge, q)
+            raise UnprovedError(
+                "the arm's surface is above the joint, and no fixed point of the jog is given"
+            )
+        still = s.landing <= 0
+        prove(
+            still, "with noise of the landing place a part may come to either side of the jog's fixed point"
+        )
+        check_fixed_point(s, scene.k_lo, scene.k_hi, edge, q, said)
+    else:
+        above = "a fixed point of the jog is given, but the arm's surface is not above the joint"
+        prove(said is None, above)
+        check_near_hinge(s, scene.k_lo, scene.k_hi, edge, q)
 
 
 def fixed_points_in_words(section: dict[str, Any], noisy: bool) -> str:
@@ -268,7 +260,7 @@ def fixed_points_in_words(section: dict[str, Any], noisy: bool) -> str:
 MOST_EDGES = 20_000_000  # pairs of a cell and a target, for one thinning
 
 
-def not_arriving(c: Cells, ways: list[Array], cells: Array, wanted: Array, throws: int) -> Array:
+def not_arriving(ways: list[Array], cells: Array, wanted: Array, throws: int) -> Array:
     """Find the cells from which orbits are not proved to come to the wanted cells within so many throws.
 
     Backward reachability: after k rounds every orbit from a cell that is done comes to a wanted cell within k throws,
@@ -310,8 +302,8 @@ def steepness(
     return least
 
 
-def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array) -> str:
-    """Check that almost every orbit leaves the cells `left`, or comes to cells of another kind; "" or the reason.
+def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array) -> None:
+    """Check that almost every orbit leaves the cells `left`, or comes to cells of another kind.
 
     A bound of densities under the Perron-Frobenius operator.  Spread starts evenly over the cells, and look at those
     that have not left.  After a throw their density is, at y, the sum over all x thrown to y of the density at x over
@@ -323,18 +315,11 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array
     An orbit that comes to another kind of cells has left: the kinds are looked at apart.
     """
     steep = np.full(len(left), math.nan)
-    lower, upper = c.lower(), c.upper()
-    for k in np.flatnonzero(left).tolist():
-        s, x, phi = scene.sides[int(c.side[k])], (float(lower[k]), float(upper[k])), c.phi[k].tolist()
-        steep[k] = steepness(s, scene.k_lo, scene.k_hi, x, (phi[0], phi[1]))
-    bad = first_bad(c, [(~left | (steep > 0), "dR'/dR > 0 is not proved")])
-    if bad:
-        return bad
     cells = np.flatnonzero(left)
-    links = links_within(c, left, cells, kind)
-    if links is None:
-        return "there are too many targets"
-    source, to, group = links
+    for k, enclosed in throws_of(c, scene, cells):
+        steep[k] = steepness(*enclosed)
+    c.prove_all(~left | (steep > 0), "dR'/dR > 0 is not proved")
+    source, to, group = links_within(c, left, cells, kind)
     slots, slot = np.unique(to * (2 * len(cells) + 2) + group, return_inverse=True)
     owner = slots // (2 * len(cells) + 2)
     density: Array = left.astype(np.float64)
@@ -348,25 +333,35 @@ def check_thinning(c: Cells, scene: Scene, left: Array, throws: int, kind: Array
         np.maximum.at(worst, number, density[cells])
         gone |= worst < 1
         if gone.all():
-            return ""
+            return
         density[cells[gone[number]]] = 0.0  # no other kind depends on this one
         if not (density < 1e100).all():
             break
-    return f"what has not arrived is not proved to thin out within {throws} throws"
+    raise UnprovedError(f"what has not arrived is not proved to thin out within {throws} throws")
 
 
-def links_within(c: Cells, left: Array, cells: Array, kind: Array) -> tuple[Array, Array, Array] | None:
+def throws_of(
+    c: Cells, scene: Scene, cells: Array
+) -> Iterator[tuple[int, tuple[Side, Arb, Arb, Pair, Pair]]]:
+    """Give for each of some cells its number, and what encloses its throws: side, kappa, x and bracket of phi."""
+    lower, upper = c.lower(), c.upper()
+    for k in cells.tolist():
+        least, most = c.phi[k].tolist()
+        x = float(lower[k]), float(upper[k])
+        yield k, (scene.sides[int(c.side[k])], scene.k_lo, scene.k_hi, x, (least, most))
+
+
+def links_within(c: Cells, left: Array, cells: Array, kind: Array) -> tuple[Array, Array, Array]:
     """List the throws within cells of one kind: the cell, its target, and a number for its run and branch.
 
-    `cells` are the cells `left`, ascending.  None if there are too many.
+    `cells` are the cells `left`, ascending.
     """
     run = np.cumsum((np.diff(cells, prepend=-2) > 1) | (np.diff(c.side[cells], prepend=-1) != 0))
     froms, tos, groups = [], [], []
     for branch, array in enumerate((c.jog, c.flip)):
         q = np.flatnonzero(array[cells, 0] >= 0)
         first, last = array[cells[q], 0].astype(np.int64), array[cells[q], 1].astype(np.int64)
-        if int((last - first + 1).sum()) > MOST_EDGES:
-            return None
+        prove(int((last - first + 1).sum()) <= MOST_EDGES, "there are too many targets")
         for step in range(int((last - first).max(initial=-1)) + 1):
             to = first + step
             some = (to <= last) & left[np.minimum(to, len(left) - 1)]
@@ -378,22 +373,18 @@ def links_within(c: Cells, left: Array, cells: Array, kind: Array) -> tuple[Arra
     return source, to, group
 
 
-def check_null(c: Cells, scene: Scene, cells: Array, near: bool) -> str:
-    """Check that on some cells starts of length zero come from starts of length zero only; "" or the reason.
+def check_null(c: Cells, scene: Scene, cells: Array, near: bool) -> None:
+    """Check that on some cells starts of length zero come from starts of length zero only.
 
     Where dR'/dR > 0 is proved on a cell each branch has an inverse with bounded slope.  Near the joint, which counts if
     `near`, phi rises with R, possibly by jumps; where D' > 0 on all angles possible R' = R + D(phi) grows at least as
     fast as R.  (Beyond a fixed point of the jog check_growth_beyond has proved it.)
     """
-    lower, upper = c.lower(), c.upper()
     rises = np.ones(len(c.side), dtype=bool)
-    for k in np.flatnonzero(cells).tolist():
-        s, x, phi = scene.sides[int(c.side[k])], (float(lower[k]), float(upper[k])), c.phi[k].tolist()
-        enclosed = s, scene.k_lo, scene.k_hi, x, (phi[0], phi[1])
-        rises[k] = steepness(*enclosed, 1) > 0 or steepness(*enclosed) > 0
+    for k, enclosed in throws_of(c, scene, np.flatnonzero(cells)):
+        rises[k] = steepness(*enclosed, pieces=1) > 0 or steepness(*enclosed) > 0
     for i, s in enumerate(scene.sides if near else ()):
-        bound = near_angle(s, scene.k_lo, scene.k_hi, float(c.edges[i][0]))
-        phi = ZERO.union(bound)
-        if not rise_of_jog(s, phi.sin(), phi.cos()) > 0:
-            return f"side {i}, near the joint: R' is not proved to rise with R"
-    return first_bad(c, [(rises, "dR'/dR > 0 is not proved")])
+        phi = ZERO.union(near_angle(s, scene.k_lo, scene.k_hi, float(c.edges[i][0])))
+        outward = rise_of_jog(s, phi.sin(), phi.cos()) > 0
+        prove(outward, f"side {i}, near the joint: R' is not proved to rise with R")
+    c.prove_all(rises, "dR'/dR > 0 is not proved")

@@ -24,31 +24,17 @@ def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Ar
     A formula that names an interval twice gives too wide a ball.  The mean value theorem, f(c) + f'(box) (q - c), gives
     a narrower one.
     """
-
-    def as_ball(value: object, where: str) -> Arb:
-        return span(*ends_of(value, where, unit))
-
-    plain_rests, rho = read_part(part, unit, as_ball)
-    wide: dict[int, tuple[int, Fraction, Fraction]] = {}
-
-    def look(value: object, where: str) -> Arb:
-        lo, hi = ends_of(value, where, unit)
-        if lo < hi:
-            wide.setdefault(id(value), (len(wide), lo, hi))
-        return span(lo, hi)
-
-    read_part(part, unit, look)
+    wide, plain_rests, rho = read_wide(part, unit)
     if not wide:
         return plain_rests, rho
 
     def middle(value: object, where: str) -> Arb:
-        known = wide.get(id(value))
-        return as_ball(value, where) if known is None else exact((known[1] + known[2]) / 2)
+        lo, hi = ends_of(value, where, unit)
+        return exact((lo + hi) / 2) if id(value) in wide else span(lo, hi)
 
     def rising(value: object, where: str) -> Any:
-        known = wide.get(id(value))
-        own = None if known is None else known[0]
-        return Rising(as_ball(value, where), [ONE if k == own else ZERO for k in range(len(wide))])
+        ball = span(*ends_of(value, where, unit))
+        return Rising(ball, [ONE if key == id(value) else ZERO for key in wide])
 
     centre, rho_centre = read_part(part, unit, middle)
     steep, rho_steep = read_part(part, unit, rising)
@@ -67,6 +53,21 @@ def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Ar
         for rows_of_side in zip(centre, steep, plain_rests, strict=True)
     ]
     return rests, about(rho_centre, rho_steep, rho)
+
+
+def read_wide(
+    part: object, unit: Fraction
+) -> tuple[dict[int, tuple[str, Fraction, Fraction]], list[tuple[Any, ...]], Arb]:
+    """Read a part in balls; before it by id, as they are read, the numbers that are intervals: name and ends."""
+    wide: dict[int, tuple[str, Fraction, Fraction]] = {}
+
+    def look(value: object, where: str) -> Arb:
+        lo, hi = ends_of(value, where, unit)
+        if lo < hi:
+            wide.setdefault(id(value), (where, lo, hi))
+        return span(lo, hi)
+
+    return wide, *read_part(part, unit, look)
 
 
 def read_part(
@@ -176,13 +177,5 @@ def read_plate(
 
 def read_lengths(part: object, unit: Fraction) -> list[tuple[int, str, Arb]]:
     """List the lengths of the part that are intervals, in the order in which they are read: id, name and ball."""
-    lengths: dict[int, tuple[int, str, Arb]] = {}
-
-    def look(value: object, where: str) -> Arb:
-        lo, hi = ends_of(value, where, unit)
-        if lo < hi and not where.endswith(".mass"):
-            lengths.setdefault(id(value), (id(value), where, span(lo, hi)))
-        return span(lo, hi)
-
-    read_part(part, unit, look)
-    return list(lengths.values())
+    wide, _, _ = read_wide(part, unit)
+    return [(k, where, span(lo, hi)) for k, (where, lo, hi) in wide.items() if not where.endswith(".mass")]

@@ -3,28 +3,17 @@
 docs/certificates.md, "Regions".
 """
 
-import copy
 import itertools
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Iterator
 from fractions import Fraction
-from multiprocessing import get_context
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .balls import Array
-from .cells import SMALL, workers_ignore_interrupts
+from .balls import Array, prove
 from .file import KINDS, Arrays, Quantity, plain, quantity, require, rows, section_alone, table
-from .region import (
-    GOAL_PROVED,
-    GOAL_REFUTED,
-    Claimed,
-    check_region_cell,
-    start_region_worker,
-)
-from .scene import place_of, quantities, read_scene
+from .region import GOAL_PROVED, GOAL_REFUTED, Claimed
+from .scene import quantities, read_scene
 
 STARTS_WORDS = ("every", "almost-every", "from", "cells")  # the codes of the array `starts`
 MOST_BORDERS = 4_097
@@ -51,7 +40,10 @@ class Axis(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """The content of a file: read, and not yet believed."""
+    """The content of a file: read, and not yet believed.
+
+    Its cells are cells of parameters.
+    """
 
     raw: dict[str, Any]
     axes: list[Axis]
@@ -63,6 +55,11 @@ class Plane(NamedTuple):
     blocks: Array
     chain: Array
     ends: Array
+
+    def name(self, k: int) -> str:
+        """Name a cell of parameters, for people."""
+        a, b, c, d = self.flat["cells"][k].tolist()
+        return f"{self.axes[0].between(a, b)}, {self.axes[1].between(c, d)}"
 
 
 def read_plane(header: dict[str, Any], entries: dict[str, memoryview]) -> Plane:
@@ -131,36 +128,31 @@ def read_axis(value: object, raw: dict[str, Any]) -> Axis:
     return Axis(plain(name), texts, values)
 
 
-def raster_of(plane: Plane) -> tuple[Array, str]:
-    """Spread the numbers of the cells over the smallest cells; "" or why the cells do not cover the plane once."""
+def raster_of(plane: Plane) -> Array:
+    """Spread the numbers of the cells over the smallest cells; the cells have to cover the plane once."""
     shape = tuple(len(axis.texts) - 1 for axis in plane.axes)
     raster, index = np.full(shape, -1, dtype=np.int64), plane.flat["cells"]
     right = (index >= 0) & (index <= np.array([shape[0], shape[0], shape[1], shape[1]]))
-    if not right.all() or not ((index[:, 0] < index[:, 1]) & (index[:, 2] < index[:, 3])).all():
-        return raster, "the borders of a cell are not such"
+    ascend = (index[:, 0] < index[:, 1]) & (index[:, 2] < index[:, 3])
+    prove(bool(right.all() and ascend.all()), "the borders of a cell are not such")
     for k, (a, b, c, d) in enumerate(index.tolist()):
-        if (raster[a:b, c:d] >= 0).any():
-            return raster, f"cell {k} lies over another one"
+        prove(not (raster[a:b, c:d] >= 0).any(), f"cell {k} lies over another one")
         raster[a:b, c:d] = k
-    return raster, "" if (raster >= 0).all() else "the cells leave a gap"
+    prove(bool((raster >= 0).all()), "the cells leave a gap")
+    return raster
 
 
-def check_codes(plane: Plane, has_goal: bool) -> str:
-    """Check that codes are codes, and that blocks and orbits belong to cells; "" or the reason."""
+def check_codes(plane: Plane, has_goal: bool) -> None:
+    """Check that codes are codes, and that blocks and orbits belong to cells."""
     f, n = plane.flat, len(plane.flat["cells"])
-    for name, least, most in (
-        ("goal", 0, 2),
-        ("starts", 0, 3),
-        ("near", 0, 1),
-    ):
-        if not ((f[name] >= least) & (f[name] <= most)).all():
-            return f"array {name} holds a code that is none"
-    if not has_goal and (f["goal"] == GOAL_REFUTED).any():
-        return "a goal is refuted, but the scene has none"
+    for name, most in (("goal", 2), ("starts", 3), ("near", 1)):
+        known = (f[name] >= 0) & (f[name] <= most)
+        prove(bool(known.all()), f"array {name} holds a code that is none")
+    fits = has_goal or not (f["goal"] == GOAL_REFUTED).any()
+    prove(fits, "a goal is refuted, but the scene has none")
     for name, owner in (("blocks", plane.blocks[:, 0]), ("chain", plane.chain[:, 0])):
-        if not ((owner >= 0) & (owner < n)).all() or (np.diff(owner) < 0).any():
-            return f"array {name} is not in the order of the cells"
-    return ""
+        ordered = ((owner >= 0) & (owner < n)).all() and (np.diff(owner) >= 0).all()
+        prove(bool(ordered), f"array {name} is not in the order of the cells")
 
 
 def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
@@ -169,14 +161,14 @@ def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
     numbers = np.arange(len(f["cells"]) + 1)
     blocks, chain = np.searchsorted(plane.blocks[:, 0], numbers), np.searchsorted(plane.chain[:, 0], numbers)
     for k, (a, b, c, d) in enumerate(f["cells"].tolist()):
-        raw = copy.deepcopy(plane.raw)
-        for axis, low, high in ((plane.axes[0], a, b), (plane.axes[1], c, d)):
-            holder, at = place_of(raw, axis.name)
-            holder[at] = [axis.texts[low], axis.texts[high]]
+        ends = zip(plane.axes, ((a, b), (c, d)), strict=True)
+        ranges = {axis.name: [axis.texts[low], axis.texts[high]] for axis, (low, high) in ends}
         rows_of = slice(int(plane.first[k]), int(plane.first[k + 1]))
         grid, orbit = int(f["grid"][k]), slice(chain[k], chain[k + 1])
         yield Claimed(
-            raw,
+            k,
+            plane.raw,
+            ranges,
             int(f["goal"][k]),
             plane.grids[grid] if grid >= 0 else None,
             arrays={name: each[rows_of] for name, each in plane.tall.items()},
@@ -190,43 +182,10 @@ def claims_of_cells(plane: Plane) -> Iterator[Claimed]:
         )
 
 
-def check_plane_cells(
-    plane: Plane, workers: int, progress: Callable[[int, int], None] | None
-) -> tuple[int, str]:
-    """Return the number of the first cell of parameters that is not proved, and the reason; -1 and "" if all are."""
-    work = int(plane.first[-1])
-    some = workers > 1 and work > SMALL
-    pool = ProcessPoolExecutor(workers, get_context("spawn"), start_region_worker) if some else None
-    try:
-        with workers_ignore_interrupts():
-            failures = (
-                map(check_region_cell, claims_of_cells(plane))
-                if pool is None
-                else pool.map(check_region_cell, claims_of_cells(plane), chunksize=4)
-            )
-        for k, bad in enumerate(failures):
-            if bad:
-                return k, bad
-            if progress is not None:
-                progress(int(plane.first[k + 1]), work)
-    except BrokenProcessPool:  # they cannot be started here, as in a script without a main guard
-        return check_plane_cells(plane, 1, progress)
-    finally:
-        if pool is not None:
-            pool.shutdown(cancel_futures=True)
-    return -1, ""
-
-
-def name_of_cell(plane: Plane, k: int) -> str:
-    """Name a cell of parameters, for people."""
-    a, b, c, d = plane.flat["cells"][k].tolist()
-    return f"{plane.axes[0].between(a, b)}, {plane.axes[1].between(c, d)}"
-
-
 # ------------------------------------------------------------------------------------------------- regions
 
 
-def check_regions(plane: Plane, raster: Array) -> str:
+def check_regions(plane: Plane, raster: Array) -> None:
     """Check the numbers of the regions: cells with a common face are of one only where blocks correspond."""
     n, grid = len(plane.flat["cells"]), plane.flat["grid"]
     root = list(range(n))
@@ -250,8 +209,8 @@ def check_regions(plane: Plane, raster: Array) -> str:
                 root[max(top(i), top(j))] = min(top(i), top(j))
     numbers: dict[int, int] = {}
     mine = [numbers.setdefault(top(k), len(numbers)) if grid[k] >= 0 else -1 for k in range(n)]
-    wrong = np.flatnonzero(plane.flat["region"] != mine)
-    return f"cell {wrong[0]}: its region is not {plane.flat['region'][wrong[0]]}" if wrong.size else ""
+    for k, (said, own) in enumerate(zip(plane.flat["region"].tolist(), mine, strict=True)):
+        prove(said == own, f"cell {k}: its region is not {said}")
 
 
 def blocks_correspond(plane: Plane, i: int, j: int) -> bool:

@@ -4,21 +4,21 @@ docs/certificates.md, "Policies" and "Arrays of a policy".
 """
 
 import re
-from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb
 
-from .balls import Array
-from .cells import Crew, first_bad, marked, targets_of, tasks_of
+from .balls import Array, about, prove
+from .cells import Crew, bracketed, marked, targets_of, tasks_of, with_targets
 from .file import (
     LENGTHS,
     Arrays,
     Cells,
     Quantity,
     hex_float,
+    one_length,
     plain,
     quantity,
     read_side,
@@ -27,8 +27,8 @@ from .file import (
     rows,
     section_alone,
     table,
+    whole_number,
 )
-from .model import FULL_TURN
 from .scene import Scene, read_scene
 
 STOP = NO_STATE = -1  # no throw; no state: the answer cannot come, or the part is caught
@@ -96,8 +96,7 @@ def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Polic
     mode = section["mode"]
     require(mode in MODES, "mode is neither stop nor catch")
     check_cavity(raw, mode, x)
-    within = section["within"]
-    require(type(within) is int and within >= 0, "within is not a number of throws")
+    within = whole_number(section["within"], 0, 10**17, "within is not a number of throws")
     words = ["any"] if sensor.side is None and sensor.place is None else ["yes", "no"]
     begin = table(section["first"], "first", " ".join(words))
     first = [NO_STATE if begin[word] is None else begin[word] for word in words]
@@ -137,13 +136,6 @@ def read_sensor(value: object, n_sides: int) -> Sensor:
     error = one_length(asked["error"], "sensor.error") if "error" in asked else none
     require(error.lo >= 0, "the sensor's error is negative")
     return Sensor(None, place, error)
-
-
-def one_length(value: object, where: str) -> Quantity:
-    """Read a length that is no interval."""
-    length = quantity(value, "length", where)
-    require(length.lo == length.hi, f"{where} is not one number")
-    return length
 
 
 def check_cavity(raw: dict[str, Any], mode: str, x: Quantity) -> None:
@@ -268,33 +260,26 @@ def beyond(values: Array, limit: Fraction) -> Array:
     return np.array([Fraction(value) > limit for value in values.tolist()], dtype=bool)
 
 
-def check_policy(
-    policy: Policy, workers: int, progress: Callable[[int, int], None] | None
-) -> tuple[str, int]:
-    """Check the table, and the images that it rests on; "" or the reason, and the number of boxes looked at."""
-    bad = check_ranges(policy)
-    if bad:
-        return bad, 0
+def check_policy(policy: Policy) -> list[Array]:
+    """Check the table; return by throw the cells from which it is made: the images that the table rests on."""
+    check_ranges(policy)
     board = board_of(policy)
-    bad = check_begin(policy, board)
-    if bad:
-        return bad, 0
+    check_begin(policy, board)
     made = [np.zeros(len(board.won), dtype=bool) for _ in policy.choices]
     for state in range(len(policy.throw)):
-        bad = check_state(policy, board, state)
-        if bad:
-            return f"state {state}: {bad}", 0
+        with about(f"state {state}"):
+            check_state(policy, board, state)
         if policy.throw[state] != STOP:
             made[policy.throw[state]] |= mask_of(policy, state)
-    return check_images(policy, made, workers, progress)
+    return made
 
 
-def check_ranges(policy: Policy) -> str:
-    """Check that all numbers of states, throws and cells are those of one; "" or the reason."""
+def check_ranges(policy: Policy) -> None:
+    """Check that all numbers of states, throws and cells are those of one."""
     n, states = len(policy.cells[0].side), len(policy.throw)
     sides = policy.choices[0].scene.sides
-    if not all(arb(float(e[0])) > s.a for e, s in zip(policy.cells[0].edges, sides, strict=True)):
-        return "the cells begin left of a: a part there has left the arm"
+    on = all(arb(float(e[0])) > s.a for e, s in zip(policy.cells[0].edges, sides, strict=True))
+    prove(on, "the cells begin left of a: a part there has left the arm")
     state, first, last = policy.belief.T
     for good, what in (
         (
@@ -308,9 +293,7 @@ def check_ranges(policy: Policy) -> str:
         ((first >= 0) & (first <= last) & (last < n), "a belief names cells that are none"),
         (np.array([NO_STATE <= k < states for k in policy.first]), "the state to begin in is none"),
     ):
-        if not good.all():
-            return what
-    return ""
+        prove(bool(good.all()), what)
 
 
 def mask_of(policy: Policy, state: int) -> Array:
@@ -319,84 +302,58 @@ def mask_of(policy: Policy, state: int) -> Array:
     return marked(policy.belief[begin:end, 1:], len(policy.cells[0].side))
 
 
-def check_begin(policy: Policy, board: Board) -> str:
-    """Check that the starts lie on the cells, and in the beliefs to begin with; "" or the reason."""
+def holds_all(policy: Policy, state: int, heard: Array) -> bool:
+    """Whether a state holds all cells that may be where its answer is heard."""
+    return not heard.any() or (state != NO_STATE and not (heard & ~mask_of(policy, state)).any())
+
+
+def check_begin(policy: Policy, board: Board) -> None:
+    """Check that the starts lie on the cells, and in the beliefs to begin with."""
     c = policy.cells[0]
     begin = np.zeros(len(c.side), dtype=bool)
     for side, lo, hi in policy.starts:
-        edges = c.edges[side]
-        if not edges[0] <= lo <= hi <= edges[-1]:
-            return f"the starts [{lo!r}, {hi!r}] on side {side} do not lie on the cells"
+        on = bool(c.edges[side][0] <= lo <= hi <= c.edges[side][-1])
+        prove(on, f"the starts [{lo!r}, {hi!r}] on side {side} do not lie on the cells")
         inside = (c.upper() > lo) & (c.lower() < hi) if lo < hi else (c.upper() >= lo) & (c.lower() <= hi)
         begin |= (c.side == side) & inside
-    if policy.mode == "catch" and (begin & beyond(c.upper(), policy.at(policy.x))).any():
-        return "parts in some of the starts are caught at once"
+    caught = policy.mode == "catch" and (begin & beyond(c.upper(), policy.at(policy.x))).any()
+    prove(not caught, "parts in some of the starts are caught at once")
     for answer, state in zip(board.answers, policy.first, strict=True):
-        heard = begin & answer
-        if heard.any() and (state == NO_STATE or (heard & ~mask_of(policy, state)).any()):
-            return "the state to begin in does not hold all starts with its answer"
-        if state != NO_STATE and policy.left[state] > policy.within:
-            return f"more than {policy.within} throws may be needed"
-    return ""
+        held = holds_all(policy, state, begin & answer)
+        prove(held, "the state to begin in does not hold all starts with its answer")
+        enough = state == NO_STATE or policy.left[state] <= policy.within
+        prove(bool(enough), f"more than {policy.within} throws may be needed")
 
 
-def check_state(policy: Policy, board: Board, state: int) -> str:
-    """Check that a state stops in the goal region, or that its throw leads to states that hold what may be; "" or why.
+def check_state(policy: Policy, board: Board, state: int) -> None:
+    """Check that a state stops in the goal region, or that its throw leads to states that hold what may be.
 
     The number of throws left falls with every throw, so that no policy goes round for ever.
     """
     throw, belief = int(policy.throw[state]), mask_of(policy, state)
     if throw == STOP:
         known = policy.mode == "stop" and not (belief & ~board.won).any()
-        return "" if known else "it stops where the part may lie off the goal region"
+        prove(known, "it stops where the part may lie off the goal region")
+        return
     c = policy.cells[throw]
-    bad = check_targets(c, belief)
-    if bad:
-        return bad
+    c.prove_all(~belief | bracketed(c), "the bracket of phi is not one")
+    for branch in (0, 1):
+        inside, none = with_targets(c, branch)
+        c.prove_all(~belief | inside | none, "its target cells are not those of one side")
     image = targets_of([c.jog, c.flip], belief)
-    if (image & board.lost).any():
-        return "its throw may bring the part down on a wrong side"
+    prove(not (image & board.lost).any(), "its throw may bring the part down on a wrong side")
     if policy.mode == "catch":
         image &= ~board.won
-    if policy.left[state] < 1:
-        return "it throws, and no throw is left"
+    prove(bool(policy.left[state] >= 1), "it throws, and no throw is left")
     for answer, after in zip(board.answers, policy.after[state].tolist(), strict=True):
-        heard = image & answer
-        if heard.any() and (after == NO_STATE or (heard & ~mask_of(policy, after)).any()):
-            return "the state after an answer does not hold all that may be"
-        if after != NO_STATE and not policy.left[after] < policy.left[state]:
-            return "the number of throws left does not fall"
-    return ""
+        held = holds_all(policy, after, image & answer)
+        prove(held, "the state after an answer does not hold all that may be")
+        falls = after == NO_STATE or policy.left[after] < policy.left[state]
+        prove(bool(falls), "the number of throws left does not fall")
 
 
-def check_targets(c: Cells, some: Array) -> str:
-    """Check the brackets of the angle and the target cells of some cells; "" or the reason."""
-    lo, hi = c.phi.T
-    checks = [(~some | ((lo > 0) & (lo < hi) & (hi <= FULL_TURN)), "the bracket of phi is not one")]
-    n_sides = len(c.edges)
-    for array, target in ((c.jog, c.side), (c.flip, (c.side + 1) % n_sides)):
-        first, last = array.T
-        inside = (first >= c.start[target]) & (first <= last) & (last < c.start[target + 1])
-        none = (first == -1) & (last == -1)
-        checks.append((~some | inside | none, "its target cells are not those of one side"))
-    return first_bad(c, checks)
-
-
-def check_images(
-    policy: Policy, made: list[Array], workers: int, progress: Callable[[int, int], None] | None
-) -> tuple[str, int]:
-    """Check decision, landing and image of every cell from which a throw is made; "" or why, and the boxes."""
-    total = sum(int(some.sum()) for some in made)
-    advance = None if progress is None else (lambda done: progress(done, total))
-    crew = Crew(([each.scene.raw for each in policy.choices], policy.noise), workers, advance)
-    try:
-        for k, some in enumerate(made):
-            failure = crew.run(
-                list(tasks_of(policy.cells[k], policy.choices[k].scene, k, np.flatnonzero(some), None))
-            )
-            if failure is not None:
-                name = f"the throw {policy.choices[k].name}"
-                return f"{name}, {policy.cells[k].name(failure[0])}: {failure[1].text}", crew.boxes
-    finally:
-        crew.close()
-    return "", crew.boxes
+def check_images(policy: Policy, number: int, made: Array, crew: Crew) -> None:
+    """Check decision, landing and image of every cell from which one of the throws is made."""
+    c, choice = policy.cells[number], policy.choices[number]
+    tasks = tasks_of(c, choice.scene, number, np.flatnonzero(made), None)
+    crew.run(lambda cell: f"the throw {choice.name}, {c.name(cell)}", tasks)

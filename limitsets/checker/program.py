@@ -16,7 +16,7 @@ import numpy as np
 from flint import arb
 
 from .balls import ONE, ZERO, Arb, exact
-from .file import plain, require, rows
+from .file import is_whole, plain, require, rows
 
 MOST_OPERATIONS = 20_000
 LARGEST_POWER = 200
@@ -145,11 +145,6 @@ class Formulas(NamedTuple):
 
     operations: list[Operation]
     out: list[int]
-
-
-def is_whole(value: object, least: int, most: int) -> bool:
-    """Whether a value of a header is an integer, not true or false, from `least` to `most`."""
-    return type(value) is int and least <= int(str(value)) <= most
 
 
 def read_formulas(

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from flint import arb
 
-from .balls import ONE, ZERO, Arb, Pair, UnprovedError, exact, prove
+from .balls import ONE, ZERO, Arb, Pair, UnprovedError, about, exact, prove
 from .end_points import Intervals, Throws, attracting, first_outside
 from .file import (
     KINDS,
@@ -118,24 +118,18 @@ def meets(one: tuple[int, Arb, Arb], other: tuple[int, Arb, Arb]) -> bool:
     return one[0] == other[0] and not (one[2] < other[1] or other[2] < one[1])
 
 
-def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> str:
-    """Check that all periodic orbits exist and are different; "" or the reason."""
+def check_orbits(scene: Scene, c: Cells, section: dict[str, Any]) -> None:
+    """Check that all periodic orbits exist and are different."""
     cells, throws = attracting(c), Throws(scene)
     proved: list[Followed] = []
     for orbit in section["orbits"]:
-        name = f"period {len(orbit.word)}, side {orbit.side}, x in [{orbit.lo!r}, {orbit.hi!r}]"
-        try:
+        with about(f"period {len(orbit.word)}, side {orbit.side}, x in [{orbit.lo!r}, {orbit.hi!r}]"):
             prove(all(s.concave for s in scene.sides), "kappa > ell is not proved")
             followed = prove_orbit(throws, cells, orbit)
-        except UnprovedError as error:
-            return f"{name}: {error}"
-        for other in proved:
-            if len(other.states) == len(followed.states) and any(
-                meets(state, followed.states[0]) for state in other.states
-            ):
-                return f"{name}: it may be the same orbit as another one"
+            alike = [other.states for other in proved if len(other.states) == len(followed.states)]
+            same = any(meets(state, followed.states[0]) for state in itertools.chain(*alike))
+            prove(not same, "it may be the same orbit as another one")
         proved.append(followed)
-    return ""
 
 
 def orbits_statement(section: dict[str, Any]) -> str:
@@ -234,8 +228,8 @@ def read_throw(value: object) -> tuple[Any, Any]:
     return kappa, None if landing is None else arb(hex_float(landing, "landing"))
 
 
-def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
-    """Check that the scene deviates from the nominal values by no more than the tolerance; "" or the reason."""
+def check_deviations(scene: Scene, section: dict[str, Any]) -> None:
+    """Check that the scene deviates from the nominal values by no more than the tolerance."""
     flat = dict(quantities(scene.raw))
     for name, text in section["tolerance"].items():
         square = name == "throw.speed" and "throw.kappa" in flat
@@ -244,56 +238,51 @@ def check_deviations(scene: Scene, section: dict[str, Any]) -> str:
         q, nominal = quantity(flat[key], KINDS, key), quantity(section["nominal"][name], KINDS, key)
         dev = quantity(text, KINDS, "tolerance")
         require(dev.lo == dev.hi >= 0 and nominal.lo == nominal.hi, "refuted: a deviation is not one number")
-        if dev.unit == "%":
-            power = 2 if square else 1
-            low, high = nominal.lo * (1 - dev.lo), nominal.lo * (1 + dev.lo)
-            if square:
-                require(dev.lo < 1, "refuted: a deviation of 100 %")
-                low, high = nominal.lo / (1 + dev.lo) ** power, nominal.lo / (1 - dev.lo) ** power
-            low, high = min(low, high), max(low, high)
+        if square and dev.unit == "%":  # kappa deviates with the square of the speed
+            require(dev.lo < 1, "refuted: a deviation of 100 %")
+            ends = nominal.lo / (1 + dev.lo) ** 2, nominal.lo / (1 - dev.lo) ** 2
+        elif dev.unit == "%":
+            ends = nominal.lo * (1 - dev.lo), nominal.lo * (1 + dev.lo)
         else:
             require(not square and dev.pi == q.pi == nominal.pi, f"refuted: {plain(name)} is in another unit")
-            low, high = nominal.lo - dev.lo, nominal.lo + dev.lo
-        if q.pi != nominal.pi or not low <= q.lo <= q.hi <= high:
-            return f"{plain(name)} is not within {plain(text)} of {plain(section['nominal'][name])}"
-    return ""
+            ends = nominal.lo - dev.lo, nominal.lo + dev.lo
+        within = q.pi == nominal.pi and min(ends) <= q.lo <= q.hi <= max(ends)
+        why = f"{plain(name)} is not within {plain(text)} of {plain(section['nominal'][name])}"
+        prove(within, why)
 
 
-def check_refuted(scene: Scene, section: dict[str, Any]) -> str:
-    """Throw the orbit again in balls, without the cells; "" or the reason."""
+def check_refuted(scene: Scene, section: dict[str, Any]) -> None:
+    """Throw the orbit again in balls, without the cells."""
     why, goal = section["why"], section["goal"]
-    if not why:
-        return "it shows a passing orbit only: a goal is refuted by one that comes back"
-    bad = check_deviations(scene, section)
-    if bad:
-        return bad
+    prove(bool(why), "it shows a passing orbit only: a goal is refuted by one that comes back")
+    check_deviations(scene, section)
     once = goal["kind"] in ("stays_on_arm", "attracts_all")
     if once or (goal["kind"] == "oriented_beyond" and goal["anywhere"]):
-        if why != "once":
-            return "an orbit that comes back is not what refutes this goal"
-    elif why == "once":
-        return "once is not enough: the goal does not speak of every throw from every start"
-    try:
-        states = periodic(scene, section["orbit"]) if why == "cycle" else thrown_again(scene, section)
-        if section["laid"] is not None:
-            # an orbit that comes back begins with each of its states
-            begins = states[:1] if why == "once" else states
-            laid = any(lies_within(section["laid"], state) for state in begins)
-            prove(laid, "no state of the orbit is proved to be one in which a part is laid down")
-        if why == "once":
-            return left_or_beyond(scene, goal, states[-1])
-        prove(breaks(scene, goal, states), "no state of the orbit violates the goal")
-    except UnprovedError as error:
-        return str(error)
-    if goal["kind"] == "reaches" and not goal["every"] and not (why == "cycle" and section["orbit"].attracts):
-        return "the goal speaks of almost every start, and the orbit is not proved to attract"
-    return ""
+        prove(why == "once", "an orbit that comes back is not what refutes this goal")
+    else:
+        every = "once is not enough: the goal does not speak of every throw from every start"
+        prove(why != "once", every)
+    states = periodic(scene, section["orbit"]) if why == "cycle" else thrown_again(scene, section)
+    # an orbit that comes back begins with each of its states
+    laid = is_laid_down(section["laid"], states[:1] if why == "once" else states)
+    prove(laid, "no state of the orbit is proved to be one in which a part is laid down")
+    if why == "once":
+        check_left_or_beyond(scene, goal, states[-1])
+        return
+    prove(breaks(scene, goal, states), "no state of the orbit violates the goal")
+    attracts = why == "cycle" and section["orbit"].attracts
+    enough = goal["kind"] != "reaches" or goal["every"] or attracts
+    prove(enough, "the goal speaks of almost every start, and the orbit is not proved to attract")
 
 
-def lies_within(laid: list[list[Span]], state: State) -> bool:
-    """Whether a state is proved to lie inside one of the ranges of its side, so that its neighbours lie there too."""
-    side, low, high = state
-    return any(bool(low > lo and high < hi) for lo, hi in laid[side])
+def is_laid_down(laid: list[list[Span]] | None, states: list[State]) -> bool:
+    """Whether a state is proved to lie inside one of the ranges of its side, so that its neighbours lie there too.
+
+    So does any where parts may be laid down everywhere.
+    """
+    return laid is None or any(
+        bool(low > lo and high < hi) for side, low, high in states for lo, hi in laid[side]
+    )
 
 
 def periodic(scene: Scene, orbit: Orbit) -> list[State]:
@@ -383,16 +372,14 @@ def breaks(scene: Scene, goal: dict[str, Any], states: list[State]) -> bool:
     return all(side != goal["side"] or bool(hi < x) for side, _, hi in states)
 
 
-def left_or_beyond(scene: Scene, goal: dict[str, Any], last: State) -> str:
-    """Check that a state is off the arm, or beyond x on another side; "" or the reason."""
+def check_left_or_beyond(scene: Scene, goal: dict[str, Any], last: State) -> None:
+    """Check that a state is off the arm, or beyond x on another side."""
     side, lo, hi = last
-    s = scene.sides[side]
-    if goal["kind"] != "oriented_beyond":
-        off = bool(hi <= s.a or lo > s.arm)
-        return "" if off else f"the orbit ends on side {side} at x = {lo.union(hi).str(12)}, on the arm"
-    if breaks(scene, goal, [last]) and hi <= s.arm:
-        return ""
-    return f"the orbit ends on side {side} at x = {lo.union(hi).str(12)}, which the goal allows"
+    s, ends = scene.sides[side], f"the orbit ends on side {side} at x = {lo.union(hi).str(12)}"
+    if goal["kind"] == "oriented_beyond":
+        prove(breaks(scene, goal, [last]) and hi <= s.arm, f"{ends}, which the goal allows")
+    else:
+        prove(hi <= s.a or lo > s.arm, f"{ends}, on the arm")
 
 
 def statement_of_refutation(section: dict[str, Any]) -> str:

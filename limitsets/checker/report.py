@@ -6,7 +6,8 @@ docs/certificates.md, "Checking one": the words of a verdict, and what is printe
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from html import escape
 from typing import Any
@@ -14,16 +15,17 @@ from typing import Any
 import flint
 
 from .any_map import map_in_words
-from .balls import PRECISION
+from .balls import PRECISION, reason_of
 from .brackets import Chances, chances_in_words, check_chances, read_chances
-from .cells import Crew, extents
-from .claims import CLAIMS, check_box_claims, read_claims
+from .cells import Crew, Progress, extents, scene_of_box
+from .claims import CLAIMS, check_box_claims, failing, read_claims
 from .feeding import verdict_of_feeds
 from .file import (
     KINDS,
     Arrays,
     BadFileError,
     Cells,
+    is_whole,
     model_in_words,
     open_certificate,
     plain,
@@ -35,7 +37,8 @@ from .file import (
     table,
 )
 from .goals import content_of_goal, goal_of_scene
-from .map_claims import check_map_file
+from .map_cells import check_map_task, map_of_box
+from .map_claims import check_parts, work_of_maps
 from .map_file import MapFile, read_map_file
 from .map_plane import region_in_words
 from .model import FORMULAS
@@ -43,15 +46,14 @@ from .plane import (
     Plane,
     area_shares,
     check_codes,
-    check_plane_cells,
     check_regions,
-    name_of_cell,
+    claims_of_cells,
     plane_in_words,
     raster_of,
     read_plane,
 )
-from .policy import Policy, check_policy, policy_in_words, read_policy
-from .program import is_whole
+from .policy import Policy, check_images, check_policy, policy_in_words, read_policy
+from .region import check_region_cell
 from .scene import (
     Scene,
     check_by_halves,
@@ -64,6 +66,7 @@ from .scene import (
 from .starts import shares
 
 MOST_OPEN = 0.01  # the share of the arm that may be open where a goal is proved from some x on
+NO_GOAL = "of the scene's own goal nothing is claimed"
 WORDS = {  # the verdicts, in JSON and for people
     "proved": "PROVED",
     "proved-on-cells": "PROVED ON CELLS",
@@ -72,7 +75,6 @@ WORDS = {  # the verdicts, in JSON and for people
     "not rechecked": "NOT RECHECKED",
     "bad file": "BAD FILE",
 }
-Progress = Callable[[int, int], None] | None
 EXITS = {"proved": 0, "proved-on-cells": 1, "refuted": 1, "failed": 1, "bad file": 2}
 
 
@@ -202,13 +204,11 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
     cells = [read_cells(arrays, box["prefix"], n_sides) for box in boxes]
     arrays.require_no_others()
     claims, unknown = read_claims(header["claims"], n_sides)
-    parameters = [b["parameters"] for b in boxes]
-    noise, tolerance = header["noise"], header["tolerance"]
     return Certificate(
         raw,
-        parameters,
-        noise=noise,
-        tolerance=tolerance,
+        [box["parameters"] for box in boxes],
+        noise=header["noise"],
+        tolerance=header["tolerance"],
         scenes=scenes,
         cells=cells,
         claims=claims,
@@ -262,8 +262,8 @@ def check_certificate(path: str | os.PathLike[str], workers: int, progress: Prog
         read, check, noise_of = ALONE[alone]
         content = read(header, entries)
         require_model(header, [content.raw])
-        describe_alone(report, alone, content.raw, noise_of(content))
-        bad = check(content, workers, progress, report)
+        describe_scene(report, content.raw, noise_of(content), alone)
+        bad = reason_of(check, content, workers, progress, report)
         report.verdict = "failed" if bad else "proved"
         report.claims = [(alone, report.verdict, bad)]
         report.reason = f"{alone}: {bad}" if bad else ""
@@ -272,20 +272,28 @@ def check_certificate(path: str | os.PathLike[str], workers: int, progress: Prog
     gap = describe(report, file)
     own = goal_of_scene(file.raw[0], len(file.scenes[0].sides))
     failed = failed_at_once(file, gap, own)
-    work = work_of(file)
-    advance = None if progress is None else (lambda done: progress(min(done, work), work))
-    crew = Crew((list(file.raw), file.noise), workers, advance)
-    try:
+    setup = scene_of_box, list(file.raw), file.noise
+    with crew_of(report, setup, workers, progress, work_of(file)) as crew:
         check_boxes(file, crew, failed)
+    conclude(report, file, failed, own)
+
+
+@contextmanager
+def crew_of(report: Report, setup: tuple[Any, ...], *how: Any) -> Iterator[Crew]:
+    """Give the processes that check cells, until these are checked; the report tells how many boxes they looked at."""
+    crew = Crew(setup, *how)
+    try:
+        yield crew
     finally:
         crew.close()
-    report.boxes = crew.boxes
-    conclude(report, file, failed, own)
+        report.boxes = crew.boxes
 
 
 def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report) -> None:
     """Check a certificate of a map, and fill in the report."""
-    outcomes, report.boxes = check_map_file(file, workers, progress)
+    setup = map_of_box, file.shape, [part.parameters for part in file.parts]
+    with crew_of(report, setup, workers, progress, work_of_maps(file), check_map_task) as crew:
+        outcomes = list(check_parts(file, crew))
     report.map = {
         "dimension": file.shape.dimension,
         "sides": file.shape.sides,
@@ -311,54 +319,54 @@ def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report)
     report.reason = next((f"{name}: {why}" for name, _, why in report.claims if why), "")
 
 
-def describe_alone(report: Report, alone: str, raw: dict[str, Any], noise: object) -> None:
-    """Say what a file with one claim relies on, and of which scene it is."""
+def describe_scene(report: Report, raw: dict[str, Any], noise: object, alone: str = "") -> None:
+    """Say what a file relies on, and of which scene it is; `alone`: its claim, where that stands alone."""
     tell_model(report, raw, noise)
     for name, value in quantities(raw):
         if alone != "policy" or not name.startswith("throw."):  # its throws are those to choose from
             report.parameters[plain(name)] = value_in_words(value, name)
 
 
-def recheck_plane(plane: Plane, workers: int, progress: Progress, report: Report) -> str:
-    """Check regions of a plane, and fill in the report; "" or the reason."""
+def recheck_plane(plane: Plane, workers: int, progress: Progress, report: Report) -> None:
+    """Check regions of a plane, and fill in the report."""
     report.parameters |= {axis.name: axis.between(0, len(axis.texts) - 1) for axis in plane.axes}
     report.parameters["noise (at every throw)"] = "none"
     report.cells = int(plane.first[-1])
     goal = goal_of_scene(plane.raw, plane.n_sides)
-    raster, bad = raster_of(plane)
-    bad = bad or check_codes(plane, goal is not None)
-    if not bad:
-        cell, why = check_plane_cells(plane, workers, progress)
-        bad = f"{name_of_cell(plane, cell)}: {why}" if why else check_regions(plane, raster)
-    if not bad:
-        report.statement = plane_in_words(plane, goal)
-        undecided, proved, refuted = (float(share) for share in area_shares(plane))
-        report.area = {"proved": proved, "refuted": refuted, "undecided": undecided}
-    return bad
+    raster = raster_of(plane)
+    check_codes(plane, goal is not None)
+    with crew_of(report, (None,), workers, progress, report.cells, check_region_cell) as crew:
+        crew.run(plane.name, claims_of_cells(plane))
+    check_regions(plane, raster)
+    report.statement = plane_in_words(plane, goal)
+    undecided, proved, refuted = (float(share) for share in area_shares(plane))
+    report.area = {"proved": proved, "refuted": refuted, "undecided": undecided}
 
 
-def recheck_chances(c: Chances, _: int, progress: Progress, report: Report) -> str:
-    """Check probabilities, and fill in the report; "" or the reason."""
+def recheck_chances(c: Chances, _: int, progress: Progress, report: Report) -> None:
+    """Check probabilities, and fill in the report."""
     for name, text in c.laws.items():
         report.parameters[f"law of {name}"] = f"uniform, within {quantity(text, KINDS, name)}"
+    report.cells = sum(len(e) - 1 for e in c.edges)
+    report.statement = chances_in_words(c)
     if goal_of_scene(c.raw, len(c.scene.sides)) is not None:
-        report.statement.append("of the scene's own goal nothing is claimed")
-    bad, report.cells = check_chances(c, progress)
-    report.statement = chances_in_words(c) + report.statement
-    return bad
+        report.statement.append(NO_GOAL)
+    check_chances(c, progress)
 
 
-def recheck_policy(policy: Policy, workers: int, progress: Progress, report: Report) -> str:
-    """Check a policy, and fill in the report; "" or the reason."""
-    noise = "none" if policy.noise is None else deviations_in_words(policy.noise)
-    report.parameters["noise (at every throw)"] = noise
+def recheck_policy(policy: Policy, workers: int, progress: Progress, report: Report) -> None:
+    """Check a policy, and fill in the report."""
+    report.parameters["noise (at every throw)"] = noise_in_words(policy.noise)
     report.cells = len(policy.cells[0].side)
-    bad, report.boxes = check_policy(policy, workers, progress)
     report.statement = policy_in_words(policy)
-    return bad
+    made = check_policy(policy)
+    setup = scene_of_box, [each.scene.raw for each in policy.choices], policy.noise
+    with crew_of(report, setup, workers, progress, sum(int(some.sum()) for some in made)) as crew:
+        for number, some in enumerate(made):
+            check_images(policy, number, some, crew)
 
 
-ALONE: dict[str, tuple[Callable[..., Any], Callable[..., str], Callable[[Any], object]]] = {
+ALONE: dict[str, tuple[Callable[..., Any], Callable[..., None], Callable[[Any], object]]] = {
     "region": (read_plane, recheck_plane, lambda _: None),
     "policy": (read_policy, recheck_policy, lambda policy: policy.noise),
     "probabilities": (read_chances, recheck_chances, lambda chances: chances.laws),
@@ -368,15 +376,12 @@ ALONE: dict[str, tuple[Callable[..., Any], Callable[..., str], Callable[[Any], o
 
 def describe(report: Report, file: Certificate) -> str:
     """Say what the certificate relies on, and for which scenes; return "" or the gap in its tolerance."""
-    tell_model(report, file.raw[0], file.noise)
-    for name, value in quantities(file.raw[0]):
-        report.parameters[plain(name)] = value_in_words(value, name)
+    describe_scene(report, file.raw[0], file.noise)
     ranges, gap = check_tolerance(file.raw, file.tolerance)
     report.parameters |= ranges
     if file.tolerance is not None:
         report.parameters["tolerance (fixed but unknown)"] = deviations_in_words(file.tolerance)
-    noise = "none" if file.noise is None else deviations_in_words(file.noise)
-    report.parameters["noise (at every throw)"] = noise
+    report.parameters["noise (at every throw)"] = noise_in_words(file.noise)
     report.cells = sum(len(c.side) for c in file.cells)
     return gap
 
@@ -428,12 +433,11 @@ def check_boxes(file: Certificate, crew: Crew, failed: dict[str, str]) -> None:
     """Check all claims for box after box, until all have failed; `failed` gets the first reason of each."""
     claims = file.claims
     for k, (scene, c) in enumerate(zip(file.scenes, file.cells, strict=True)):
-        bad = check_by_halves(scene, check_parameters, file.parameters[k], f"box {k}")
-        where = f"box {k}, " if len(file.scenes) > 1 else ""
-        failures = [(list(claims), bad)] if bad else check_box_claims(scene, c, k, claims, crew)
-        for names, reason in failures:
-            for name in names:
-                failed.setdefault(name, where + reason)
+        said = file.parameters[k], f"box {k}"
+        failures = failing(claims, check_by_halves, scene, check_parameters, *said)
+        failures = failures or check_box_claims(scene, c, k, claims, crew)
+        for name, reason in failures.items():
+            failed.setdefault(name, (f"box {k}, " if len(file.scenes) > 1 else "") + reason)
         scene.parts.clear()  # room
         if len(failed) == len(claims):
             break
@@ -458,7 +462,7 @@ def conclude(report: Report, file: Certificate, failed: dict[str, str], own: dic
             f"attracting cells: {extents(file.cells[0], file.cells[0].component >= 0)}{which}"
         )
     if own is not None and not {"goal", "refuted"} & set(claims):
-        report.statement.append("of the scene's own goal nothing is claimed")
+        report.statement.append(NO_GOAL)
     report.claims = [
         (name, *state_of(report, name, section, failed)) for name, section in claims.items()
     ] + file.unknown
@@ -513,6 +517,11 @@ def value_in_words(value: object, name: str) -> str:
     if isinstance(value, str | list):
         return str(quantity(value, KINDS, name))
     return plain(value)
+
+
+def noise_in_words(noise: object) -> str:
+    """Write the noise, if there is any."""
+    return "none" if noise is None else deviations_in_words(noise)
 
 
 def deviations_in_words(deviations: object) -> str:

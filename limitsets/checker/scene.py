@@ -13,7 +13,7 @@ from typing import Any
 
 from flint import arb
 
-from .balls import HALF, ONE, ZERO, Arb, exact, span
+from .balls import HALF, ONE, ZERO, Arb, UnprovedError, exact, prove, reason_of, span
 from .file import (
     KINDS,
     LENGTHS,
@@ -142,19 +142,17 @@ def halved(raw: dict[str, Any], name: str) -> Iterator[dict[str, Any]]:
         yield tree
 
 
-def check_by_halves(scene: Scene, check: Callable[..., str], *more: Any) -> str:
-    """Check a statement about all parameters, half by half where the check fails for the whole; "" or the reason."""
+def check_by_halves(scene: Scene, check: Callable[..., None], *more: Any) -> None:
+    """Check a statement about all parameters, half by half where the check fails for the whole."""
     stack, tried = [(scene, 0)], 0
     while stack:
         piece, depth = stack.pop()
         tried += 1
-        bad = check(piece, *more)
-        if bad:
+        reason = reason_of(check, piece, *more)
+        if reason:
             parts = piece.halves() if depth < DEPTH and tried + len(stack) < MOST_HALVES else []
-            if not parts:
-                return bad
+            prove(bool(parts), reason)
             stack += [(half, depth + 1) for half in parts]
-    return ""
 
 
 def read_scene(raw: object, noise: object) -> Scene:
@@ -334,8 +332,8 @@ def read_kappa(scene: dict[str, Any], noise: object, unit: Fraction) -> tuple[Ar
     return (g[0] / fast**2).lower(), (g[1] / slow**2).upper()
 
 
-def check_parameters(scene: Scene, said: object, where: str) -> str:
-    """Check that each enclosure lies inside the interval that the producer computed with; "" or the reason.
+def check_parameters(scene: Scene, said: object, where: str) -> None:
+    """Check that each enclosure lies inside the interval that the producer computed with.
 
     No proof rests on this check, which only finds files that were put together wrongly: so a little slack is allowed.
     """
@@ -352,8 +350,8 @@ def check_parameters(scene: Scene, said: object, where: str) -> str:
             # a ball's radius has 30 bits; and over a tolerance a ball may be wider than the producer's interval
             slack = (hi - lo) * 2.0**-10 + (abs(hi) * 2.0**-26 if scene.loose > 0 else ZERO)
             if not (ball >= lo - slack and ball <= hi + slack):
-                return f"parameter {key} {i}: the scene gives {ball.str(17)}, not in [{lo.str(17)}, {hi.str(17)}]"
-    return ""
+                own, limits = ball.str(17), f"[{lo.str(17)}, {hi.str(17)}]"
+                raise UnprovedError(f"parameter {key} {i}: the scene gives {own}, not in {limits}")
 
 
 Ends = list[tuple[Fraction, Fraction]]

@@ -18,17 +18,21 @@ from .balls import (
     Arb,
     Array,
     Pair,
+    about,
     exact,
     float_above,
     float_below,
+    prove,
+    reason_of,
     sine_cosine,
 )
-from .cells import first_bad, leading_into, targets_of
-from .file import Cells, Quantity, by_side, hex_float, require, rows, table
+from .cells import check_reach, grown, leading_into, targets_of
+from .file import Cells, Quantity, by_side, hex_float, require, rows, table, whole_number
 from .labels import range_max
 from .model import at_angle, landing_at, over_angles, ratios, rise_of_jog, root_above
 from .near_hinge import (
     check_below_cells,
+    check_near_joint,
     check_null,
     check_thinning,
     near_angle,
@@ -84,9 +88,10 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
     require(
         kind in ("every", "almost-every", "from", "cells") or bool(laid), "goal.starts is none that is known"
     )
-    thinning = section.get("thinning", 0)
-    fits = type(thinning) is int and (0 < thinning < MOST_COUNTED if "thinning" in section else True)
-    require(fits, "goal.thinning is not a number of rounds")
+    thinning = 0
+    if "thinning" in section:
+        rounds = "goal.thinning is not a number of rounds"
+        thinning = whole_number(section["thinning"], 1, MOST_COUNTED - 1, rounds)
     near = read_near_hinge(section["near_joint"], n_sides) if "near_joint" in section else None
     lost = None
     if "lost" in section:
@@ -134,8 +139,8 @@ def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: 
     require(kind != "cells" or goal["kind"] != "attracts_all", "attracts_all of some cells")
 
 
-def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -> str:
-    """Check that the starts claimed come into the attracting cells, given all images; "" or the reason.
+def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -> None:
+    """Check that the starts claimed come into the attracting cells, given all images.
 
     Let G be the cells with a rank.  No orbit leaves them, and off the components the rank never rises: so in the end it
     stays what it is.  It cannot stay where it falls along every target; nor for ever in a cell that only leads to
@@ -143,181 +148,152 @@ def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -
     left, Z, has to thin out, rank by rank; and starts of length zero have to come from starts of length zero only.
     """
     if starts.only:
-        return ""
+        return
     almost = goal["kind"] == "reaches" and not goal["every"]
-    if goal["kind"] == "attracts_all" and starts.near is not None and any(starts.near[1]):
-        return "parts near the joint creep to it: there are two basins"
+    creeps = goal["kind"] == "attracts_all" and starts.near is not None and any(starts.near[1])
+    prove(not creeps, "parts near the joint creep to it: there are two basins")
     for side in range(len(c.edges) if starts.laid is None else 0):
-        bad = check_starts_of_side(c, scene, starts, side)
-        if bad:
-            return bad
-    if goal["anywhere"] and not (goal["kind"] == "flip_order" or almost):
-        return ""  # the goal asks something of every throw, or of a number of throws: no orbit has to arrive
-    return check_arrival(c, scene, starts, almost)
+        check_starts_of_side(c, scene, starts, side)
+    # other goals from anywhere ask something of every throw, or of a number of throws: no orbit has to arrive
+    if not goal["anywhere"] or goal["kind"] == "flip_order" or almost:
+        check_arrival(c, scene, starts, almost)
 
 
-def laid_down(c: Cells, scene: Scene, starts: Starts) -> tuple[Cells, str]:
+def laid_down(c: Cells, scene: Scene, starts: Starts) -> Cells:
     """Keep of the cells what starts laid down in the ranges can come to; all of it has to have a rank.
 
     Any other cell gets neither rank nor component nor targets, so that nothing is asked of it and nothing rests on it.
     No orbit from the ranges meets such a cell: the cells kept hold the ranges, and all targets of the cells kept.
     """
-    begin, bad = cells_of_ranges(c, scene, starts.laid or [])
-    if bad:
-        return c, bad
+    begin = cells_of_ranges(c, scene, starts.laid or [])
     if starts.kind == "cells":
         begin &= c.rank >= 0
-    if not begin.any():
-        return c, "no start is claimed that lies in a cell with a rank"
+    prove(bool(begin.any()), "no start is claimed that lies in a cell with a rank")
     met = led_to(c, begin)
-    bad = first_bad(c, [(~met | (c.rank >= 0), "a part laid down may come to it, and its rank is -1")])
+    c.prove_all(~met | (c.rank >= 0), "a part laid down may come to it, and its rank is -1")
     jog, flip = (np.where(met[:, None], array, -1) for array in (c.jog, c.flip))
     rank, component = np.where(met, c.rank, -1), np.where(met, c.component, -1)
-    return replace(c, jog=jog, flip=flip, rank=rank, component=component), bad
+    return replace(c, jog=jog, flip=flip, rank=rank, component=component)
 
 
-def cells_of_ranges(c: Cells, scene: Scene, laid: list[list[Span]]) -> tuple[Array, str]:
-    """Find the cells that hold the starts of some ranges, as far as these lie on the arm; and "" or why they do not."""
+def cells_of_ranges(c: Cells, scene: Scene, laid: list[list[Span]]) -> Array:
+    """Find the cells that hold the starts of some ranges, as far as these lie on the arm; all of them have to."""
     begin = np.zeros(len(c.rank), dtype=bool)
     for i, (edges, ranges) in enumerate(zip(c.edges, laid, strict=True)):
         for lo, hi in ranges:
-            if not lo >= edges[0]:
-                return begin, f"side {i}: starts are claimed that lie before the cells"
-            if Fraction(lo) >= scene.arm[0]:
-                return begin, f"side {i}: starts are claimed that lie beyond arm.length"
-            if Fraction(float(edges[-1])) < min(Fraction(hi), scene.arm[1]):
-                return begin, f"side {i}: the cells end before the starts do"
+            last = Fraction(float(edges[-1]))
+            prove(bool(lo >= edges[0]), f"side {i}: starts are claimed that lie before the cells")
+            prove(Fraction(lo) < scene.arm[0], f"side {i}: starts are claimed that lie beyond arm.length")
+            prove(last >= min(Fraction(hi), scene.arm[1]), f"side {i}: the cells end before the starts do")
             begin[c.start[i] : c.start[i + 1]] |= (edges[1:] > lo) & (edges[:-1] < hi)
-    return begin, ""
+    return begin
+
+
+def length_within(c: Cells, cells: Array, side: int, lo: float, hi: float) -> float:
+    """Return the length of some cells of a side from lo to hi, but for the rounding of the sum."""
+    edges = c.edges[side]
+    inside = np.minimum(edges[1:], hi) - np.maximum(edges[:-1], lo)
+    return float(np.clip(inside, 0.0, None)[cells[c.start[side] : c.start[side + 1]]].sum())
 
 
 def share_of_ranges(c: Cells, laid: list[list[Span]], cells: Array, end: float) -> float:
     """Bound from below the share of some ranges that lies in some cells, up to some x."""
-    claimed = whole = 0.0
-    for i, (edges, ranges) in enumerate(zip(c.edges, laid, strict=True)):
+    claimed = length = 0.0
+    for i, ranges in enumerate(laid):
         for lo, hi in ranges:
-            whole += float_above(exact(Fraction(hi) - Fraction(lo)))
-            inside = np.minimum(edges[1:], min(hi, end)) - np.maximum(edges[:-1], lo)
-            claimed += float(np.clip(inside, 0.0, None)[cells[c.start[i] : c.start[i + 1]]].sum())
-    return claimed / whole * (1 - 2.0**-30)  # against the rounding of these sums
+            length += float_above(exact(Fraction(hi) - Fraction(lo)))
+            claimed += length_within(c, cells, i, lo, min(hi, end))
+    return claimed / length * (1 - 2.0**-30)  # against the rounding of these sums
 
 
 def led_to(c: Cells, cells: Array) -> Array:
     """Find the cells given, and all to which some orbit from them may come, by the targets of the cells."""
-    reached, new = cells.copy(), cells.copy()
-    while new.any():
-        new = targets_of([c.jog, c.flip], new) & ~reached
-        reached |= new
-    return reached
+    return grown(cells, lambda known: targets_of([c.jog, c.flip], known))
 
 
-def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> str:
-    """Check that the starts claimed on a side lie in cells with a rank or near the joint; "" or the reason."""
+def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> None:
+    """Check that the starts claimed on a side lie in cells with a rank or near the joint."""
     edges, near = c.edges[side], starts.near
-    first, own = float(edges[0]), c.rank[c.start[side] : c.start[side + 1]] >= 0
+    first, claimed = float(edges[0]), c.rank >= 0
     since = None if starts.x is None else starts.x[side]
-    needed = np.zeros(len(own), dtype=bool)
+    needed = np.zeros(len(edges) - 1, dtype=bool)
     if starts.kind != "cells":
-        if Fraction(float(edges[-1])) < scene.arm[1]:
-            return f"side {side}: the cells end before arm.length"
+        check_reach(c, scene, side)
         needed = edges[1:] > (-math.inf if since is None else since)
-    if since is not None and near is None and not since >= first:
-        return f"side {side}: starts are claimed that lie before the cells"
+    known = since is None or near is not None or since >= first
+    prove(known, f"side {side}: starts are claimed that lie before the cells")
     if near is not None:
-        bad = check_by_halves(scene, check_below_cells, side, first, near[0][side], near[1][side])
-        if bad:
-            return f"side {side}, near the joint, x in (a, {first!r}]: {bad}"
+        check_near_joint(c, scene, side, check_below_cells, near[0][side], near[1][side])
         needed |= edges[:-1] <= float_above(near_landing(scene.sides[side], scene.k_lo, scene.k_hi, first))
-    if not own[needed].all():
-        cell = int(c.start[side]) + int(np.argmax(needed & ~own))
-        return f"{c.name(cell)}: nothing is claimed of starts in it: its rank is -1"
+    claimed[c.start[side] : c.start[side + 1]] |= ~needed
+    claimed[: c.start[side]] = claimed[c.start[side + 1] :] = True
+    c.prove_all(claimed, "nothing is claimed of starts in it: its rank is -1")
     if starts.lost is not None:
-        bad = check_by_halves(scene, check_lost, side, starts.lost[side])
-        if bad:
-            return f"side {side}, starts up to x = {starts.lost[side]!r}: {bad}"
-    return ""
+        with about(f"side {side}, starts up to x = {starts.lost[side]!r}"):
+            check_by_halves(scene, check_lost, side, starts.lost[side])
 
 
-def check_arrival(c: Cells, scene: Scene, starts: Starts, almost: bool) -> str:
-    """Check that orbits from the cells with a rank arrive, every one or almost every one; "" or the reason."""
-    stuck, bad = level_cells(c, scene)
-    if bad:
-        return bad
+def check_arrival(c: Cells, scene: Scene, starts: Starts, almost: bool) -> None:
+    """Check that orbits from the cells with a rank arrive, every one or almost every one."""
+    stuck = level_cells(c, scene)
     if stuck.any():
-        if not starts.thinning:
-            return first_bad(c, [(~stuck, "the rank does not fall along a throw")])
-        bad = check_thinning(c, scene, stuck, starts.thinning, c.rank)
-        if bad:
-            return bad
-    if not (stuck.any() or almost):
-        return ""
-    claimed = c.rank >= 0
-    some = claimed if almost else leading_to(c, stuck)
-    outward = starts.near is not None and not any(starts.near[1])
-    return check_null(c, scene, some & claimed & ~(c.component >= 0), outward)
+        c.prove_all(~stuck | (starts.thinning > 0), "the rank does not fall along a throw")
+        check_thinning(c, scene, stuck, starts.thinning, c.rank)
+    if stuck.any() or almost:
+        claimed = c.rank >= 0
+        some = claimed if almost else grown(stuck, lambda known: leading_into(c, known))
+        outward = starts.near is not None and not any(starts.near[1])
+        check_null(c, scene, some & claimed & ~(c.component >= 0), outward)
 
 
-def level_cells(c: Cells, scene: Scene) -> tuple[Array, str]:
-    """Find the cells of Z: off the components, those in which an orbit may stay at its rank; "" or the reason."""
+def level_cells(c: Cells, scene: Scene) -> Array:
+    """Find the cells of Z: off the components, those in which an orbit may stay at its rank, which never rises."""
     inside, claimed = c.component >= 0, c.rank >= 0
     level = np.zeros(len(inside), dtype=bool)
     alone = np.ones(len(inside), dtype=bool)  # no other cell than itself has its rank among its targets
-    checks = [(~inside | (c.rank == 0), "a cell of a component has a rank other than 0")]
-    for array, what in ((c.jog, "jog"), (c.flip, "flip")):
-        q = np.flatnonzero((array[:, 0] >= 0) & claimed & ~inside)
-        first, last = array[q, 0], array[q, 1]
-        most, least = range_max(c.rank, first, last), -range_max(-c.rank, first, last)
+    c.prove_all(~inside | (c.rank == 0), "a cell of a component has a rank other than 0")
+    for array, (what, q, least, most) in zip(
+        (c.jog, c.flip), c.targets(c.rank, claimed & ~inside), strict=True
+    ):
         stays, falls = np.ones(len(inside), dtype=bool), np.ones(len(inside), dtype=bool)
         stays[q], falls[q] = least >= 0, most <= c.rank[q]
-        checks.append((stays, f"a {what} may lead to a cell with the rank -1"))
-        checks.append((falls, f"the rank may rise along a {what}"))
+        c.prove_all(stays, f"{what} may lead to a cell with the rank -1")
+        c.prove_all(falls, f"the rank may rise along {what}")
         level[q] |= most == c.rank[q]
+        first, last = array[q].T
         for lo, hi in ((first, np.minimum(last, q - 1)), (np.maximum(first, q + 1), last)):
             some = lo <= hi
             alone[q[some]] &= range_max(c.rank, lo[some], hi[some]) < c.rank[q[some]]
-    bad = first_bad(c, checks)
-    for k in np.flatnonzero(level & alone).tolist() if not bad else ():
-        level[k] = bool(check_by_halves(scene, check_passing, int(c.side[k]), c.phi[k].tolist()))
-    return level, bad
+    for k in np.flatnonzero(level & alone).tolist():
+        turn = check_by_halves, scene, check_passing, int(c.side[k]), c.phi[k].tolist()
+        level[k] = bool(reason_of(*turn))
+    return level
 
 
-def check_passing(scene: Scene, side: int, phi: list[float]) -> str:
-    """Check that jogs with angles in the bracket all go one way by more than the landing scatters; "" or the reason."""
+def check_passing(scene: Scene, side: int, phi: list[float]) -> None:
+    """Check that jogs with angles in the bracket all go one way by more than the landing scatters."""
     s = scene.sides[side]
     low, high = at_angle(s, arb(phi[0])), at_angle(s, arb(phi[1]))
     rise = rise_of_jog(s, *sine_cosine(low.p.union(high.p)))
     moved = low.D.union(high.D) if rise > 0 else low.D + rise * ZERO.union(high.p - low.p)
-    one_way = moved > s.landing or moved < -s.landing
-    return "" if one_way else "a jog is not proved to move it one way"
+    prove(moved > s.landing or moved < -s.landing, "a jog is not proved to move it one way")
 
 
-def leading_to(c: Cells, cells: Array) -> Array:
-    """Find the cells from which some orbit may lead to the cells given, and these cells."""
-    leading, count = cells.copy(), -1
-    while count != int(leading.sum()):
-        count = int(leading.sum())
-        leading |= leading_into(c, leading)
-    return leading
-
-
-def check_lost(scene: Scene, side: int, end: float) -> str:
-    """Check that a worst sequence of landings takes every start in (a, end] to the joint; "" or the reason.
+def check_lost(scene: Scene, side: int, end: float) -> None:
+    """Check that a worst sequence of landings takes every start in (a, end] to the joint.
 
     A start R(p, kappa), told by its impact angle p, is thrown by D(p).  Where the throw is a jog with D < e for all p
     up to an angle after the impact at the end, landings that fall short by e bring the part inward, by a least step: to
     x <= a.
     """
     s, x = scene.sides[side], arb(end)
-    if not s.landing > 0:
-        return "without noise of the landing place no part is lost by it"
+    prove(s.landing > 0, "without noise of the landing place no part is lost by it")
     if x <= s.a:
-        return ""  # there are no such starts
-    if not (x > s.a and x <= s.arm):
-        return "they do not lie on the arm"
+        return  # there are no such starts
+    prove(x > s.a and x <= s.arm, "they do not lie on the arm")
     kappa = kappa_of_worst(scene)
     bound = near_angle(s, kappa.lower(), kappa.upper(), end)
-    if not bound < 3:
-        return "the impact angle is not bounded"
+    prove(bound < 3, "the impact angle is not bounded")
     top = root_above(s, x, kappa.lower(), at_angle(s, bound)).p
     stack, looked = [(top * k / 64, top * (k + 1) / 64) for k in range(64)], 0
     while stack:
@@ -325,12 +301,10 @@ def check_lost(scene: Scene, side: int, end: float) -> str:
         looked += 1
         p = lo.union(hi)
         R = landing_at(s, ratios(p), kappa) if s.exact else s.a + HALF * (kappa - s.small_d) * p
-        if over_angles(s, p, R, kappa)[0] == 0 and not check_short(s, lo, hi):
+        if over_angles(s, p, R, kappa)[0] == 0 and falls_short(s, lo, hi):
             continue
-        if looked > MOST_HALVES:
-            return "that a jog falls short is not proved"
+        prove(looked <= MOST_HALVES, "that a jog falls short is not proved")
         stack += [(lo, HALF * (lo + hi)), (HALF * (lo + hi), hi)]
-    return ""
 
 
 def kappa_of_worst(scene: Scene) -> Arb:
@@ -342,35 +316,34 @@ def kappa_of_worst(scene: Scene) -> Arb:
     return inner[1] if not loose and inner[0] < inner[1] else scene.k_lo.union(scene.k_hi)
 
 
-def check_short(s: Side, lo: Arb, hi: Arb) -> str:
-    """Check that jogs with angles in [lo, hi] go outward by less than the landing scatters; "" or the reason."""
+def falls_short(s: Side, lo: Arb, hi: Arb) -> bool:
+    """Whether jogs with angles in [lo, hi] are proved to go outward by less than the landing scatters."""
     rise = rise_of_jog(s, *sine_cosine(lo.union(hi)))
     end = at_angle(s, hi).D
     moved = end if rise > 0 else end - rise * ZERO.union(hi - lo)
-    return "" if moved < s.landing else "a jog may move a part outward by more than the landing scatters"
+    return bool(moved < s.landing)
 
 
 def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float, float]:
     """Bound from below the shares of the arm whose starts are claimed, and whose starts are lost or creep inward."""
     if starts.kind in ("every", "almost-every", "within"):
         return 1.0, 0.0
-    whole = claimed = explained = 0.0
+    length = claimed = explained = 0.0
     end = float_below(exact(scene.arm[0]))
     if starts.laid is not None:
         return share_of_ranges(c, starts.laid, cells, end), 0.0
     for i, s in enumerate(scene.sides):
         begin, fixed = float_above(s.a), starts.fixed(i)
-        whole += float_above(exact(scene.arm[1])) - float_below(s.a)
-        edges = np.minimum(c.edges[i], end)
+        length += float_above(exact(scene.arm[1])) - float_below(s.a)
         since = -math.inf if starts.x is None else starts.x[i]
-        own = cells[c.start[i] : c.start[i + 1]]
-        claimed += float(np.clip(edges[1:] - np.maximum(edges[:-1], since), 0.0, None)[own].sum())
+        claimed += length_within(c, cells, i, since, end)
         if starts.near is not None and not starts.only:
-            claimed += max(0.0, float(edges[0]) - max(begin if fixed is None else fixed[1], since))
+            first = min(float(c.edges[i][0]), end)
+            claimed += max(0.0, first - max(begin if fixed is None else fixed[1], since))
         until = fixed[0] if fixed is not None else begin if starts.lost is None else starts.lost[i]
         explained += max(0.0, min(until, end) - begin)
     room = 1 - 2.0**-30  # against the rounding of these sums
-    return claimed / whole * room, explained / whole * room
+    return claimed / length * room, explained / length * room
 
 
 def starts_in_words(starts: Starts, noisy: bool) -> str:

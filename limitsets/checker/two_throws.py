@@ -27,10 +27,11 @@ from .balls import (
     Rising,
     float_above,
     float_below,
+    prove,
     span,
 )
+from .cells import leading_by
 from .file import LENGTHS, Cells, quantity
-from .labels import range_max
 from .model import barrier
 from .part import ends_of, read_lengths, read_part
 from .scene import Scene
@@ -49,11 +50,11 @@ class Two(NamedTuple):
     second: int
 
 
-def check_two_throws(c: Cells, scene: Scene, bad: Array, x: float) -> str:
-    """Check that two throws with the same parameters never end beyond x in the bad cells; "" or the reason."""
+def check_two_throws(c: Cells, scene: Scene, bad: Array, x: float) -> None:
+    """Check that two throws with the same parameters never end beyond x in the bad cells."""
     names = scene.noise if isinstance(scene.noise, dict) else {}
-    if set(names) - {"landing.x"}:
-        return "with noise of the throw no two throws have the same parameters"
+    same = set(names) <= {"landing.x"}
+    prove(same, "with noise of the throw no two throws have the same parameters")
     unit = LENGTHS[scene.unit]
     known = read_lengths(scene.raw["part"], unit)
     h = quantity(scene.raw["arm"]["surface_height"], "length", "arm.surface_height")
@@ -73,23 +74,17 @@ def check_two_throws(c: Cells, scene: Scene, bad: Array, x: float) -> str:
                 continue
             lo, hi = box[k]
             cut = lo + (hi - lo) / 2
-            if looked + len(stack) > MOST_PAIRS or not lo < cut < hi:
-                return f"two throws with the same parameters may end beyond x = {x!r} on another side"
+            more = looked + len(stack) <= MOST_PAIRS and lo < cut < hi
+            prove(more, f"two throws with the same parameters may end beyond x = {x!r} on another side")
             stack += [[*box[:k], (lo, cut), *box[k + 1 :]], [*box[:k], (cut, hi), *box[k + 1 :]]]
-    return ""
 
 
 def kinds_of_two(c: Cells, bad: Array) -> Iterator[tuple[Two, list[Pair]]]:
     """Yield each kind of two throws from attracting cells that may end in bad ones, with the ranges of both angles."""
     inside = c.component >= 0
-    ways = (c.jog, c.flip)
     for second, first in itertools.product((0, 1), (0, 1)):
-        then = inside & (ways[second][:, 0] >= 0)
-        q = np.flatnonzero(then)
-        then[q] = range_max(bad.astype(np.int64), *ways[second][q].T) > 0
-        begin = inside & (ways[first][:, 0] >= 0)
-        q = np.flatnonzero(begin)
-        begin[q] = range_max(then.astype(np.int64), *ways[first][q].T) > 0
+        then = inside & leading_by([(c.jog, c.flip)[second]], bad)
+        begin = inside & leading_by([(c.jog, c.flip)[first]], then)
         for side in range(len(c.edges)):
             own = np.flatnonzero(begin & (c.side == side))
             if len(own):

@@ -305,3 +305,15 @@ class MapCertificate:
 
     def recheck(self, folder: Path) -> Report:
         return recheck(self.write(folder / "map.proof.zip"), workers=1)
+
+
+def denied(certificate, folder, why=""):
+    """What is not proved is denied, for a reason that holds some words."""
+    report = certificate.recheck(folder)
+    assert (report.verdict, why in report.reason) == ("failed", True), report
+
+
+def refused(certificate, folder):
+    """What cannot be read is refused, for some reason."""
+    report = certificate.recheck(folder)
+    assert (report.verdict, report.reason != "") == ("bad file", True), report

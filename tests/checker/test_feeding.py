@@ -260,19 +260,6 @@ def test_progress_of_every_start_where_an_orbit_stays(good, never_fed, tmp_path)
     assert "not proved to be enough" in denied(ending(good, section, "20.5 in"), tmp_path)
 
 
-def test_a_spread_of_the_scene_that_is_not_in_the_noise(good, tmp_path):
-    f = ending(good, EVERY)
-    spread = {"effects": {"spread": "bounded"}, "world": {"scatter": {"landing": "0.02 in"}}}
-    f.header["boxes"][0]["scene"] |= spread
-    assert verdict(f, tmp_path).verdict == "bad file"
-
-
-def test_another_scene(good, tmp_path):
-    f = ending(good, EVERY)
-    f.header["boxes"][0]["scene"]["throw"]["kappa"] = "25.9 in"
-    assert denied(f, tmp_path)
-
-
 def spoiled(f, name, cell, value):
     f = f.copy()
     f.arrays[name][cell] = value
@@ -311,12 +298,6 @@ def test_cells_that_may_leave_and_are_said_not_to(scattered, tmp_path):
     f = ending(scattered, {"side": 2, "safety": "every"})
     cell = int(np.flatnonzero(f.arrays["0.rank"] < 0)[0])
     assert "is not proved to lie in" in denied(spoiled(f, "0.rank", cell, 0), tmp_path)
-
-
-def test_a_scene_without_a_cavity(good, tmp_path):
-    f = ending(good, EVERY)
-    del f.header["boxes"][0]["scene"]["cavity"]
-    assert "no cavity" in denied(f, tmp_path)
 
 
 def test_an_orbit_that_is_fed(good, never_fed, tmp_path):
@@ -395,22 +376,30 @@ def test_a_section_that_cannot_be_read(good, tmp_path, section):
     assert verdict(ending(good, section), tmp_path).verdict == "bad file"
 
 
-@pytest.mark.parametrize(
-    "cavity", [{"position": "19"}, {"position": ["18 in", "19 in"]}, {}, {"position": "-1 in"}], ids=str
-)
-def test_a_cavity_that_cannot_be_read(good, tmp_path, cavity):
+SCATTERS = {"effects": {"spread": "bounded"}, "world": {"scatter": {"landing": "0.02 in"}}}
+OF_THE_SCENE = {  # what is changed in it, and what becomes of the file, why
+    "another throw": ({"throw": {"kappa": "25.9 in"}}, "failed", ""),
+    "no cavity": ({"cavity": None}, "failed", "no cavity"),
+    "a spread that is not in the noise": (SCATTERS, "bad file", "not in the noise"),
+    "a place without a unit": ({"cavity": CAVITY | {"position": "19"}}, "bad file", ""),
+    "a place that is an interval": ({"cavity": CAVITY | {"position": ["18 in", "19 in"]}}, "bad file", ""),
+    "no place": ({"cavity": CAVITY}, "bad file", "position missing"),
+    "a place before the joint": ({"cavity": CAVITY | {"position": "-1 in"}}, "bad file", "above 0"),
+    # what the cavity is like beyond the end is not claimed, but its keys are known
+    "how a part tips": ({"cavity": CAVITY | {"position": "19 in", "tips": "rest"}}, "proved", ""),
+    "a key that is not known": (
+        {"cavity": CAVITY | {"position": "19 in", "tilts": "rest"}},
+        "bad file",
+        "unknown key",
+    ),
+}
+
+
+@pytest.mark.parametrize("change", OF_THE_SCENE)
+def test_another_scene(good, tmp_path, change):
+    tables, expected, why = OF_THE_SCENE[change]
     f = ending(good, EVERY)
-    f.header["boxes"][0]["scene"]["cavity"] = CAVITY | cavity
-    assert verdict(f, tmp_path).verdict == "bad file"
-
-
-def test_how_a_part_tips_is_read_and_nothing_else(good, tmp_path):
-    """What the cavity is like beyond the end is not claimed, but its keys are known."""
-    for key, sure in (("tips", True), ("tilts", False)):
-        f = ending(good, {"side": 2, "safety": "every"})
-        for box in f.header["boxes"]:
-            box["scene"]["cavity"][key] = "rest"
-        if sure:
-            assert verdict(f, tmp_path).claims[0][1] in ("proved", "proved-on-cells")
-        else:
-            assert "unknown key" in str(verdict(f, tmp_path))
+    f.header["boxes"][0]["scene"] |= tables
+    report = verdict(f, tmp_path)
+    assert report.verdict == expected
+    assert why in report.reason

@@ -165,8 +165,18 @@ def used_cell(forged, throw=0):
     return int(np.flatnonzero(forged.arrays[f"{throw}.jog"][:, 0] >= 0)[0])
 
 
-def a_cell_of_the_first_belief_is_dropped(f):
-    f.arrays["belief"][0, 1] += 1
+def added(name, at, by):
+    """A change of an entry of an array."""
+
+    def spoil(f):
+        f.arrays[name][at] += by
+
+    return spoil
+
+
+def turned(name, change):
+    """Another array in place of one."""
+    return lambda f: f.arrays.update({name: np.ascontiguousarray(change(f, f.arrays[name]))})
 
 
 def a_belief_is_moved(f):
@@ -183,19 +193,10 @@ def another_throw_is_made(f):
     f.arrays["throw"][state] = 1 - f.arrays["throw"][state]
 
 
-def fewer_throws_are_said_to_be_enough(f):
+def fewer_throws(f, left):
+    """Fewer are said to be enough; and to be left in some states."""
     section_of(f)["within"] -= 1
-
-
-def fewer_throws_are_left(f):
-    section_of(f)["within"] -= 1
-    f.arrays["left"][0] -= 1
-
-
-def every_count_is_one_less(f):
-    """Nothing comes after the throw that catches the part: only its own count says that there is one."""
-    section_of(f)["within"] -= 1
-    f.arrays["left"][f.arrays["throw"] >= 0] -= 1
+    f.arrays["left"][left] -= 1
 
 
 def the_states_go_round(f):
@@ -209,22 +210,9 @@ def the_states_go_round_with_even_counts(f):
     f.arrays["left"][:] = f.arrays["left"][0]
 
 
-def the_mode_is_the_other_one(f):
-    section = section_of(f)
-    section["mode"] = "catch" if section["mode"] == "stop" else "stop"
-
-
-def an_answer_is_dropped(f):
-    f.arrays["after"][state_that(f, first=1), 1] = -1
-
-
 def an_answer_before_the_first_throw_is_dropped(f):
     first = section_of(f)["first"]
     first[next(word for word, state in first.items() if state is not None)] = None
-
-
-def answers_are_swapped(f):
-    f.arrays["after"] = np.ascontiguousarray(f.arrays["after"][:, ::-1])
 
 
 def it_stops_at_once(f):
@@ -247,34 +235,28 @@ def a_border_is_moved(f):
     edges[cell] += 0.4 * (edges[cell + 1] - edges[cell])
 
 
-def a_belief_is_dropped(f):
-    belief = f.arrays["belief"]
-    f.arrays["belief"] = np.ascontiguousarray(belief[belief[:, 0] != int(f.arrays["after"][0].max())])
-
-
 LIES = {  # in all three policies
-    each.__name__.replace("_", " "): each
-    for each in (
-        a_cell_of_the_first_belief_is_dropped,
-        a_belief_is_dropped,
-        a_belief_is_moved,
-        the_throws_change_their_names,
-        another_throw_is_made,
-        fewer_throws_are_said_to_be_enough,
-        fewer_throws_are_left,
-        every_count_is_one_less,
-        the_states_go_round,
-        the_states_go_round_with_even_counts,
-        the_mode_is_the_other_one,
-        an_answer_is_dropped,
-        an_answer_before_the_first_throw_is_dropped,
-        answers_are_swapped,
-        it_stops_at_once,
-        an_image_is_narrowed,
-        a_branch_is_denied,
-        a_border_is_moved,
-    )
-} | {
+    "a cell of the first belief is dropped": added("belief", (0, 1), 1),
+    "a belief is dropped": turned("belief", lambda f, a: a[a[:, 0] != int(f.arrays["after"][0].max())]),
+    "a belief is moved": a_belief_is_moved,
+    "the throws change their names": the_throws_change_their_names,
+    "another throw is made": another_throw_is_made,
+    "fewer throws are said to be enough": lambda f: fewer_throws(f, []),
+    "fewer throws are left": lambda f: fewer_throws(f, 0),
+    # nothing comes after the throw that catches the part: only its own count says that there is one
+    "every count is one less": lambda f: fewer_throws(f, f.arrays["throw"] >= 0),
+    "the states go round": the_states_go_round,
+    "the states go round with even counts": the_states_go_round_with_even_counts,
+    "the mode is the other one": lambda f: section_of(f).update(
+        mode="catch" if section_of(f)["mode"] == "stop" else "stop"
+    ),
+    "an answer is dropped": lambda f: f.arrays["after"].__setitem__((state_that(f, first=1), 1), -1),
+    "an answer before the first throw is dropped": an_answer_before_the_first_throw_is_dropped,
+    "answers are swapped": turned("after", lambda f, a: a[:, ::-1]),
+    "it stops at once": it_stops_at_once,
+    "an image is narrowed": an_image_is_narrowed,
+    "a branch is denied": a_branch_is_denied,
+    "a border is moved": a_border_is_moved,
     "the speed of a throw is changed": put(*FEEDBACK, "throws", 0, "kappa", "33.4 in"),
     "no throw is left": lambda f: f.arrays["left"].fill(0),
     "the starts reach farther down": put(*AT, "starts", 0, 1, (16.9).hex()),

@@ -167,7 +167,7 @@ def good(tmp_path_factory):
         whole = module.mesh_of(claim.edges)
         chain = links.chain_of(claim.noisy, whole, *module.kinds_of(claim, whole), lambda more: None)
         row = module.start_row(claim, whole)
-        found = {name: module.check_within(chain, row, name, said)[1] for name, said in claim.within.items()}
+        found = {name: module.brackets_of(chain, row, name, len(said)) for name, said in claim.within.items()}
     quantiles = [["any", "50 %", *median_of(found["any"])]]
     return noisy(found, quantiles=quantiles, mean=[(12.2).hex(), (12.4).hex()])
 

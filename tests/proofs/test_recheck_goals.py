@@ -235,7 +235,8 @@ def test_near_the_joint_nothing_holds_with_scattered_landings():
         scene = checker.scene.read_scene(forge.scene("designed"), noise)
         for side in scene.sides:
             edge = float(side.a.mid()) + 0.1
-            missing = checker.near_hinge.check_near_hinge(side, scene.k_lo, scene.k_hi, edge, 1.0157)
+            near = checker.near_hinge.check_near_hinge, side, scene.k_lo, scene.k_hi, edge, 1.0157
+            missing = checker.balls.reason_of(*near)
             assert (missing == "") == proved
             assert proved or "x <= a" in missing
 

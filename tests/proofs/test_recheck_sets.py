@@ -477,12 +477,10 @@ def test_where_there_may_be_several_impacts_nothing_is_proved(good, tmp_path):
     cells = checker.file.Cells([f.arrays[f"0.edges.{i}"] for i in range(3)], *[
         f.arrays[f"0.{name}"] for name in ("jog", "flip", "branch", "rank", "component", "phi")])  # fmt: skip
     ends, cycles = sections(f)
-    assert "several impacts" in checker.end_points.check_ends(
-        scene, cells, checker.end_points.read_ends(ends, 3)
-    )
-    assert "kappa > ell" in checker.refutations.check_orbits(
-        scene, cells, checker.refutations.read_orbits(cycles, 3)
-    )
+    with pytest.raises(checker.balls.UnprovedError, match="several impacts"):
+        checker.end_points.check_ends(scene, cells, checker.end_points.read_ends(ends, 3))
+    with pytest.raises(checker.balls.UnprovedError, match="kappa > ell"):
+        checker.refutations.check_orbits(scene, cells, checker.refutations.read_orbits(cycles, 3))
 
 
 def test_the_impact_is_bracketed_next_to_the_joint():

@@ -9,8 +9,8 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from limitsets.checker.end_points import Throws
-from limitsets.checker.region import decided_on
+from limitsets.checker.end_points import Piece, Throws, unproved_of
+from limitsets.checker.region import MOST_CUT
 from limitsets.checker.scene import read_scene
 from limitsets.parameters.regions import (
     Block,
@@ -397,4 +397,5 @@ def test_a_decision_is_proved_on_either_side_of_its_switch_and_not_across(branch
     given = ls.load("paper-designed").as_dict()
     raw = {word: given[word] for word in ("name", "part", "arm", "throw", "gravity") if word in given}
     scene = read_scene(raw | {"model": {"flight": "exact", "flip": "signed"}}, None)
-    assert decided_on(Throws(scene), 2, branch, lo, hi) is proved
+    unproved = unproved_of(Throws(scene), Piece(2, lo, hi, branch, 0), MOST_CUT)
+    assert unproved == ("" if proved else "branch")

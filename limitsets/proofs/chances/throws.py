@@ -20,7 +20,7 @@ import numpy as np
 
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.proofs.chances.averages import Average, Gaps, Nodes, Span, Swings, Windows, mean_matrix
-from limitsets.proofs.chances.deficits import Deficits, Rows, Staircase
+from limitsets.proofs.chances.deficits import MORE, Deficits, Rows, Staircase
 from limitsets.proofs.chances.landings import (
     Decided,
     Derivatives,
@@ -33,12 +33,8 @@ from limitsets.proofs.chances.landings import (
 )
 from limitsets.proofs.prover.numbers import Intervals
 
-# Inflates coefficients against the rounding of the few operations that make them.
-MORE = 1.0 + 2.0**-40
 # Deviations of the speed enclosed at a time: of 6 % at once no derivative keeps its sign.
 PIECE = 0.005
-# Stands for the absence of a cap.
-NEVER = 1e200
 
 
 def throw_average(

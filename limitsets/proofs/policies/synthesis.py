@@ -23,7 +23,7 @@ from limitsets.feeder.scene import BeyondSensor, Model, Scene, Sensor, exact_tex
 from limitsets.proofs.policies.board import Board, Progress, Starts, board_of
 from limitsets.proofs.policies.policy import NONE, NOT_DECIDED, SOLVED, Found, Policy, search
 from limitsets.proofs.prover.certificate import Saved, brackets, pack, tidy
-from limitsets.proofs.prover.cover import Cover, targets
+from limitsets.proofs.prover.cover import targets
 from limitsets.systems.cells import CellSet, Grid
 
 # ----------------------------------------------------------------
@@ -102,14 +102,14 @@ def _of_throws(board: Board, policy: Policy) -> Arrays:
     held: Arrays = {f"edges.{side}": edges for side, (edges,) in enumerate(board.starts.grid.edges)}
     for number, cover in enumerate(board.covers.values()):
         made = policy.belief[policy.throw == number].any(axis=0)
-        for name, value in _images(cover).items():
-            none = -1 if name != "phi" else 0.0
+        images = (
+            ("jog", targets(cover, 0), -1),
+            ("flip", targets(cover, 1), -1),
+            ("phi", brackets(cover), 0.0),
+        )
+        for name, value, none in images:
             held[f"{number}.{name}"] = np.where(made[:, None], value, none).astype(value.dtype)
     return held
-
-
-def _images(cover: Cover) -> Arrays:
-    return {"jog": targets(cover, 0), "flip": targets(cover, 1), "phi": brackets(cover)}
 
 
 # ----------------------------------------------------------------
