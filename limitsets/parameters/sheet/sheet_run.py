@@ -147,22 +147,35 @@ class _SheetRun:
         """Find the factor on the tolerance."""
         label = "margin of all together"
         with self.step(label):
-            quiet: dict[str, Any] = {"width": width, "tell": lambda share: self.tell(label, share)}
-            quiet["seconds"] = FOR_JOINT * self.left()
+            seconds = FOR_JOINT * self.left()
             try:
-                factor = joint_margin(self.scene, self.goals, self.tolerance, **quiet)
+                factor = joint_margin(
+                    self.scene,
+                    self.goals,
+                    self.tolerance,
+                    width=width,
+                    seconds=seconds,
+                    tell=lambda share: self.tell(label, share),
+                )
                 self.keep(_written(factor, self.folder, self.recheck))
             except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
                 self.left_out["joint"] = failure(error)
 
     def curve(self, side: int) -> MarginsBeyond | None:
         """Find margins against X; None where the part gets farther out on another side."""
-        told: dict[str, Any] = {"tell": self.tell, "keep": self.write, "seconds": self.left()}
-        told["executor"] = self.executor
-        told["laid"] = {int(on): pairs for on, pairs in by_side(self.goals[0].laid).items()} or None
+        seconds = self.left()
         with self.step("margins against X"):
             try:
-                margins, left = curve(self.scene, side, self.tolerance, **told)
+                margins, left = curve(
+                    self.scene,
+                    side,
+                    self.tolerance,
+                    laid={int(on): pairs for on, pairs in by_side(self.goals[0].laid).items()} or None,
+                    seconds=seconds,
+                    executor=self.executor,
+                    tell=self.tell,
+                    keep=self.write,
+                )
             except Exception as error:  # noqa: BLE001 - it is told, the rest goes on
                 self.left_out["curve"] = str(error) if isinstance(error, AnswerError) else failure(error)
                 return None

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limitsets.base import AnswerError, Table, Tabled, as_table, joined, picked
+from limitsets.base.campaign import Here
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scattering import LAWS, Scattering, scattering_of
 from limitsets.feeder.scene import WITHOUT_SCATTER, LaidLike, Model, Scene, load
@@ -43,16 +44,6 @@ def _joined(one: MarginsBeyond | None, other: MarginsBeyond) -> MarginsBeyond:
         for name in ("x", "proved", "refuted")
     }
     return replace(one, **columns, margins=())
-
-
-class _Here(Executor):
-    """Computes in this process."""
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Compute at once."""
-        done: Future[Any] = Future()
-        done.set_result(fn(*args, **kwargs))
-        return done
 
 
 def _place(
@@ -111,7 +102,7 @@ def curve(
     places = places_beyond(scene, side, PLACES)
     places = places[np.argsort(np.abs(places - places.mean()), kind="stable")]
     waiting, margins = places.tolist(), None
-    pool = executor or _Here()
+    pool = executor or Here()
     margin_there = partial(_place, scene, side, names, words)
     # concurrent.futures has no public word for it; of an executor of another kind it is not known
     at_once = getattr(pool, "_max_workers", 1)
