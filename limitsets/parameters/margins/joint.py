@@ -204,14 +204,12 @@ class _SubBox:
 
     def cut(self, k: int, at: Fraction, number: int) -> list[_SubBox]:
         """Cut along one quantity."""
-        parts = []
-        for low, high in (
-            (self.low, (*self.high[:k], at, *self.high[k + 1 :])),
-            ((*self.low[:k], at, *self.low[k + 1 :]), self.high),
-        ):
-            number += 1
-            parts.append(_SubBox(_nearness(low, high), number, low, high))
-        return parts
+        upper_end = (*self.high[:k], at, *self.high[k + 1 :])
+        lower_end = (*self.low[:k], at, *self.low[k + 1 :])
+        return [
+            _SubBox(_nearness(self.low, upper_end), number + 1, self.low, upper_end),
+            _SubBox(_nearness(lower_end, self.high), number + 2, lower_end, self.high),
+        ]
 
 
 def _nearness(low: Parts, high: Parts) -> Fraction:
@@ -279,7 +277,7 @@ class Subdivision:
             if outcome is not None and outcome.verdict == "proved":
                 self.proved.append((part, outcome))
                 self.cost = max(LEAST_COST, self.cost * 0.99)
-                tell(self.done(waiting))
+                tell(len(self.proved) / (len(self.proved) + len(waiting)))
                 continue
             if outcome is not None and self.sensitivity.slack.size:
                 self.cost = min(MOST_COST, self.cost * 1.03)
@@ -352,10 +350,6 @@ class Subdivision:
                 Fraction(1, 64),
             )
         return share, missing
-
-    def done(self, waiting: list[_SubBox]) -> float:
-        """Share of the pieces known so far."""
-        return len(self.proved) / (len(self.proved) + len(waiting))
 
     def _try(self, part: _SubBox, left: float) -> Outcome:
         self.tried += 1

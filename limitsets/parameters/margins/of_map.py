@@ -58,19 +58,16 @@ class _Query:
 
     def prove(self, piece: Any = None, noise: Any = None, finest: int = 0) -> _Outcome:
         """Prove the goal; there is no noise, and the cells are those that were given."""
-        del noise, finest
         proof = proved_again(self.first, *self._corners(piece))
         return _Outcome(proof.claims[0].verdict, proof.claims[0].reason, proof, piece)
 
     def refute(self, piece: Any = None, noise: Any = None) -> _Outcome:
         """Refute it."""
-        del noise
         proof = refuted_again(self.first, *self._corners(piece))
         return _Outcome(proof.claims[0].verdict, proof.claims[0].reason, proof, piece)
 
     def unjoined(self, pieces: Any) -> str:
         """Say why pieces are not one claim: never, for each is proved for the same starts and ends."""
-        del pieces
         return ""
 
 
@@ -100,7 +97,6 @@ class _Scale:
 
     def noise(self, factor: Fraction) -> dict[str, str]:
         """Say that nothing differs at every step."""
-        del factor
         return {}
 
     def texts(self, factor: Fraction) -> dict[str, str]:
