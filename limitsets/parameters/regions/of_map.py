@@ -13,8 +13,9 @@ final cells, whose orbits tend to a cycle, one cell of both says that the two cy
 from __future__ import annotations
 
 import functools
+import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -110,13 +111,13 @@ class RegionsOfMap(Saved):
     @functools.cached_property
     def sizes(self) -> tuple[Fraction, ...]:
         """The share of the whole that each box is, exactly: its ends are decimals."""
-        shares = []
-        for at in self.index.tolist():
-            share = Fraction(1)
-            for axis, low, high in zip(self.axes, at[::2], at[1::2], strict=True):
-                share *= (axis.borders[high] - axis.borders[low]) / (axis.borders[-1] - axis.borders[0])
-            shares.append(share)
-        return tuple(shares)
+        return tuple(
+            math.prod(
+                (axis.borders[high] - axis.borders[low]) / (axis.borders[-1] - axis.borders[0])
+                for axis, low, high in zip(self.axes, at[::2], at[1::2], strict=True)
+            )
+            for at in self.index.tolist()
+        )
 
     def share(self, chosen: Any) -> Fraction:
         """Add the shares of some boxes, exactly; `chosen` has shape (n,)."""
@@ -251,16 +252,12 @@ def certified_map(
     boxes: list[Cell] = [tuple(end for axis in axes for end in (0, len(axis.borders) - 1))]
     for _ in range(first):
         boxes = [half for at in boxes for half in _halves(at)]
-    asked = functools.partial(_asked, ask)
-    index, records = cut_where_open(boxes, asked, _halves, depth - first, progress)
+    index, records = cut_where_open(
+        boxes, lambda todo: (ask(at) for at in todo), _halves, depth - first, progress
+    )
     code = np.array([CODES.index(record.verdict) for record in records], dtype=np.int8)
     region = regions(records, spread(axes, index, np.arange(len(index))), _corresponds)
     return RegionsOfMap(grid, axes, index, records, code, region, goal, time.perf_counter() - begin)
-
-
-def _asked(ask: Callable[[Cell], RecordOfMap], todo: list[Cell]) -> Iterator[RecordOfMap]:
-    """Ask one box after another."""
-    return (ask(at) for at in todo)
 
 
 def _axes(lower: Any, upper: Any, depth: int) -> tuple[CellAxis, ...]:

@@ -185,12 +185,10 @@ class Regions(Saved):
     @property
     def area(self) -> Array:
         """Area of each cell in the units of the axes, shape (n,)."""
-        sides = []
-        for k, axis in enumerate(self.axes):
-            at = np.array([float(value) for value in axis.borders])
-            sides.append(at[self.index[:, 2 * k + 1]] - at[self.index[:, 2 * k]])
-        product: Array = sides[0] * sides[1]
-        return product
+        borders = [np.array([float(value) for value in axis.borders]) for axis in self.axes]
+        low, high = self.index[:, ::2], self.index[:, 1::2]
+        width, height = (at[high[:, k]] - at[low[:, k]] for k, at in enumerate(borders))
+        return np.asarray(width * height)
 
     @property
     def blocks(self) -> Ints:

@@ -116,14 +116,9 @@ class Return(NamedTuple):
     branches: Ints
 
 
-class Violation(NamedTuple):
-    """Whether an orbit of the scene in the middle violates the goal, and the chain that proves it of all parameters."""
-
-    seen: bool = False
-    chain: Chain | None = None
-
-
-def violating_chain(attracting: Attraction, middle_box: ParameterBox, goal: OrientedBeyond) -> Violation:
+def violating_chain(
+    attracting: Attraction, middle_box: ParameterBox, goal: OrientedBeyond
+) -> tuple[bool, Chain | None]:
     """Look for a periodic orbit that violates the goal, and prove that every map of the box has one.
 
     Parameters
@@ -134,17 +129,24 @@ def violating_chain(attracting: Attraction, middle_box: ParameterBox, goal: Orie
         The scene in the middle of the box.
     goal : OrientedBeyond
         The goal.
+
+    Returns
+    -------
+    bool
+        Whether an orbit of the scene in the middle violates the goal.
+    Chain or None
+        What proves it of all parameters.
     """
     box = attracting.cover.box
     map_now = middle_box.at_kappa(middle_box.middle_kappa)
     start = orbit(map_now, *middle(attracting, attracting.cells.numbers()), SETTLING)
     path = orbit(map_now, float(start.x[-1]), int(start.side[-1]), SEARCHED)
     if not goal.wrong()(path.x * MORE_THAN_ROUNDING, path.side).any():
-        return Violation()
+        return False, None
     if not box.concave:
-        return Violation(True)  # the impact may not depend continuously on where the throw starts
+        return True, None  # the impact may not depend continuously on where the throw starts
     chains = (_widened(box, near, above(goal.x)) for near in _returns(path, goal))
-    return Violation(True, next((chain for chain in chains if chain is not None), None))
+    return True, next((chain for chain in chains if chain is not None), None)
 
 
 def _returns(path: Orbit, goal: OrientedBeyond) -> Iterator[Return]:
@@ -154,16 +156,14 @@ def _returns(path: Orbit, goal: OrientedBeyond) -> Iterator[Return]:
     room = _from_switches(x, side, path.code)
     begin = np.flatnonzero(goal.wrong()(x, side) & (np.arange(size) < size - LONGEST))
     least = x[begin] - goal.x
-    scores, starts, periods = [], [], []
+    tried = []
     for period in range(1, LONGEST + 1):
         least = np.minimum(least, room[begin + period - 1])
         to = begin + period
         back = (side[to] == side[begin]) & (np.abs(x[to] - x[begin]) <= NEAR * x[begin])
         best = np.argsort(-least[back], kind="stable")[:TRIED]
-        scores.append(least[back][best])
-        starts.append(begin[back][best])
-        periods.append(np.full(best.size, period))
-    score, start, length = (np.concatenate(each) for each in (scores, starts, periods))
+        tried.append((least[back][best], begin[back][best], np.full(best.size, period)))
+    score, start, length = (np.concatenate(parts) for parts in zip(*tried, strict=True))
     for k in np.argsort(-score, kind="stable")[:TRIED].tolist():
         piece = slice(int(start[k]), int(start[k] + length[k]))
         yield Return(x[piece], side[piece].astype(np.int64), path.code[piece].astype(np.int64))
@@ -356,16 +356,14 @@ def certify_cell(
         for number in cells:
             attracting = _finer(coarse, scene, number)
             doubtful = _may_violate(attracting, scene)
-            against = Violation()
+            seen, chain = False, None
             if doubtful and first is None and isinstance(goal, OrientedBeyond) and not goal.from_anywhere:
-                against = violating_chain(attracting, middle, goal)
+                seen, chain = violating_chain(attracting, middle, goal)
             # if these cells prove nothing, finer cells come before two throws at once, which cost more
-            record = _record(
-                attracting, scene, ends, ask=not against.seen and (not doubtful or number == cells[-1])
-            )
-            if against.chain is not None:
-                return replace(record, goal="refuted", reason="", chain=against.chain)
-            if against.seen:
+            record = _record(attracting, scene, ends, ask=not seen and (not doubtful or number == cells[-1]))
+            if chain is not None:
+                return replace(record, goal="refuted", reason="", chain=chain)
+            if seen:
                 return replace(record, reason=SEEN)
             if record.settled:
                 return record

@@ -200,15 +200,12 @@ def _of_records(records: Sequence[Record], sides: int) -> Arrays:
             joint[k] = np.ravel(section["joint"])
         counts[k] = section["thinning"], section.get("throws", 0), section.get("jogs", 0)
         parts.append(_compact(record))
-    names = ("jog", "flip", "rank", "component", "phi")
-    rows = {name: np.concatenate([part[name] for part in parts]) for name in names} if parts else {}
-    empty = {
+    empty: Arrays = {
         **{name: np.zeros((0, 2), np.int32) for name in ("jog", "flip")},
-        "rank": np.zeros(0, np.int32),
-        "component": np.zeros(0, np.int32),
+        **{name: np.zeros(0, np.int32) for name in ("rank", "component")},
         "phi": np.zeros((0, 2), np.float32),
     }
-    held = empty | rows
+    held = {name: np.concatenate([none, *(part[name] for part in parts)]) for name, none in empty.items()}
     for name in ("jog", "flip", "rank", "component"):  # two bytes are enough for most
         held[name] = held[name].astype(np.int16 if held[name].max(initial=0) < 2**15 else np.int32)
     return {
