@@ -243,7 +243,7 @@ class _Watched:
         return next((word for word, holds in reasons if holds), "never")
 
 
-def crowd_of(pair: Pair, how: Question, *, record: bool = False) -> Crowd:
+def crowd_of(pair: Pair, how: Question) -> Crowd:
     """Make the engine's crowd of both parts."""
     friction = pair.scenes[0].world.friction
     return Crowd(
@@ -252,7 +252,6 @@ def crowd_of(pair: Pair, how: Question, *, record: bool = False) -> Crowd:
         carried=how.carried,
         friction=FRICTION if friction is None else friction,
         step=how.step,
-        record=record,
     )
 
 

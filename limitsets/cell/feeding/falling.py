@@ -123,8 +123,7 @@ def _kept(scene: Scene, side: int, beyond: Array) -> Array:
     """Give the rate about the end, for 1 at which the side comes down about its left corner."""
     a, d = float(scene.sides.a[side]), float(scene.sides.d[side])
     own = scene.radius_of_gyration**2 + d * d
-    ratio: Array = (own + a * beyond) / (own + beyond * beyond)
-    return ratio
+    return np.asarray((own + a * beyond) / (own + beyond * beyond))
 
 
 def _speed(scene: Scene) -> float:

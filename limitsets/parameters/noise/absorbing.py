@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from limitsets.base import GridError, as_table, picked
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.parameters.noise.cell_images import BoxcarOperator, cells_met
+from limitsets.parameters.noise.cell_images import BoxcarBlock, cells_met
 from limitsets.parameters.noise.ulam import SubOperator, Transfer
 from limitsets.systems.cells import CellSet, Domain, Grid, grid
 from limitsets.systems.graph.components import strong_components
@@ -99,19 +99,19 @@ def graph_of(chain: Transfer) -> Ranges:
         return _ranges(chain, source[begin], matrix.indices[begin].astype(np.int64), run)
     columns: list[Ints] = []
     for block in chain.throw.blocks:
-        first, last = _cells_hit(chain, block, chain.throw)
+        first, last = _cells_hit(chain, block)
         source, start = block.first + np.arange(first.size), first + int(chain.grid.offset[block.target])
         columns.append(np.stack([source, start, last - first + 1])[:, (block.mass > 0.0) & (last >= first)])
     table = np.concatenate(columns, axis=1)
     return _ranges(chain, *table[:, np.argsort(table[0], kind="stable")])
 
 
-def _cells_hit(chain: Transfer, block: Any, stage: BoxcarOperator) -> tuple[Ints, Ints]:
+def _cells_hit(chain: Transfer, block: BoxcarBlock) -> tuple[Ints, Ints]:
     """First and last cell of a side that boxcars and the noise of the landing place after them can reach."""
     first, last = cells_met(block.lo, block.hi)
     if chain.landing is None:
         return first, last
-    between, edges = stage.edges[block.target], chain.grid.edges[block.target][0]
+    between, edges = chain.throw.edges[block.target], chain.grid.edges[block.target][0]
     low, high = between[first] + chain.reach[0], between[last + 1] + chain.reach[1]
     inside = (high >= edges[0]) & (low <= edges[-1])
     first = np.clip(np.searchsorted(edges, low, side="right") - 1, 0, edges.size - 2)

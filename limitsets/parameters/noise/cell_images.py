@@ -430,5 +430,4 @@ def _spread_of_points(
 
 def uses_pieces(params: Any) -> bool:
     """Whether cells of a map can be cut into monotone pieces."""
-    kind = kind_of(params)
-    return kind.dimension == 1 and has_slope(params)
+    return kind_of(params).dimension == 1 and has_slope(params)
