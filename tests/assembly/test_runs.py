@@ -137,38 +137,39 @@ def test_a_file_of_other_trials_is_refused(tmp_path):
         ls.assemble(*NAMES, NOISE, trials=1, seed=8, file=file)
 
 
-def test_what_cannot_be():
-    two = ls.load(NAMES[1])
-    with pytest.raises(AnswerError, match="overlapping"):
-        ls.assemble(*NAMES, starts=[(10.0, 2), (10.5, 1)], trials=1)
-    with pytest.raises(AnswerError, match="the start of paper-quadrilateral"):
-        ls.assemble(*NAMES, starts=[(6.0, 2), (20.5, 1)], trials=1)
-    with pytest.raises(AnswerError, match="kappa of the two scenes"):
-        ls.assemble(NAMES[0], two.with_values({"throw.kappa": 24.0}), trials=1)
-    with pytest.raises(AnswerError, match="surface_height of the two scenes"):
-        ls.assemble(NAMES[0], two.with_values({"arm.surface_height": -0.4}), trials=1)
-    trees = both()
-    for tree in trees:
-        del tree["cavity"]
-    with pytest.raises(AnswerError, match="cavity"):
-        ls.assemble(*trees, trials=1)
-    with pytest.raises(AnswerError, match=r"effects\.contact"):
-        ls.assemble(*NAMES, contact="hinge", trials=1)
-    with pytest.raises(AnswerError, match=r"effects\.contact of the two scenes"):
-        ls.assemble(pair(contact=True)[0], NAMES[1], trials=1)
-    with pytest.raises(AnswerError, match="the contact"):
-        ls.assemble(*pair(contact=True), contact="glue", trials=1)
-    with pytest.raises(AnswerError, match="the trials"):
-        ls.assemble(*NAMES, trials=0)
-    with pytest.raises(AnswerError, match=r"the seed is -1; allowed: a whole number from 0"):
-        ls.assemble(*NAMES, trials=1, seed=-1)
-    energy = [ls.load({**tree, "model": {"flight": "exact", "flip": "energy"}}) for tree in both()]
-    with pytest.raises(AnswerError, match="the flip of paper-triangle"):
-        ls.assemble(*energy, trials=1)
-
-
 def both():
     return [ls.load(name).as_dict() for name in NAMES]
+
+
+def second_with(name, value):
+    """The pair, one quantity of the second part's scene changed."""
+    return NAMES[0], ls.load(NAMES[1]).with_values({name: value})
+
+
+CONTACT = pair(contact=True)
+ENERGY = [tree | {"model": {"flight": "exact", "flip": "energy"}} for tree in both()]
+FLAT = [{key: table for key, table in tree.items() if key != "cavity"} for tree in both()]
+
+
+@pytest.mark.parametrize(
+    ("scenes", "words", "said"),
+    [
+        (NAMES, {"starts": [(10.0, 2), (10.5, 1)]}, "overlapping"),
+        (NAMES, {"starts": [(6.0, 2), (20.5, 1)]}, "the start of paper-quadrilateral"),
+        (second_with("throw.kappa", 24.0), {}, "kappa of the two scenes"),
+        (second_with("arm.surface_height", -0.4), {}, "surface_height of the two scenes"),
+        (FLAT, {}, "cavity"),
+        (NAMES, {"contact": "hinge"}, r"effects\.contact"),
+        ((CONTACT[0], NAMES[1]), {}, r"effects\.contact of the two scenes"),
+        (CONTACT, {"contact": "glue"}, "the contact"),
+        (NAMES, {"trials": 0}, "the trials"),
+        (NAMES, {"seed": -1}, r"the seed is -1; allowed: a whole number from 0"),
+        (ENERGY, {}, "the flip of paper-triangle"),
+    ],
+)
+def test_what_cannot_be(scenes, words, said):
+    with pytest.raises(AnswerError, match=said):
+        ls.assemble(*scenes, **{"trials": 1} | words)
 
 
 def test_parts_that_do_not_fit_one_on_the_other_are_named(capfd, tmp_path):

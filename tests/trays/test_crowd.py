@@ -2,7 +2,7 @@
 
 import json
 from concurrent.futures import Executor, ThreadPoolExecutor
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -52,32 +52,6 @@ def test_parts_that_pass_through_each_other_fill_a_depression_as_single_ones_do(
     assert same >= 37  # the plates lie at different x, and rounding decides some bounces
 
 
-@pytest.mark.parametrize(("depressions", "over"), [(1, True), (2, False)])
-def test_a_part_comes_above_what_is_in_its_way_and_no_higher_than_it_would(
-    asked, monkeypatch, depressions, over
-):
-    tray = _Strewn(Pouring(asked, 2, depressions, 1, 0), between=True)
-    came = [asked.arrival(np.random.default_rng(k)) for k in range(2)]
-    boxes, drop = [], tray.crowd.drop
-
-    def seen(number, pose):
-        drop(number, pose)
-        xs, ys = zip(*tray.crowd.members[number].world(), strict=True)
-        boxes.append((pose[1], min(xs), max(xs), min(ys), max(ys)))
-
-    monkeypatch.setattr(tray.crowd, "drop", seen)
-    monkeypatch.setattr(tray, "_settle", lambda: None)
-    tray.pour(0, came)
-    (first, *one), (second, *other) = boxes
-    assert first == came[0][0].y
-    assert (one[0] < other[1] and other[0] < one[1]) is over
-    if over:
-        assert other[2] == pytest.approx(max(one[3], other[2]), rel=1e-12)
-        assert second > came[1][0].y
-    else:
-        assert second == came[1][0].y
-
-
 @pytest.mark.parametrize("each", [1.0, 3.0, 0.25, 2.5])
 def test_the_chain_of_many_parts_is_a_product_of_passes(each):
     random = np.random.default_rng(4)
@@ -125,15 +99,17 @@ def test_a_depression_is_right_covered_or_wrong(asked):
     assert tray.states() == [1, 1, 2]  # the last one is empty
 
 
-def test_parts_that_come_by_begin_above_what_is_in_the_way(asked):
-    tray = _Strewn(Pouring(asked, 3, 1, 1, 0), True)
+@pytest.mark.parametrize("depressions", [1, 3])
+def test_parts_that_come_by_begin_above_what_is_in_the_way_and_no_higher(asked, depressions):
+    """Three over one depression stand one above the other; over one each, at the height at which they come."""
+    tray = _Strewn(Pouring(asked, 3, depressions, 1, 0), True)
     came = [asked.arrival(random_of(2, k)) for k in range(3)]
     begun = []
     tray._settle = lambda: begun.extend(member.world() for member in tray.crowd.members[:3])
     tray.pour(0, [(pose._replace(x=0.0), motion) for pose, motion in came])
-    assert min(y for _, y in begun[0]) == pytest.approx(0.5)  # the agitation
-    for lower, upper in pairwise(begun):
-        assert min(y for _, y in upper) == pytest.approx(max(y for _, y in lower))
+    heights = [[y for _, y in corners] for corners in begun]
+    below = [0.5, *(max(ys) for ys in heights[:2])] if depressions == 1 else [0.5] * 3  # the agitation
+    assert [min(ys) for ys in heights] == pytest.approx(below)
 
 
 def test_intervals_are_the_wider_of_batches_and_depressions():
