@@ -164,13 +164,14 @@ class _SheetRun:
     def curve(self, side: int) -> MarginsBeyond | None:
         """Find margins against X; None where the part gets farther out on another side."""
         seconds = self.left()
+        laid: Any = {int(on): pairs for on, pairs in by_side(self.goals[0].laid).items()}
         with self.step("margins against X"):
             try:
                 margins, left = curve(
                     self.scene,
                     side,
                     self.tolerance,
-                    laid={int(on): pairs for on, pairs in by_side(self.goals[0].laid).items()} or None,
+                    laid=laid or None,
                     seconds=seconds,
                     executor=self.executor,
                     tell=self.tell,
