@@ -178,6 +178,11 @@ def test_a_refined_set_is_the_same_set():
     assert np.isclose(piece.refined(plane.refine(2)).measure(), piece.measure())
 
 
+def test_a_grid_with_a_side_without_states_is_shown_without_this_side():
+    (shown,) = ls.grid(Domain([[0.0], [1.0]], [[2.0], [1.0]]), cells=4).tables()
+    assert [row[:3] for row in shown.rows] == [(0, 0, 4)]
+
+
 def test_sets_of_different_grids_do_not_mix():
     other = CellSet.of(ls.grid([(0.0, 1.0)], cells=16), [0])
     with pytest.raises(GridError, match="same grid"):

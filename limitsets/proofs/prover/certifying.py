@@ -29,7 +29,7 @@ from limitsets.proofs.prover.parameters import (
     scattered,
     whole,
 )
-from limitsets.proofs.prover.proof import Claim, Proof, claimed
+from limitsets.proofs.prover.proof import Claim, Proof, claimed, undecided
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.proofs.prover.query import weakest_of
 from limitsets.proofs.prover.thinning import least_slope
@@ -53,7 +53,7 @@ def _attracts_all(attractors: Attraction, scene: Scene) -> Claim:
             once = {"once": True}
             return Claim("attracts-all", "refuted", attractors.reason, {}, orbit, final=True, recurs=once)
         if noisy:
-            return Claim("attracts-all", "undecided", attractors.reason, {}, final=True)
+            return undecided("attracts-all", attractors.reason, final=True)
         return _not_attracted(attractors, scene)
     section = {"near_joint": near_section(attractors), "max_rank": attractors.max_rank}
     return Claim("attracts-all", "proved", "", section)
@@ -64,21 +64,21 @@ def _not_attracted(attractors: Attraction, scene: Scene) -> Claim:
     box = attractors.cover.box
     if box.lo.surface_height <= 0.0 <= box.hi.surface_height:
         reason = "the arm's surface is not proved to be below the joint nor above it"
-        return claimed("attracts-all", f"{reason}; {attractors.reason}", final=True)
+        return undecided("attracts-all", f"{reason}; {attractors.reason}", final=True)
     for side, point in enumerate(attractors.cover.points):
         if point.reason:
             # a narrower piece of the tolerance may have one that can be enclosed
             alone = box.scene == dict(scene.text)
-            return claimed("attracts-all", f"side {side}: {point.reason}", final=alone)
+            return undecided("attracts-all", f"side {side}: {point.reason}", final=alone)
     for side, near in enumerate(attractors.joint):
         if attractors.cover.points and not near.proved:
             reason = f"side {side}, up to x = {near.x:.6g}: {near.reason}"
-            return claimed("attracts-all", f"{reason}; {attractors.reason}")
+            return undecided("attracts-all", f"{reason}; {attractors.reason}")
     least = min((near.q for near in attractors.joint if attractors.cover.points), default=math.inf)
     gain = f"{least - 1.0:.1g} of its distance"
     slow = f"; beyond the jog's fixed point a throw gains {gain} only, too little for such cells"
     few = len(attractors.unresolved) and least - 1.0 < 0.01
-    return claimed("attracts-all", attractors.reason + (slow if few else ""))
+    return undecided("attracts-all", attractors.reason + (slow if few else ""))
 
 
 def _expanding(attractors: Attraction, _: Scene) -> Claim:
@@ -124,7 +124,9 @@ def _end_points(attractors: Attraction, scene: Scene) -> Claim:
     box = attractors.cover.box
     if box.effects or box.landing > 0.0:
         beyond = "effects beyond the minimal model" if box.effects else "noise of landing.x"
-        return claimed("end-points", f"end points with {beyond} cannot be proved in this version", final=True)
+        return undecided(
+            "end-points", f"end points with {beyond} cannot be proved in this version", final=True
+        )
     ends = proved_ends(attractors)
     return claimed("end-points", ends.reason, ends.section())
 
@@ -133,7 +135,7 @@ def _cycles(attractors: Attraction, scene: Scene) -> Claim:
     _require_one_scene("cycles", attractors, scene)
     if attractors.cover.box.effects:
         reason = "cycles with effects beyond the minimal model cannot be proved in this version"
-        return claimed("cycles", reason, final=True)
+        return undecided("cycles", reason, final=True)
     orbits = proved_cycles(attractors)
     missing = (*orbits.missing, f"none is found of period up to {orbits.up_to}")
     return claimed("cycles", "" if orbits.cycles else missing[0], orbits.section())

@@ -19,7 +19,7 @@ from limitsets.proofs.prover.every_orbit import every_orbit
 from limitsets.proofs.prover.numbers import Intervals
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, Lies, prove_orbit, slopes_of, slopes_on
 from limitsets.proofs.prover.programs import names_alone
-from limitsets.proofs.prover.proof import Claim, claimed
+from limitsets.proofs.prover.proof import Claim, claimed, undecided
 from limitsets.proofs.prover.proof_of_map import ProofOfMap, frames_of
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.maps import has_slope, kind_of
@@ -54,7 +54,7 @@ def every_cycle(
     domain = proof.graph.grid.domain
     if not _decided(proof.map) or not has_slope(proof.map):
         reason = "it needs slopes, and `margin` where there are branches"
-        return claimed("all-cycles", reason, final=True), claimed("cycles", reason, final=True), ()
+        return undecided("all-cycles", reason, final=True), undecided("cycles", reason, final=True), ()
     proved, missing = every_orbit((proof.map, proof.upper), domain, period, progress)
     boxes = np.stack([domain.lo, domain.hi], axis=-1)
     sides = [{"side": side, "box": hexed(box)} for side, box in enumerate(boxes)]
@@ -109,7 +109,7 @@ def _has_cycles(lower: Any) -> bool:
 def cycles_claim(proof: ProofOfMap, progress: Progress | None) -> tuple[Claim, tuple[CycleOfMap, ...]]:
     """Prove the orbits that floats find in the attracting cells, and return these."""
     if not _has_cycles(proof.map):
-        return claimed("cycles", NO_CYCLES, final=True), ()
+        return undecided("cycles", NO_CYCLES, final=True), ()
     candidates, missing = _candidates(proof) if len(proof.cells) else ((), [])
     proved: list[CycleOfMap] = []
     for number, cycle in enumerate(candidates):
@@ -155,7 +155,7 @@ def _spread(grid: Grid) -> tuple[Array, Ints]:
 def converging_claim(proof: ProofOfMap) -> tuple[ProofOfMap, Claim]:
     """Draw balls around the cycles that attract, and find the cells in them."""
     if not _has_cycles(proof.map):
-        return proof, claimed("converges", NO_CYCLES, final=True)
+        return proof, undecided("converges", NO_CYCLES, final=True)
     grid = proof.graph.grid
     orbits, missing = proof.cycles, list[str]()
     if not orbits:
@@ -173,7 +173,7 @@ def converging_claim(proof: ProofOfMap) -> tuple[ProofOfMap, Claim]:
         # what attracts and has no ball tells more than an orbit that ended on a saddle
         missing[:0] = [f"period {cycle.period} through {cycle.lo[0]}: {why}"] if why else []
     if not drawn:
-        return proof, claimed("converges", [*missing, "no cycle that attracts is found"][0])
+        return proof, undecided("converges", [*missing, "no cycle that attracts is found"][0])
     claim = claimed("converges", "", {"cycles": drawn, "missing": missing})
     return replace(proof, cycles=tuple(chosen), final=final), claim
 

@@ -45,7 +45,7 @@ from limitsets.proofs.prover.cycles_of_map import (
     refuted_by_cycle,
 )
 from limitsets.proofs.prover.goal_of_map import missing, read_goal
-from limitsets.proofs.prover.proof import Claim, claimed
+from limitsets.proofs.prover.proof import Claim, claimed, undecided
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.graph import transitions
@@ -87,7 +87,7 @@ def _trapping(proof: ProofOfMap) -> Claim:
         if reaching.size:
             where = f"the image of {_place(grid, int(mine[reaching[0]]))} may reach the border of the domain"
             reason = f"{where}: widen the domain, or claim invariant"
-            return claimed("trapping", reason, final=True)
+            return undecided("trapping", reason, final=True)
     return claimed("trapping", no_cells(proof.component))
 
 
@@ -103,7 +103,7 @@ def _attracts_all(proof: ProofOfMap) -> Claim:
     attracts = np.array([attracting[cells[0]] for cells in sets], dtype=bool)
     if leaving.size:
         place = _place(graph.grid, int(leaving[0]))
-        return claimed("attracts-all", f"the image of {place} may leave the domain, or is not enclosed")
+        return undecided("attracts-all", f"the image of {place} may leave the domain, or is not enclosed")
     if no_cells(proof.component):
         return claimed("attracts-all", no_cells(proof.component))
     stays = np.zeros(len(sets), np.int64) if attracts.all() else longest_stays(graph)
@@ -115,7 +115,7 @@ def _attracts_all(proof: ProofOfMap) -> Claim:
     )
     if lost.size:
         place = _place(graph.grid, int(lost.min()))
-        return claimed("attracts-all", f"{lost.size} recurrent cells do not attract: first {place}")
+        return undecided("attracts-all", f"{lost.size} recurrent cells do not attract: first {place}")
     settled = np.zeros(parts.count, dtype=bool)
     settled[np.flatnonzero(parts.recurrent)[attracts]] = True
     # a rank falls with every step, but for those within a recurrent component, through which orbits pass
@@ -132,14 +132,14 @@ def _escapes(proof: ProofOfMap) -> Claim:
 
 def _almost_every(proof: ProofOfMap) -> Claim:
     if proof.graph.grid.dimension != 1:
-        return claimed("almost-every", "that starts thin out is proved in one dimension only", final=True)
+        return undecided("almost-every", "that starts thin out is proved in one dimension only", final=True)
     return claimed("almost-every", proof.weights if isinstance(proof.weights, str) else "")
 
 
 def _expanding(proof: ProofOfMap) -> Claim:
     grid = proof.graph.grid
     if grid.dimension != 1:
-        return claimed("expanding", "expansion is proved in one dimension only", final=True)
+        return undecided("expanding", "expansion is proved in one dimension only", final=True)
     if no_cells(proof.component):
         return claimed("expanding", no_cells(proof.component))
     least, most, place = np.inf, 0.0, ""
@@ -172,7 +172,7 @@ def proved_again(proof: ProofOfMap, lower: Any, upper: Any) -> ProofOfMap:
 
 def refuted_again(proof: ProofOfMap, lower: Any, upper: Any) -> ProofOfMap:
     """Look for what refutes "ends-in" between other corners."""
-    open_ = claimed("ends-in", "no cycle is found that refutes it")
+    open_ = undecided("ends-in", "no cycle is found that refutes it")
     return refuted_by_cycle(replace(proof, map=lower, upper=upper, claims=(open_,), cycles=()))
 
 
@@ -185,7 +185,7 @@ def _with_final(proof: ProofOfMap, claim: str) -> Claim:
     lost = np.flatnonzero(rank < 0)
     if claim == "attracts-all" and lost.size:
         place = _place(grid, int(lost[0]))
-        return claimed(claim, f"{lost.size} cells may not lead to attracting cells: first {place}")
+        return undecided(claim, f"{lost.size} cells may not lead to attracting cells: first {place}")
     return claimed(claim, "", {"max_rank": int(rank.max())} if claim == "attracts-all" else {})
 
 

@@ -221,13 +221,14 @@ class Claim:
         return brackets if brackets and all(brackets.values()) else None
 
 
-def claimed(
-    word: str, missing: str, section: Mapping[str, Any] | None = None, *, final: bool = False
-) -> Claim:
+def undecided(word: str, reason: str, *, final: bool = False) -> Claim:
+    """Leave a claim open, for a reason; `final` where smaller boxes would not help."""
+    return Claim(word, "undecided", reason, {}, final=final)
+
+
+def claimed(word: str, missing: str, section: Mapping[str, Any] | None = None) -> Claim:
     """Claim a word as proved, by the numbers of its section; undecided where something is missing."""
-    if missing:
-        return Claim(word, "undecided", missing, {}, final=final)
-    return Claim(word, "proved", "", dict(section or {}))
+    return undecided(word, missing) if missing else Claim(word, "proved", "", dict(section or {}))
 
 
 def _starts(starts: Any) -> str | None:

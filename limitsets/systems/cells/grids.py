@@ -75,6 +75,7 @@ class Grid(Tabled):
             (side, axis, edges.size - 1, (edges[0], edges[-1]), (np.diff(edges).min(), np.diff(edges).max()))
             for side, axes in enumerate(self.edges)
             for axis, edges in enumerate(axes)
+            if edges.size > 1  # a side without states has no cells
         ]
         spans = (Column("x", show=".6g", ends=True), Column("width of a cell", show=".3g", ends=True))
         return (Table(("side", "axis", "cells", *spans), rows, f"Grid of {self.n_cells} cells"),)
