@@ -294,3 +294,43 @@ def test_a_plane_of_record(benchmark, table):
         limit("Chialvo's neuron: share of the plane with a proved attractor", share, "", None),
     ]
     assert share > 0.95
+
+
+# ----------------------------------------------------------------
+# The delayed Ricker map (arXiv 1209.2406) in x/alpha: every start tends to the fixed point, for all alpha from 0.5 on.
+
+
+def delayed(x, y, alpha):
+    return y, y * math.exp(alpha * (1.0 - x))
+
+
+def around(centre, lo, hi, least, growth):
+    """Borders of cells that grow with the distance from a centre."""
+    up, down = [centre + least / 2], [centre - least / 2]
+    while up[-1] < hi:
+        up.append(up[-1] + max(least, growth * (up[-1] - centre)))
+    while down[-1] > lo:
+        down.append(down[-1] - max(least, growth * (centre - down[-1])))
+    return np.array([lo, *down[-2::-1], *up[:-1], hi])
+
+
+@pytest.mark.parametrize(
+    ("end", "least", "growth", "depth"), [(0.8, 0.002, 0.022, 9), (0.88, 0.0002, 0.009, 8)]
+)
+def test_the_delayed_ricker_map(end, least, growth, depth, tmp_path, table):
+    lower = ls.map(delayed, alpha=0.5)
+    grid = ls.cells.Grid(
+        ls.cells.Domain([[0.02, 0.02]], [[4.0, 4.0]]), ((around(1.0, 0.02, 4.0, least, growth),) * 2,)
+    )
+    how = {"upper": lower.with_values(alpha=end), "first": 3, "depth": depth, "share": 0.8}
+    begin = perf_counter()
+    proved = certified_map(lower, grid, ["converges", "basin"], **how)
+    proving = perf_counter() - begin
+    assert proved.shares()["proved"] == 1
+    report = ls.recheck(proved.save(tmp_path / "delayed.proof.zip"))
+    assert report.verdict == "proved"
+    what = (
+        f"delayed Ricker, alpha 0.5 to {end}, {grid.n_cells} cells, {len(proved.records)} boxes, one process"
+    )
+    table.append(limit(f"{what}: proved", proving, "s", None))
+    table.append(limit(f"{what}: with save and recheck", perf_counter() - begin, "s", None))

@@ -219,7 +219,7 @@ class ProofOfMap(Saved):
         if ranked == count:
             return ""
         return (
-            f"; a certificate shows {ranked} of them, for its ranks do not pass through cells that recur: finer "
+            f"; a certificate can show {ranked} of them, for its ranks do not pass through cells that recur: finer "
             "cells, or ends= with boxes around the attracting cells, show more"
         )
 
