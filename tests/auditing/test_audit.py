@@ -333,6 +333,7 @@ def test_parts_with_more_sides(name):
 # ---------------------------------------------------------------- auto
 
 
+@pytest.mark.sweep
 def test_auto_switches_on_what_is_called_for_and_names_the_rest():
     chosen = choose_effects(told("paper-initial", {}, auto=True))
     assert chosen.switched_on[0] == "roll"
@@ -358,6 +359,7 @@ def test_auto_says_that_effects_need_the_exact_flight():
     assert chosen.left_out["roll"] == 'called for, but it needs flight = "exact"'
 
 
+@pytest.mark.sweep
 def test_auto_leaves_out_what_cannot_be_simulated_beside_what_is_on():
     # without restitution the bounce changes nothing, and the stroke is called for as in the minimal model
     world = {"stroke": "6 deg", "restitution": 0.0, "bounce_threshold": "0.01 in"}

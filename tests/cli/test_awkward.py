@@ -143,6 +143,7 @@ def test_a_certificate_of_other_values_stays_where_nothing_is_proved(capfd):
     assert Path("paper-designed.proof.zip").read_bytes() == kept
 
 
+@pytest.mark.sweep
 def test_a_scene_that_certify_refuses_is_not_proposed_to_it(capfd):
     """The effect slip has no enclosure."""
     written(file="my part.toml", world={"friction": 0.9}, effects={"slip": True})

@@ -263,7 +263,10 @@ AUDITED = (
     "feed mine.toml --trials 100 --no-level",
     f"design mine.toml --critical-points 10.1,10,20 --starts 0 --vary {MASS},throw.kappa",
     "design mine.toml --goal --vary throw.kappa --evaluations 5",
-    "design mine.toml --robust --vary part.mass.center.along --evaluations 4 --seconds 0",
+    pytest.param(
+        "design mine.toml --robust --vary part.mass.center.along --evaluations 4 --seconds 0",
+        marks=pytest.mark.sweep,
+    ),
 )
 OTHERS = (
     "feedback mine.toml --starts 2=16:16.5 --cells 256 --parts 10",
@@ -413,6 +416,7 @@ def test_a_sheet_of_a_scene_that_scatters(capfd):
         assert json_of(capfd, line, code=1)["holds"] is None
 
 
+@pytest.mark.sweep
 def test_a_feeder_that_feeds_nothing_says_so_first(capfd):
     """The end is beyond all that the throws reach: 23.4 in on side 2, known_answers.md; most stay on the arm."""
     file = written(with_cavity(position="26 in"))

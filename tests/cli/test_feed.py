@@ -347,6 +347,7 @@ def test_noise_that_covers_the_scatter_does_not_break_its_assumption(capfd):
     assert "spread" in run(capfd, "certify", latch(None), "--no-recheck")[1].splitlines()[-1]
 
 
+@pytest.mark.sweep
 def test_a_sampled_limit_set_is_said_to_be_without_scatter(capfd):
     """`analyse` said that no part gets beyond 443 mm; with the scatter most parts do, in some hundred throws."""
     _, out, _ = run(capfd, "analyse", latch("gaussian"), "-o", "found")

@@ -568,6 +568,7 @@ def test_the_usual_bounds_are_in_the_scenes_unit():
         assert bounds_of(cm)[name] == pytest.approx((2.54 * lo, 2.54 * hi), rel=1e-12)
 
 
+@pytest.mark.sweep
 def test_what_belongs_to_x_moves_with_it():
     """The cavity stayed where it was, so that nothing was fed by the design."""
     given = ls.load("paper-designed").as_dict()

@@ -200,6 +200,7 @@ def test_a_decision_has_the_slope_of_the_branch_that_the_margin_takes(x, slope):
     assert decision(Tent(1.9), x, 0) == (x - 0.5, slope, True)
 
 
+@pytest.mark.sweep
 def test_a_map_with_a_real_power_is_enclosed():
     """Fixed points of b x^n / (1 + x^n), b = 2.5, that attract: 0, and 2 for n = 2; for n = 2.5 by Newton's method."""
     hill = ls.map(_hill, b=2.5, n=2.0)
@@ -290,6 +291,7 @@ def registered_same_name(image):
     return ls.register(Again, image=image)
 
 
+@pytest.mark.sweep
 def test_each_of_two_classes_of_one_name_is_followed_by_its_own_formula():
     """The fixed point of x / 2 + c is 2 c; either class may come first."""
     old, new = registered_same_name(slow), registered_same_name(fast)

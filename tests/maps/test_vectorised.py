@@ -64,6 +64,7 @@ def test_an_orbit_ends_where_the_image_is_nan():
     assert np.isnan(path.x[-1])
 
 
+@pytest.mark.sweep
 def test_a_spline_of_scipy_has_shares_of_its_basins():
     """x' = x + (x - x^3)/2 through nine knots: 1 and -1 attract one half each, by the symmetry of the knots."""
     knots = np.linspace(-1.5, 1.5, 9)

@@ -33,6 +33,7 @@ def image_of(figure):
     return found
 
 
+@pytest.mark.sweep
 def test_each_pixel_has_the_colour_of_its_class(feeders):
     figure = ls.plot.atlas(feeders)
     numbers = feeders.dataset["class"].values
@@ -77,6 +78,7 @@ def test_lines_part_the_classes_and_nothing_else(feeders):
     assert len(lines.get_segments()) == wanted
 
 
+@pytest.mark.sweep
 def test_a_class_looks_alike_in_every_picture():
     few = ls.atlas(maps.Logistic(3.8), "r=3.83:3.832:2", domain=[(0, 1)])
     many = ls.atlas(maps.Logistic(3.8), "r=2.8:3.832:120", domain=[(0, 1)])

@@ -51,6 +51,7 @@ def initial():
     return ls.certify(ls.load(tree | {"effects": BOTH}), ["attracts-all", "goal", "invariant", "end-points"])
 
 
+@pytest.mark.sweep
 def test_on_the_limit_set_of_the_designed_part_no_effect_is_called_for():
     """Everything that is proved of the minimal model is proved of the part that may land and roll as it likes."""
     words = ["attracts-all", "goal", "invariant", "trapping", "expanding"]

@@ -393,6 +393,7 @@ def test_thrown_parts_do_what_is_proved(scene, proofs):
     assert (advance(scene.map, x, side, 300)[2] < 0).mean() > 0.5
 
 
+@pytest.mark.sweep
 def test_shares_are_those_of_the_ranges(scene, proofs):
     proof, file = proofs["partly"]
     (claim,) = proof.claims

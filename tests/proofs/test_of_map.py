@@ -201,6 +201,7 @@ def test_a_cycle_across_a_jump_is_proved_for_a_range_of_parameters():
     assert cycle.slope_lo[0, 0] <= 0.25 <= cycle.slope_hi[0, 0]
 
 
+@pytest.mark.sweep
 def test_cycles_of_a_chaotic_range_leave_the_other_claims_of_the_call_alone():
     grid, told = ls.grid([(-2.1, 2.1)], cells=2048), []
     upper, tell = Odd(2.51), (lambda *step: told.append(step))
@@ -222,6 +223,7 @@ def test_cycles_of_a_chaotic_range_leave_the_other_claims_of_the_call_alone():
             assert slope - 1e-9 * abs(slope) <= cycle.slope_hi[0, 0]
 
 
+@pytest.mark.sweep
 def test_a_search_for_very_many_cycles_ends_and_says_so():
     # a = 2.9: about 3^p / p cycles of period p
     proof = ls.certify(Odd(2.9), ls.grid([(-2.1, 2.1)], cells=512), ["cycles"])

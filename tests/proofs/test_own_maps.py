@@ -182,6 +182,7 @@ def test_corners_differ_in_numbers_alone(lower, upper, name):
         ls.transitions(lower, LINE, "boxes", upper=upper)
 
 
+@pytest.mark.sweep
 def test_corners_that_differ_in_numbers_are_taken():
     nested = ls.certify(sort(0.4, shift=0.1), LINE, ["invariant"], upper=sort(0.5, shift=0.2))
     assert nested.proved

@@ -357,6 +357,7 @@ def holds(params, program, seed):
             assert not ball.is_finite() or all(wider.contains(arb(end[k, axis])) for end in (least, most))
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("seed", range(2))
 def test_random_programs_agree(seed):
     agrees(seed)

@@ -105,6 +105,7 @@ def test_a_range_is_told_as_refuted_only_if_the_checker_confirms_it(r, tmp_path)
         assert ls.recheck(proof.save(tmp_path / "x.zip")).verdict == "refuted"
 
 
+@pytest.mark.sweep
 def test_cycles_split_where_the_period_doubles(tmp_path):
     lower, grid = ls.map(logistic, r=2.7), ls.grid([(0.1, 0.9)], cells=2048)
     found = certified_map(lower, grid, ["converges", "basin"], upper=lower.with_values(r=3.3), depth=8)

@@ -363,6 +363,7 @@ def test_entropies_of_starts_lie_in_their_brackets_in_nineteen_of_twenty_cases()
     assert sum(held) >= 37  # of 40: 38 expected
 
 
+@pytest.mark.sweep
 def test_orbits_of_starts_come_back():
     """A third of the starts stays, a third leaves and comes back, a third leaves for good."""
     graph, attractors = setting(Excursion(5.0), [(0.0, 3.0)], 300)
@@ -449,6 +450,7 @@ def test_no_exponent_is_fitted_to_shares_that_saturate(fractal):
     assert "starts=" in found.table().caption
 
 
+@pytest.mark.sweep
 def test_the_exponent_of_starts_is_that_of_own_orbits(fractal):
     rng, shares = np.random.default_rng(1), []
     for apart in (2e-2, 2e-8):

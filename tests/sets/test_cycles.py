@@ -407,6 +407,7 @@ def test_basins_say_that_starts_are_undecided_by_the_enclosed_image_of_a_jump():
     assert "enclosed image" not in ls.basins(sampled, ls.attractors(sampled)).advice
 
 
+@pytest.mark.sweep
 def test_the_atlas_decides_circle_maps_with_a_floor():
     """Denjoy: with an irrational rotation number the whole circle is the attractor, and its exponent is 0.
 
@@ -429,6 +430,7 @@ def test_the_atlas_decides_circle_maps_with_a_floor():
     assert quarter.undecided.attrs["flag_meanings"].split()[int(quarter.undecided.values[0])] == "not_one"
 
 
+@pytest.mark.sweep
 def test_the_atlas_finds_the_bands_of_a_falling_map_with_a_floor():
     """x -> -5 x / 2 mod 1 expands, and its images of any interval fill [0, 1]."""
     found = ls.atlas(ls.map(times, m=-2.5), "m=-2.5:-2.25:2", domain=[(0.0, 1.0)]).dataset

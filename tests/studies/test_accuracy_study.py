@@ -240,6 +240,7 @@ def test_windows_of_the_logistic_map_begin_where_theory_says(recorded):
         assert last - 2 * step < windows[period][1] <= last
 
 
+@pytest.mark.sweep
 def test_tongues_of_the_circle_map(study_atlas_study, recorded, tmp_path):
     assert recorded["circle"]["main tongue differs"] == 0
     assert set(range(1, 20)) <= set(recorded["circle"]["periods"])

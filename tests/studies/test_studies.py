@@ -165,6 +165,7 @@ def test_the_engine_nears_the_effects_as_its_order_says(effects_in_engine):
         assert numbers["convergence"][name]["order"] == pytest.approx(order, abs=0.3), name
 
 
+@pytest.mark.sweep
 def test_throws_are_set_aside_where_the_laws_part(effects_in_engine):
     _, numbers, _ = effects_in_engine
     for name, found in numbers.items():

@@ -479,6 +479,7 @@ def test_what_is_no_path_is_refused():
             ls.continuation(subject, path, **options)
 
 
+@pytest.mark.sweep
 def test_bands_beyond_the_resolution_are_told_as_the_least_there_are():
     # beyond period 128, at 3.5699: the doublings accumulate at 3.5699457
     found = ls.continuation(maps.Logistic(3.569), {"r": (3.5695, 3.56994)}, steps=3)
@@ -508,6 +509,7 @@ def _jump_margin(p, x, side):
 ls.register(Jump, image=_jump, image_on=_jump_on, margin=_jump_margin, branches=("below", "above"))
 
 
+@pytest.mark.sweep
 def test_a_change_at_zero_is_told_as_zero():
     # beyond m = 2 / 15 the cycle of period 4 is another: its point next to the jump meets x = 0 there
     found = ls.continuation(Jump(0.13), {"m": (0.13, 0.134)}, domain=[(-2, 2)], steps=2, most=30)

@@ -168,6 +168,7 @@ def test_circle_staircase():
     assert told >= 0.9 * omegas.size
 
 
+@pytest.mark.sweep
 def test_cubic_shares():
     # below sqrt r the sign stays, and images come to 2 (r/3)^(3/2) at most; u = +-sqrt(r - 1)
     rs, lo, hi = (1.46, 1.5, 1.8, 1.95), -1.1, 1.2
@@ -191,6 +192,7 @@ def test_cubic_basin_ends_at_its_cycle_of_two():
         assert t.leaves[i] + t.collapses[i] == pytest.approx(1 - math.sqrt(r + 1) / half, abs=2e-3)
 
 
+@pytest.mark.sweep
 def test_a_chaotic_attractor_beside_a_fixed_point():
     t = found([Two(1.9, 0.5, 0.6), Two(1.3, -0.5, 0.37), Two(1.5, 0.9, 0.41)], -1.0, 1.0)
     assert decided(t)
@@ -201,6 +203,7 @@ def test_a_chaotic_attractor_beside_a_fixed_point():
     assert t.lowest[:, 1, 0] == pytest.approx([0.6, 0.37, 0.41], abs=1e-8)
 
 
+@pytest.mark.sweep
 def test_a_jump_within_a_branch():
     jumps = (0.1, 0.3, 0.777)
     t = found([Grazing(j) for j in jumps])
@@ -209,6 +212,7 @@ def test_a_jump_within_a_branch():
         assert t.undecided[i] or t.share[i, :2] == pytest.approx([jump, 1 - jump], abs=1 / LEVELS[0][0])
 
 
+@pytest.mark.sweep
 def test_contractions():
     slopes = (0.98, 0.5, 0.0, -0.5, -0.98)
     t = found([Contraction(s, 0.3 * (1 - s)) for s in slopes])

@@ -238,6 +238,7 @@ def of_logistic(count):
     return t, periods(lambda x, k: r[k] * x * (1.0 - x), slope, tops)
 
 
+@pytest.mark.sweep
 def test_a_cycle_that_was_told_as_two_bands():
     # period 60, multiplier 0.44: its immediate basin is narrower than the finest cells
     t = topologies(stacked([Ricker(3.021714671660232, 0.228946186747888)]), [[0.0]], [[14.0]])
@@ -270,6 +271,7 @@ def test_at_a_bifurcation_no_longer_cycle_is_told(r, period):
     assert t.undecided[0] or t.period[0, 0] == period
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize(
     ("circle", "period"),
     # the orbit {0, 1/2} of multiplier (1 - m)^2 - k^2, and the fixed point 0 of multiplier 1 - k - m

@@ -105,6 +105,7 @@ def test_no_impact_gains_energy(slips: bool) -> None:
             assert left <= before * (1 + 1e-13)
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("names", [("bounce",), ("bounce", "roll")])
 def test_no_restitution_is_the_plastic_map(names: tuple[str, ...]) -> None:
     plain = tuple(name for name in names if name != "bounce")

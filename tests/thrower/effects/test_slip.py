@@ -143,6 +143,7 @@ def test_impacts_are_those_of_the_integrated_law(restitution: float) -> None:
     assert back > 10 or restitution > 0.0
 
 
+@pytest.mark.sweep
 def test_enough_friction_is_that_to_stick_and_not_to_slide_back() -> None:
     """The bare map's impact from the larger of |J_t|/J_n and |B|/A on, and not before."""
     rng, second = np.random.default_rng(43), 0
