@@ -44,7 +44,7 @@ def reason_of(check: Callable[..., object], *more: Any) -> str:
     try:
         check(*more)
     except UnprovedError as error:
-        return str(error)
+        return str(error) or "it is not proved"  # an empty text would count as a proof
     return ""
 
 

@@ -13,7 +13,7 @@ import flint
 from flint import arb
 
 from limitsets.checker.any_map import CellPiece, Map, map_in_words, read_map, slopes_unless
-from limitsets.checker.balls import PRECISION
+from limitsets.checker.balls import PRECISION, UnprovedError, reason_of
 from limitsets.checker.file import BadFileError
 from limitsets.checker.program import Program, in_words, number, read_formulas
 from tests.checker.maps_in_files import Example
@@ -316,3 +316,11 @@ def test_long_formulas_are_cut_into_lines():
     lines = printed(long)
     assert max(map(len, lines)) < 200
     assert len(lines) > 5
+
+
+def test_a_check_that_gives_no_reason_is_not_taken_for_proved():
+    def silent():
+        raise UnprovedError("")
+
+    assert reason_of(silent)
+    assert reason_of(lambda: None) == ""
