@@ -443,5 +443,28 @@ def test_only_entries_of_the_package_are_kept() -> None:
         assert caches[2] is jit_cache.CACHE
 
 
+def _steps_to(x: int, target: int) -> int:
+    steps = 0
+    while x != target:
+        x = x // 2 if x % 2 == 0 else 3 * x + 1
+        steps += 1
+    return steps
+
+
+def test_a_loop_that_several_kernels_lead_to_is_optimised_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Any] = []
+    plain = compiling._Loop._finalize_final_module
+    monkeypatch.setattr(compiling._Loop, "_finalize_final_module", lambda own: (made.append(own), plain(own)))
+    loop = kernel(inlined=False)(_steps_to)
+    down = kernel(inlined=False)(lambda x, end: loop(x, 4 * end))
+    on = kernel(inlined=False)(lambda x, end: loop(x, end) - down(x, end))
+    # 27 comes to 1 in 111 steps of Collatz's map (OEIS A006577), the last of them from 4 over 2
+    assert kernel(entry=True)(lambda x, end: (down(x, end), on(x, end)))(27, 1) == (109, 2)
+    functions = [each for library in made for each in library._final_module.functions]
+    defined = [each for each in functions if "_steps_to" in each.name and not each.is_declaration]
+    assert (len(made), len(defined)) == (3, 1)
+    assert (down(27, 1), loop(27, 1)) == (109, 111)  # Python calls them too
+
+
 def test_numba_still_has_the_internals_the_cache_overrides() -> None:
     assert jit_cache._source_cache(Path("anywhere")) is not None

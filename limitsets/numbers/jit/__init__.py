@@ -6,7 +6,7 @@ Three words are used elsewhere:
     Compiles a function for estimates: a multiplication and an addition may be contracted into one instruction.
     Plain ``@kernel`` is for small pieces, which are inlined where they are called (a call costs 80 ns and stops
     the loop from vectorising); ``@kernel(entry=True)`` is for a loop over whole arrays called from Python, the
-    only kind that is kept on disk.
+    only kind that is kept on disk; ``@kernel(inlined=False)`` is for one that only other kernels call.
 ``proof_kernel``
     The same without contraction, for arithmetic whose rounding a proof relies on.  ``kernel`` takes ``counting=False``
     where a kernel neither makes arrays nor gives one back, and nothing that it calls does: references to arrays are

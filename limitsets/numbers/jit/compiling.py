@@ -56,7 +56,38 @@ PROOF = {**_COMMON, "fastmath": False}
 # Kernels within others: parts of the machine code of their callers, with none of their own.
 
 
-class _Part(codegen.JITCodeLibrary):  # type: ignore[misc]  # numba has no types
+class _Linked(codegen.JITCodeLibrary):  # type: ignore[misc]  # numba has no types
+    """Code that hands on the loops it calls, to be linked where machine code is made.
+
+    Numba links and optimises what is called in each caller, and so a loop again in each that leads to it: half the time
+    in which the topology of a new map compiled.
+    """
+
+    _loops: dict[Any, None]
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._loops = {}
+
+    def add_linking_library(self, library: Any) -> None:
+        """Take what is called: into the code itself, or among the loops."""
+        self._loops.update(getattr(library, "_loops", {}))
+        if isinstance(library, _Loop):
+            self._loops[library] = None
+        else:
+            super().add_linking_library(library)
+
+
+class _Whole(_Linked):
+    """Code with machine code of its own."""
+
+    def finalize(self) -> None:
+        """Link the loops too: from callers to what they call, for only what is called already is linked."""
+        self._linking_libraries.extend(reversed(self._loops))
+        super().finalize()
+
+
+class _Part(_Linked):
     """Code that callers take into theirs.
 
     Numba makes machine code of it too, which nothing runs: a quarter of the time in which a map compiles.
@@ -64,7 +95,6 @@ class _Part(codegen.JITCodeLibrary):  # type: ignore[misc]  # numba has no types
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
         self._finalized = True
 
     @property
@@ -77,12 +107,31 @@ class _Part(codegen.JITCodeLibrary):  # type: ignore[misc]  # numba has no types
         return 0
 
 
-class _Within(Compiler):  # type: ignore[misc]  # numba has no types
-    """How kernels within others are compiled."""
+class _Loop(_Part):
+    """Code that is called, not taken in."""
+
+
+class _Compiler(Compiler):  # type: ignore[misc]  # numba has no types
+    """How entries are compiled."""
+
+    library: type[_Linked] = _Whole
 
     def __init__(self, typing_context: Any, target_context: Any, library: Any, *rest: Any) -> None:
         super().__init__(typing_context, target_context, library, *rest)
-        self.state.library = _Part(target_context.codegen(), "part of callers")
+        self.state.library = self.library(target_context.codegen(), self.library.__name__)
+        self.state.library.enable_object_caching()
+
+
+class _Within(_Compiler):
+    """How kernels within others are compiled."""
+
+    library = _Part
+
+
+class _Called(_Compiler):
+    """How loops that only kernels call are compiled."""
+
+    library = _Loop
 
 
 def overloaded(
@@ -324,14 +373,17 @@ def _interleaved(dispatcher: Any) -> None:
     dispatcher._compiler.compile = compile_interleaved
 
 
-def compiled(function: F, options: dict[str, Any], entry: bool, counting: bool = True) -> F:
-    """Make the dispatcher of a kernel: inlined where it is called, or an entry that is kept on disk."""
-    dispatcher = numba.jit(**options, forceinline=not entry, _nrt=counting)(function)
+def compiled(
+    function: F, options: dict[str, Any], entry: bool, counting: bool = True, inlined: bool = True
+) -> F:
+    """Make the dispatcher of a kernel: for other kernels, or an entry that is kept on disk."""
+    flags = {**options, "forceinline": inlined and not entry, "_nrt": counting}
+    dispatcher = numba.jit(**flags, pipeline_class=_Compiler)(function)
     if entry and hasattr(dispatcher, "_compiler"):
         _interleaved(dispatcher)
     elif hasattr(dispatcher, "_compiler"):  # for Python; compiled code is given a part
-        flags = {**options, "forceinline": True, "_nrt": counting, "no_cpython_wrapper": True}
-        part = numba.jit(**flags, pipeline_class=_Within)(function)
+        how = {"no_cpython_wrapper": True, "pipeline_class": _Within if inlined else _Called}
+        part = numba.jit(**flags, **how)(function)
         dispatcher.get_call_template, dispatcher.get_overload = part.get_call_template, part.get_overload
         dispatcher._compiling_counter = part._compiling_counter  # by which numba sees that it calls itself
     # The folder's name vouches for the package's own files only: a loop defined elsewhere is not kept.
@@ -344,8 +396,8 @@ def compiled(function: F, options: dict[str, Any], entry: bool, counting: bool =
 @overload
 def kernel(function: F) -> F: ...
 @overload
-def kernel(*, entry: bool = False, counting: bool = True) -> Callable[[F], F]: ...
-def kernel(function: Any = None, *, entry: bool = False, counting: bool = True) -> Any:
+def kernel(*, entry: bool = False, counting: bool = True, inlined: bool = True) -> Callable[[F], F]: ...
+def kernel(function: Any = None, *, entry: bool = False, counting: bool = True, inlined: bool = True) -> Any:
     """Compile for estimates (contraction allowed); ``entry=True`` for a loop called from Python.
 
     Parameters
@@ -356,6 +408,8 @@ def kernel(function: Any = None, *, entry: bool = False, counting: bool = True) 
         True for a loop over whole arrays: kept on disk, not inlined.
     counting : bool
         False where no array is made or given back: references are not counted.
+    inlined : bool
+        False for a loop that kernels call: compiled once, however many lead to it.
 
     Examples
     --------
@@ -367,8 +421,8 @@ def kernel(function: Any = None, *, entry: bool = False, counting: bool = True) 
     1.5
     """
     if function is None:
-        return lambda f: compiled(f, ESTIMATE, entry, counting)
-    return compiled(function, ESTIMATE, entry, counting)
+        return lambda f: compiled(f, ESTIMATE, entry, counting, inlined)
+    return compiled(function, ESTIMATE, entry, counting, inlined)
 
 
 @overload

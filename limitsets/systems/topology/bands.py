@@ -117,7 +117,7 @@ def begin_union(sides: int, attractor: int, c: Cells, k: Components, u: Unions) 
     return expands
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def images_of(
     params: Any, p: Pieces, u: Unions, row: int, into: int, leaving: int, only: int, sliver: float
 ) -> bool:
@@ -150,7 +150,7 @@ def images_of(
     return out
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def settle(params: Any, scale: float, r: Region, p: Pieces, u: Unions) -> int:
     """Take images of SET until its ends rest; NOTHING, or why they do not."""
     rest, rested = REST * scale, 0
@@ -180,7 +180,7 @@ def _ends_known(r: Region, c: Cells, k: Components, side: int, x: float) -> bool
     return not k.held[cell] and ends & (ends - 1) == 0
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def stays_around(
     params: Any, x: float, side: int, scale: float, r: Region, p: Pieces, c: Cells, k: Components, u: Unions
 ) -> bool:
@@ -243,7 +243,7 @@ def _fill_order(u: Unions, sides: int, first: int, regular: Any, order: Any) -> 
         order[:] = IRREGULAR
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def push_through(
     params: Any, sides: int, scale: float, p: Pieces, u: Unions, jogs_min: Any, jogs_max: Any, order: Any
 ) -> int:
@@ -301,7 +301,7 @@ BEFORE, MOST_GROWN, SAME = 40, 2000, 1e-9
 STRETCHES, MOST_VISITS = 200, 20_000
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _spreads(params: Any, x: float, side: int, length: float, u: Unions) -> bool:
     """Whether an orbit visits all of many equal stretches of SET."""
     missing = STRETCHES
@@ -323,7 +323,7 @@ def _spreads(params: Any, x: float, side: int, length: float, u: Unions) -> bool
     return False
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def fills(params: Any, x: float, side: int, scale: float, p: Pieces, u: Unions) -> bool:
     """Whether the images of a short interval, about where the orbit of a state of SET comes to, fill SET."""
     for _ in range(BEFORE):

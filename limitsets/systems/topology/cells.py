@@ -124,7 +124,7 @@ def _of_piece(
         cell += 1
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def fill_cells(params: Any, r: Region, shape: Any, p: Pieces, c: Cells) -> bool:
     """Fill the cells from the pieces; False where an image is not a number or takes another branch than its piece."""
     sides = r.lo.size

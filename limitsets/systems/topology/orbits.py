@@ -48,7 +48,7 @@ def _starts(sides: int, c: Cells, k: Components, s: Starts) -> int:
     return s.x.size if held else 0
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _throw_all(params: Any, sides: int, count: int, s: Starts) -> None:
     """Make a step of several orbits, side by side: the images of a side are one loop over an array."""
     thrown = 0
@@ -66,7 +66,7 @@ def _throw_all(params: Any, sides: int, count: int, s: Starts) -> None:
         s.x[i], s.side[i], s.code[i] = s.after[j], s.to[j], s.codes[j]
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def remaining(params: Any, sides: int, c: Cells, k: Components, s: Starts) -> int:
     """Count the orbits from the cells in `held` that are still among these cells after some throws; they lead `s`.
 
@@ -89,7 +89,7 @@ def remaining(params: Any, sides: int, c: Cells, k: Components, s: Starts) -> in
     return left
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def visits_all(params: Any, slack: float, u: Unions) -> bool:
     """Whether one orbit comes to every interval of SET, and leaves them never."""
     n, missing = u.size[SET], u.size[SET]
@@ -111,7 +111,7 @@ def visits_all(params: Any, slack: float, u: Unions) -> bool:
     return False
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def averages(params: Any, x: float, side: int, throws: int, out: Any) -> None:
     """Fill `out` with means over stretches of one orbit: share of throws that change sides, logarithm of the slopes.
 
@@ -186,7 +186,7 @@ SAME = 1e-6
 NO_CYCLE, DOUBTFUL = 0, -1
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _closes(params: Any, x: float, side: int, length: int, scale: float, u: Unions) -> bool:
     """Whether the branches in `u.seen` have an attracting cycle near a state; PUSHED becomes its points."""
     first, move, steps = x, scale, 0
@@ -214,7 +214,7 @@ def _closes(params: Any, x: float, side: int, length: int, scale: float, u: Unio
     return on == side and abs(y - x) <= CLOSES * scale and abs(slope) < NEUTRAL
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _cycle_from(params: Any, x: float, side: int, patient: bool, scale: float, u: Unions) -> int:
     """Length of the attracting cycle that an orbit comes to, PUSHED its points; 0 where it closes none."""
     for tries in range(2 if patient else 1):
@@ -233,7 +233,7 @@ def _cycle_from(params: Any, x: float, side: int, patient: bool, scale: float, u
     return NO_CYCLE
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _joins(params: Any, x: float, side: int, known: int, scale: float, u: Unions) -> int:
     """Follow an orbit to a cycle: its length, `DOUBTFUL` where another one is known; COVERED is the first."""
     length = _cycle_from(params, x, side, known >= NO_CYCLE, scale, u)
@@ -257,7 +257,7 @@ def _goes_on(p: Pieces, q: int, x: float, to: int, close: float) -> Any:
     return p.to[q - 1] == to and abs(p.y_hi[q - 1] - x) <= close
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _of_ends(params: Any, inside: bool, scale: float, p: Pieces, u: Unions) -> tuple[int, int]:
     """Length of the one cycle that the orbits of all ends come to, or `DOUBTFUL`; and how many ends there are.
 
@@ -286,7 +286,7 @@ def _of_ends(params: Any, inside: bool, scale: float, p: Pieces, u: Unions) -> t
     return known, count
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def one_cycle(params: Any, x: float, side: int, scale: float, p: Pieces, u: Unions) -> int:
     """Length of the attracting cycle that SET holds, which SET becomes; `NO_CYCLE`, or `DOUBTFUL`.
 

@@ -40,7 +40,7 @@ def branch_at(here: Any, x: float, side: int, decided: bool) -> int:
     return codes.UNDEFINED if after != after else code
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _followed(here: Any, x: float, side: int, branch: int, what: int) -> Any:
     """Return a number that changes its sign with what is followed: with the branch, or with the slope on a branch."""
     if what == MARGIN:
@@ -50,7 +50,7 @@ def _followed(here: Any, x: float, side: int, branch: int, what: int) -> Any:
     return 1.0 if branch_at(here, x, side, False) != branch else -1.0
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _change(
     here: Any, side: int, branch: int, what: int, a: float, b: float, f_a: float, f_b: float, close: float
 ) -> float:
@@ -76,7 +76,7 @@ def _change(
     return b
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _bottom(here: Any, side: int, branch: int, what: int, a: float, m: float, b: float, f_m: float) -> float:
     """Return a place between a and b where the other sign is met, nan where the dip about m does not come to zero."""
     sign = 1.0 if f_m > 0.0 else -1.0
@@ -94,7 +94,7 @@ def _bottom(here: Any, side: int, branch: int, what: int, a: float, m: float, b:
     return float("nan")
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _jump(
     here: Any, side: int, branch: int, a: float, b: float, rising: bool, close: float
 ) -> tuple[float, float]:
@@ -125,7 +125,7 @@ def _dips(left: float, here: float, right: float) -> bool:
     return here - tilt * tilt / (8.0 * bend) < FOLLOWED * here
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _sample(here: Any, side: int, decided: bool, bottom: float, span: float, scan: Any, s: Samples) -> None:
     for j in range(scan.size):
         s.x[j] = bottom + span * scan[j]
@@ -175,7 +175,7 @@ def _sort(cuts: Any, n: int) -> None:
         cuts[j] = x
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _cuts(here: Any, side: int, decided: bool, close: float, s: Samples) -> int:
     """Fill `s.cuts`, ascending; their number, -1 where there are too many."""
     n, last = 0, s.x.size - 1
@@ -203,7 +203,7 @@ def _cuts(here: Any, side: int, decided: bool, close: float, s: Samples) -> int:
     return n
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def find_pieces(here: Any, side: int, decided: bool, r: Region, scan: Any, s: Samples, p: Pieces) -> bool:
     """Append the pieces of one side, from samples at ``r.bottom + (r.hi - r.bottom) * scan``; False for too many."""
     lo, hi, bottom = r.lo[side], r.hi[side], r.bottom[side]

@@ -100,7 +100,7 @@ def _begin(scale: float, r: Region, a: int, i: int, t: Topologies, u: Unions) ->
             put(u, SET, side, max(lo + off, r.lo[side]), min(hi - off, r.hi[side]))
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _pieces(params: Any, decided: bool, r: Region, w: Work, p: Pieces) -> bool:
     p.begin[0], whole = 0, True
     for side in range(r.lo.size):
@@ -108,7 +108,7 @@ def _pieces(params: Any, decided: bool, r: Region, w: Work, p: Pieces) -> bool:
     return whole
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _joined(one: Any, other: Any, p: Pieces, q: Pieces, u: Unions) -> bool:
     """Fill IMAGE with the images of SET for all parameters between two; whether some part has none.
 
@@ -142,7 +142,7 @@ def _joined(one: Any, other: Any, p: Pieces, q: Pieces, u: Unions) -> bool:
     return False
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _rests(
     one: Any, other: Any, joined: bool, union: bool, scale: float, r: Region, p: Pieces, q: Pieces, u: Unions
 ) -> bool:
@@ -283,7 +283,7 @@ def _fill_extent(u: Unions, t: Topologies, i: int, a: int) -> None:
         t.reach[i, a, side] = u.hi[SET, k]
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _attractor(params: Any, a: int, r: Region, scale: float, w: Work, t: Topologies, i: int) -> int:
     """Fill the fields of one attractor of point i; DECIDED, or a doubt."""
     sides, u = r.lo.size, w.unions
@@ -330,7 +330,7 @@ def _met_twice(count: int, scale: float, t: Topologies, i: int) -> bool:
     return False
 
 
-@kernel(entry=True, counting=False)
+@kernel(counting=False, inlined=False)
 def _point(params: Any, decided: bool, r: Region, w: Work, t: Topologies, i: int) -> int:
     """Fill the fields of point i; DECIDED, or the first doubt."""
     sides, scale, doubt = r.lo.size, 0.0, DECIDED
