@@ -30,6 +30,10 @@ def above_half(x, top):
     return 0.9 * x if x > top else x
 
 
+def cut(x, top):
+    return top * x - int(2 * x)
+
+
 class Half(NamedTuple):
     slope: float
 
@@ -117,7 +121,7 @@ def test_a_map_is_a_function_an_object_or_a_class(capfd, mymap, name, settings, 
 BOX = ["--domain", "0:1,0:1"]
 REFUSED = [
     ("certify", "nofile.py:henon", [], "nofile.py"),
-    ("certify", "{}", [], "henon, ricker, above_half, Half, half, made, registered"),
+    ("certify", "{}", [], "henon, ricker, above_half, cut, Half, half, made, registered"),
     ("certify", "{}:heno", [], "henon, ricker"),
     ("certify", "{}:number", [], "the map is 3"),
     ("certify", "{}:henon", ["--set", "a=1.4"], 'add --domain "0:1,0:1"'),
@@ -132,6 +136,7 @@ REFUSED = [
     ("certify", "{}:made", ["--domain", "0:1", "--noise", "a=b"], "the option --noise is 'a=b'"),
     ("certify", "{}:made", ["--domain", "0:1", "--starts", "0:1"], "beside --ends"),
     ("certify", "{}:above_half", ["--domain", "0:1", "--set", "top=0.5"], "no comparison"),
+    ("certify", "{}:cut", ["--domain", "0:1", "--set", "top=1.5"], "write floor in place of int"),
     ("certify", "paper-designed", ["--domain", "0:1"], "none beside a scene"),
     ("certify", "paper-designed", ["--set", "a=1"], "none beside a scene"),
     ("atlas", "{}:made", ["--x", "r=2:3:4"], "--domain"),

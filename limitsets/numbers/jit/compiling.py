@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, overload
 
 import numba
-from numba import extending
+from numba import extending, types
 from numba.core import codegen, config
 from numba.core.compiler import Compiler
 from numba.core.errors import NumbaError
@@ -279,9 +279,12 @@ def _explained(error: Exception, cls: type) -> MapError:
         )
         if cls.__module__.split(".")[0] == "limitsets":  # made by `limitsets.map`
             remedy = "give each branch a function of its own: limitsets.map(pieces=(f, g), margin=m)"
+        line = linecache.getline(file, number).strip()
+        if re.search(r"\bint\(", line):
+            remedy = f"write floor in place of int, which is another number below 0; or {remedy}"
         return MapError(
             f"what {name} of {cls.__name__} does with x or a parameter ({place})",
-            linecache.getline(file, number).strip(),
+            line,
             f"for boxes: {NUMBERS_DO}",
             remedy,
         )
@@ -373,6 +376,20 @@ def _interleaved(dispatcher: Any) -> None:
     dispatcher._compiler.compile = compile_interleaved
 
 
+def _of_variables(template: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a call by a kernel compile for whole numbers and flags, and not again for each constant."""
+
+    def variable(kind: Any) -> Any:
+        return (
+            types.unliteral(kind) if isinstance(kind, types.IntegerLiteral | types.BooleanLiteral) else kind
+        )
+
+    def template_of_variables(args: Any, kws: Any) -> Any:
+        return template(tuple(map(variable, args)), {name: variable(kind) for name, kind in kws.items()})
+
+    return template_of_variables
+
+
 def compiled(
     function: F, options: dict[str, Any], entry: bool, counting: bool = True, inlined: bool = True
 ) -> F:
@@ -386,6 +403,9 @@ def compiled(
         part = numba.jit(**flags, **how)(function)
         dispatcher.get_call_template, dispatcher.get_overload = part.get_call_template, part.get_overload
         dispatcher._compiling_counter = part._compiling_counter  # by which numba sees that it calls itself
+    # a helper of a user's map may take an entry of a tuple whose entries differ, which needs the constant
+    if (function.__module__ or "").split(".")[0] == "limitsets" and hasattr(dispatcher, "get_call_template"):
+        dispatcher.get_call_template = _of_variables(dispatcher.get_call_template)
     # The folder's name vouches for the package's own files only: a loop defined elsewhere is not kept.
     inside = PACKAGE in Path(function.__code__.co_filename).resolve().parents
     if entry and inside and CACHE is not None and hasattr(dispatcher, "_cache"):
