@@ -460,10 +460,37 @@ def test_a_loop_that_several_kernels_lead_to_is_optimised_once(monkeypatch: pyte
     on = kernel(inlined=False)(lambda x, end: loop(x, end) - down(x, end))
     # 27 comes to 1 in 111 steps of Collatz's map (OEIS A006577), the last of them from 4 over 2
     assert kernel(entry=True)(lambda x, end: (down(x, end), on(x, end)))(27, 1) == (109, 2)
-    functions = [each for library in made for each in library._final_module.functions]
-    defined = [each for each in functions if "_steps_to" in each.name and not each.is_declaration]
-    assert (len(made), len(defined)) == (3, 1)
+    of_loop = [
+        each for library in made for each in library._final_module.functions if "_steps_to" in each.name
+    ]
+    assert (len(made), sorted(each.is_declaration for each in of_loop)) == (3, [False, True, True])
     assert (down(27, 1), loop(27, 1)) == (109, 111)  # Python calls them too
+
+
+def _entry_of_pair(pair: Any, at: int) -> Any:
+    return pair[at]
+
+
+def _plus(x: int, more: int) -> int:
+    return x + more
+
+
+@pytest.mark.parametrize(("own", "compilations"), [(True, 1), (False, 2)])
+def test_a_kernel_of_the_package_compiles_once_for_all_constants(
+    own: bool, compilations: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = compiling.PACKAGE
+    monkeypatch.setattr(compiling, "PACKAGE", Path(__file__).resolve().parent if own else whole)
+    plus = kernel(_plus)
+    monkeypatch.setattr(compiling, "PACKAGE", whole)
+    assert kernel(entry=True)(lambda x: plus(x, 1) + plus(x, 2))(5) == 13
+    assert len(plus.get_overload.__self__.overloads) == compilations
+
+
+def test_a_helper_from_outside_keeps_its_constants() -> None:
+    # the entries of the pair are a number and a whole number: which of them is meant has to be known
+    entry = kernel(_entry_of_pair)
+    assert kernel(entry=True)(lambda x: entry((0.5, x), 0) * entry((0.5, x), 1))(3) == 1.5
 
 
 def test_numba_still_has_the_internals_the_cache_overrides() -> None:

@@ -111,34 +111,26 @@ class _Loop(_Part):
     """Code that is called, not taken in."""
 
 
-class _Compiler(Compiler):  # type: ignore[misc]  # numba has no types
-    """How entries are compiled."""
+def _compiling_to(kind: type[_Linked]) -> type[Compiler]:
+    """How numba compiles to code of a kind."""
 
-    library: type[_Linked] = _Whole
+    class Compiling(Compiler):  # type: ignore[misc]  # numba has no types
+        def __init__(self, typing_context: Any, target_context: Any, library: Any, *rest: Any) -> None:
+            super().__init__(typing_context, target_context, library, *rest)
+            self.state.library = kind(target_context.codegen(), kind.__name__)
+            self.state.library.enable_object_caching()
 
-    def __init__(self, typing_context: Any, target_context: Any, library: Any, *rest: Any) -> None:
-        super().__init__(typing_context, target_context, library, *rest)
-        self.state.library = self.library(target_context.codegen(), self.library.__name__)
-        self.state.library.enable_object_caching()
-
-
-class _Within(_Compiler):
-    """How kernels within others are compiled."""
-
-    library = _Part
+    return Compiling
 
 
-class _Called(_Compiler):
-    """How loops that only kernels call are compiled."""
-
-    library = _Loop
+_TO_WHOLE, _TO_PART, _TO_LOOP = map(_compiling_to, (_Whole, _Part, _Loop))
 
 
 def overloaded(
     stub: Callable[..., Any], choose: Callable[..., Any], *, proof: bool = False, inlined: bool = True
 ) -> None:
     """Let compiled code run, in place of a function, what `choose` gives for the types of its arguments."""
-    options = {**(PROOF if proof else ESTIMATE), "forceinline": inlined, "pipeline_class": _Within}
+    options = {**(PROOF if proof else ESTIMATE), "forceinline": inlined, "pipeline_class": _TO_PART}
     extending.overload(stub, jit_options=options, strict=False)(choose)
 
 
@@ -395,19 +387,19 @@ def compiled(
 ) -> F:
     """Make the dispatcher of a kernel: for other kernels, or an entry that is kept on disk."""
     flags = {**options, "forceinline": inlined and not entry, "_nrt": counting}
-    dispatcher = numba.jit(**flags, pipeline_class=_Compiler)(function)
+    dispatcher = numba.jit(**flags, pipeline_class=_TO_WHOLE)(function)
     if entry and hasattr(dispatcher, "_compiler"):
         _interleaved(dispatcher)
     elif hasattr(dispatcher, "_compiler"):  # for Python; compiled code is given a part
-        how = {"no_cpython_wrapper": True, "pipeline_class": _Within if inlined else _Called}
+        how = {"no_cpython_wrapper": True, "pipeline_class": _TO_PART if inlined else _TO_LOOP}
         part = numba.jit(**flags, **how)(function)
         dispatcher.get_call_template, dispatcher.get_overload = part.get_call_template, part.get_overload
         dispatcher._compiling_counter = part._compiling_counter  # by which numba sees that it calls itself
-    # a helper of a user's map may take an entry of a tuple whose entries differ, which needs the constant
-    if (function.__module__ or "").split(".")[0] == "limitsets" and hasattr(dispatcher, "get_call_template"):
-        dispatcher.get_call_template = _of_variables(dispatcher.get_call_template)
     # The folder's name vouches for the package's own files only: a loop defined elsewhere is not kept.
     inside = PACKAGE in Path(function.__code__.co_filename).resolve().parents
+    # A helper of a user's map may take an entry of a tuple whose entries differ, which needs the constant.
+    if inside and hasattr(dispatcher, "get_call_template"):
+        dispatcher.get_call_template = _of_variables(dispatcher.get_call_template)
     if entry and inside and CACHE is not None and hasattr(dispatcher, "_cache"):
         dispatcher._cache = CACHE(function)
     return dispatcher  # type: ignore[no-any-return]  # a dispatcher is called like the function
