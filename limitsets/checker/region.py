@@ -76,7 +76,7 @@ def check_claimed(claimed: Claimed) -> None:
         holder, at = place_of(raw, name)
         holder[at] = ends
     scene = read_scene(raw, None)
-    goal = goal_of_scene(raw, len(scene.sides))
+    goal = goal_of_scene(raw, len(scene.sides), checked=True)
     if claimed.goal == GOAL_REFUTED:
         check_chain(scene, goal, claimed)
     else:

@@ -332,7 +332,7 @@ def recheck_plane(plane: Plane, workers: int, progress: Progress, report: Report
     report.parameters |= {axis.name: axis.between(0, len(axis.texts) - 1) for axis in plane.axes}
     report.parameters["noise (at every throw)"] = "none"
     report.cells = int(plane.first[-1])
-    goal = goal_of_scene(plane.raw, plane.n_sides)
+    goal = goal_of_scene(plane.raw, plane.n_sides, checked=True)
     raster = raster_of(plane)
     check_codes(plane, goal is not None)
     with crew_of(report, (None,), workers, progress, report.cells, check_region_cell) as crew:

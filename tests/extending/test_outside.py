@@ -173,6 +173,25 @@ def test_a_goal_without_a_proof_is_undecided(monkeypatch):
     assert (claim.verdict, claim.reason) == ("undecided", "nothing proves keeps_below in this version")
 
 
+@pytest.mark.usefixtures("added")
+def test_other_claims_of_a_scene_are_saved_and_rechecked_whatever_its_goal(tmp_path, monkeypatch):
+    """The checker knows no goal from outside: it says that nothing is claimed of it, and checks the rest."""
+    monkeypatch.chdir(tmp_path)
+    ls.dump(asking("24 in"), "own.toml")
+    done = CliRunner().invoke(app, ["certify", "own.toml", "--claims", "goal"])
+    assert done.exit_code == 0
+    assert "goal: PROVED" in done.output
+    assert "no certificate is written" in done.output
+    assert "nothing rechecks others" in " ".join(done.output.split())
+    monkeypatch.delitem(KINDS, "keeps_below")
+    for claims in ("attracts-all", "attracts-all,goal"):
+        done = CliRunner().invoke(app, ["certify", "own.toml", "--claims", claims, "--out", "own.proof.zip"])
+        assert "certificate: own.proof.zip" in done.output
+        report = ls.recheck("own.proof.zip")
+        assert report.claims == [("attracts-all", "proved", "")]
+        assert any("goal" in line for line in report.statement)
+
+
 # ---------------------------------------------------------------- the rest
 
 
@@ -185,6 +204,10 @@ def test_the_map_and_the_image_method():
         points = [outside.tent(outside.Tent(1.9), (cell + third) / 100, 0)[0] for third in (1 / 3, 2 / 3)]
         first, last = (math.floor(100 * x) for x in sorted(points))
         assert graph.successors(cell).tolist() == list(range(first, last + 1))
+    halved = ls.map(lambda x: 0.5 * x, vectorised=True)
+    METHODS["thirds"] = sampled(lambda grid, side: replace(outside.thirds(grid, side), split=True))
+    with pytest.raises(MapError, match="a method that cuts cells"):
+        ls.transitions(halved, ls.grid([(0.0, 1.0)], cells=100), method="thirds")
 
 
 def test_the_figure():

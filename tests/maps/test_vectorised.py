@@ -92,7 +92,9 @@ MAP = ls.map(ricker, vectorised=True, r=2.3)
 GRID = ls.grid([(0.02, 2.6)], cells=100)
 DOORS = {
     'transitions by "boxes"': lambda: ls.transitions(MAP, GRID, "boxes"),
-    'transitions by "end-points"': lambda: ls.transitions(MAP, GRID, "end-points"),
+    'transitions by "end-points", or a method that cuts cells as it does,': lambda: ls.transitions(
+        MAP, GRID, "end-points"
+    ),
     "certify": lambda: ls.certify(MAP, GRID, ["invariant"]),
     "formulas": lambda: ls.formulas(MAP),
     "cycles": lambda: ls.cycles(ls.transitions(MAP, GRID), 3),

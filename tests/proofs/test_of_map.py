@@ -231,6 +231,18 @@ def test_a_search_for_very_many_cycles_ends_and_says_so():
     assert f"more than {MOST_WORDS} itineraries" in str(proof)
 
 
+@pytest.mark.sweep
+def test_a_search_for_very_many_cycles_of_the_plane_ends_and_says_so():
+    # the cat map: 1122 cycles of periods up to 9, by |det(A^n - 1)|
+    def cat(x, y):
+        return 2.0 * x + y, x + y
+
+    grid = ls.grid([(0, 1), (0, 1)], cells=64, periodic=True)
+    proof = ls.certify(ls.map(cat), grid, ["cycles"])
+    assert "longer cycles: there are 1122 of periods up to 9" in proof.claims[0].section["missing"]
+    assert 800 < len(proof.cycles) < 1122
+
+
 def test_the_basin_holds_starts_that_pass_through_recurrent_sets_of_coarse_cells():
     # all of the starts but those that leave: 85.2 %, by orbits of 100 000 starts
     proof = ls.certify(Odd(2.2), ls.grid([(-2.1, 2.1)], cells=2048), ["trapping"])

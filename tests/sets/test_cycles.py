@@ -332,6 +332,24 @@ def test_the_standard_map_has_two_cycles_of_period_two():
     assert two[1].x[0, 1] == pytest.approx((2.0 * x) % 1.0, abs=1e-12)
 
 
+def test_the_cat_map_has_all_its_points_up_to_period_seven():
+    # trace of A^n - 2 points return after n steps
+    graph = ls.transitions(ls.map(cat, a=2.0), ls.grid([(0, 1)] * 2, cells=64, periodic=True))
+    per = Counter(cycle.period for cycle in ls.cycles(graph, 7))
+    for n in range(1, 8):
+        trace = round(np.trace(np.linalg.matrix_power(np.array([[2, 1], [1, 1]]), n)))
+        assert sum(d * per[d] for d in range(1, n + 1) if n % d == 0) == trace - 2
+
+
+def test_cycles_outside_the_domain_are_not_among_its_cycles():
+    # fixed points of x - x (x - 1) (x - 4) / 4 are 0, 1, 4; Newton's method reaches all
+    def step(x, y):
+        return x - x * (x - 1.0) * (x - 4.0) / 4.0, 0.5 * y
+
+    graph = ls.transitions(ls.map(step), ls.grid([(-0.5, 3.0), (-1.0, 1.0)], cells=32))
+    assert sorted(float(cycle.x[0, 0].round(9)) for cycle in ls.cycles(graph, 1)) == [0.0, 1.0]
+
+
 def test_the_cat_map_has_its_points():
     # |trace of A^p - 2| points: 1, 5, 16
     random, params = np.random.default_rng(3), ls.map(cat, a=2.0)

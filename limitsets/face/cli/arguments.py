@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile, ZipFile
 
-from limitsets.base import LimitsetsError, proposed
+from limitsets.base import AnswerError, LimitsetsError, proposed
 from limitsets.face.cli.output import refuse_other, saved, say_other, stem_of
 
 if TYPE_CHECKING:
@@ -205,6 +205,15 @@ def certified(
         if before and after and before != after:
             say_other("the certificate", file, before[0]["name"])
     return answer, written | {"file": str(file), "recheck": time.perf_counter() - begin if recheck else None}
+
+
+def certified_claims(proof: Any, file: Path, *, recheck: bool) -> tuple[Any, dict[str, Any] | None, str]:
+    """Write the certificate of the claims that are proved, if one can hold them; and say why there is none."""
+    some = any(claim.written for claim in proof.claims)
+    try:
+        return *certified(proof, file, proved=some, recheck=recheck), "nothing is proved"
+    except AnswerError as error:  # effects, a goal, or a function of which no certificate can be made
+        return *certified(proof, file, proved=False, recheck=recheck), str(error)
 
 
 def said_of(written: dict[str, Any] | None, missing: str, *, partly: bool = False) -> list[str]:

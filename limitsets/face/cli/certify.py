@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import limitsets as ls
 from limitsets.base import AnswerError, LimitsetsError, Table
 from limitsets.face import report
-from limitsets.face.cli.arguments import certified, deviations, laid_ranges, own_file, said_of, with_ending
+from limitsets.face.cli.arguments import (
+    certified_claims,
+    deviations,
+    laid_ranges,
+    own_file,
+    said_of,
+    with_ending,
+)
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
 from limitsets.face.cli.output import saved
 from limitsets.face.cli.subjects import (
@@ -128,10 +135,8 @@ def _of_scene(
         proof = ls.certify(
             chosen, claims or None, noise=varying, tolerance=fixed, laid=begins, progress=run.tell
         )
-    some = any(each.written for each in proof.claims)
     run.tell("recheck", 0, 1)
-    proof, written = certified(proof, file, proved=some and not proof.effects, recheck=recheck)
-    missing = "nothing rechecks maps with effects" if some and proof.effects else "nothing is proved"
+    proof, written, missing = certified_claims(proof, file, recheck=recheck)
 
     def words() -> Iterator[str | Table]:
         yield from _text(proof)
@@ -150,12 +155,8 @@ def _of_map(
     file = with_ending(run.out or Path(f"{chosen.name}.proof.zip"))
     with saved(file):  # refuses a place that cannot be written before anything is proved
         proof = ls.certify(chosen.lower, grid, claims or None, upper=chosen.upper, **boxes, progress=run.tell)
-    some, missing = any(claim.verdict == "proved" for claim in proof.claims), "nothing is proved"
     run.tell("recheck", 0, 1)
-    try:
-        proof, written = certified(proof, file, proved=some, recheck=recheck)
-    except AnswerError as error:  # of what is proved no file can be made: a function that cannot be recorded
-        missing, (_, written) = str(error), certified(proof, file, proved=False, recheck=recheck)
+    proof, written, missing = certified_claims(proof, file, recheck=recheck)
 
     def words() -> Iterator[str | Table]:
         yield f"{chosen.name}: {proof.graph.n_cells} cells, {proof.seconds:.2g} s"

@@ -24,7 +24,8 @@ from limitsets.proofs.prover.proof_of_map import ProofOfMap, frames_of
 from limitsets.systems.cells import CellSet, Grid
 from limitsets.systems.maps import has_slope, kind_of
 from limitsets.systems.maps.contract import between
-from limitsets.systems.sets import Cycle, Cycles, cycles, cycles_of
+from limitsets.systems.sets import Cycle, Cycles, cycles_of
+from limitsets.systems.sets.periodic import cycles_near
 
 # Largest period of the search for cycles.
 UP_TO = 16
@@ -32,8 +33,8 @@ UP_TO = 16
 # Largest period of which all orbits are looked for: the checker reads cycles of so many points.
 MOST_PERIOD = 200
 
-# Itineraries of one length (in the plane: starts) beyond which no longer cycles are looked for.
-MOST_WORDS = 2000
+# Itineraries of one length, and cycles in the plane, beyond which no longer cycles are looked for.
+MOST_WORDS, MOST_CYCLES = 2000, 1000
 
 
 def _within(cells: CellSet, lo: Array, hi: Array, side: Ints) -> bool:
@@ -71,7 +72,10 @@ def _candidates(proof: ProofOfMap) -> tuple[Cycles, list[str]]:
     """Find cycles in floats for the parameters in the middle, and say what was left out."""
     cells, middle = proof.cells, between(proof.map, proof.upper)
     if cells.grid.dimension > 1 or cells.grid.domain.closes:
-        return cycles(replace(proof.graph, map=middle), UP_TO, cells), []
+        candidates = cycles_near(middle, cells, UP_TO, most_cycles=MOST_CYCLES)
+        longest = max((cycle.period for cycle in candidates), default=0)
+        beyond = f"longer cycles: there are {len(candidates)} of periods up to {longest}"
+        return candidates, [beyond] if len(candidates) > MOST_CYCLES else []
     candidates = cycles_of(middle, cells.extents(), cells.grid.domain, UP_TO, most_words=MOST_WORDS)
     beyond = f"longer cycles: there are more than {MOST_WORDS} itineraries of one length"
     return candidates, [] if candidates.complete else [beyond]

@@ -424,8 +424,8 @@ class Proof(Saved):
 
     def _write(self, path: str | Path, **how: Any) -> None:
         """Write the claims that are proved."""
-        goals = [self.scene.goal for claim in self.claims if claim.claim == "goal"]
-        require_checkable(self.effects, goals, "the proof stands in .claims and .to_json()")
+        goals = [self.scene.goal for claim in self.claims if claim.claim == "goal" and claim.written]
+        require_checkable(self.effects, goals, "the claims, and the JSON of this proof, hold what is proved")
         good = [
             {"claim": claim.claim, "section": claim.section, "verdict": claim.verdict}
             for claim in self.claims

@@ -131,8 +131,8 @@ def transitions(map: Any, grid: Grid, method: str | None = None, **options: Any)
     chosen = method or ("end-points" if cut else "corners-padded")
     if chosen not in METHODS:
         raise AnswerError("the image method", chosen, ", ".join(METHODS), "correct the word")
-    if chosen in ("boxes", "end-points"):
-        compiled_kind_of(map, f'transitions by "{chosen}"')
+    if chosen == "boxes":
+        compiled_kind_of(map, 'transitions by "boxes"')
     require_memory(grid, chosen)
     require_agreement(map, grid.domain, chosen == "boxes", options.get("upper"))
     target = Target.of(grid, kind.exits)

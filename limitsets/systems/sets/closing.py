@@ -16,6 +16,7 @@ not differ.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -358,29 +359,49 @@ def _same(one: Closed, other: Closed, shift: int) -> bool:
     return bool((agree | across).all() and np.allclose(one.slopes, slopes, rtol=1e-6, atol=1e-6))
 
 
-def _least(one: Closed) -> float:
-    return float(np.ravel(one.cycle.x)[0])
-
-
 def distinct(orbits: Iterable[Closed]) -> list[Cycle]:
     """Each orbit once, with its smallest period, by period and least point."""
-    kept: list[Closed] = []
-    seamed: dict[int, list[Closed]] = {}
-    widest = 0.0
-    for one in sorted(orbits, key=lambda each: (each.cycle.period, each.cycle.side[0], _least(each))):
-        period = one.cycle.period
-        if any(_same(one, one, d) for d in range(1, period) if period % d == 0):
-            continue
-        widest = max(widest, one.near)
-        others = list(seamed.get(period, ())) if one.jumps.any() else []
-        for other in reversed(kept):
-            if other.cycle.period != period or _least(other) < _least(one) - widest:
-                break
-            others.append(other)
+    by_period: dict[int, list[Closed]] = {}
+    for orbit in orbits:
+        by_period.setdefault(orbit.cycle.period, []).append(orbit)
+    return [cycle for period in sorted(by_period) for cycle in _distinct(by_period[period], period)]
+
+
+def _distinct(orbits: list[Closed], period: int) -> Iterator[Cycle]:
+    """Each orbit of one period once, by its least point."""
+    from scipy.spatial import KDTree
+
+    orbits.sort(key=lambda orbit: (int(orbit.cycle.side[0]), *np.atleast_1d(orbit.cycle.x[0]).tolist()))
+    shorter = [d for d in range(1, period) if period % d == 0]
+    orbits = [one for one in orbits if not any(_same(one, one, d) for d in shorter)]
+    if not orbits:
+        return
+    points, jumps = (
+        np.stack(each).reshape(len(orbits), period, -1)
+        for each in ([orbit.cycle.x for orbit in orbits], [orbit.jumps for orbit in orbits])
+    )
+    # Only orbits with a point near the first point of another one, by any of their names, can be the same.
+    named, number = _names(points.reshape(-1, points.shape[-1]), jumps.reshape(-1, points.shape[-1]))
+    first, orbit_of_first = _names(points[:, 0], jumps[:, 0])
+    widest = (1.0 + 1e-6) * max(orbit.near for orbit in orbits)  # rounding of the names
+    pairs = KDTree(named).query_ball_point(first, widest, p=math.inf)
+    others: list[set[int]] = [set() for _ in orbits]
+    for k, meets in zip(orbit_of_first.tolist(), pairs, strict=True):
+        others[k].update((number[meets] // period).tolist())
+    kept: set[int] = set()
+    for k, one in enumerate(orbits):
         # Points that agree to rounding may begin at another one of them.
-        if any(_same(one, other, shift) for other in others for shift in range(period)):
-            continue
-        kept.append(one)
-        if one.jumps.any():
-            seamed.setdefault(period, []).append(one)
-    return [one.cycle for one in kept]
+        before = [orbits[other] for other in others[k] & kept]
+        if not any(_same(one, other, shift) for other in before for shift in range(period)):
+            kept.add(k)
+            yield one.cycle
+
+
+def _names(x: Array, jumps: Array) -> tuple[Array, Ints]:
+    """All names of points (n, d), one jump further or back along any axes, and the number of the point of each."""
+    names = [
+        (np.array(way) * jumps, np.array(way) == 0.0) for way in product((0.0, 1.0, -1.0), repeat=x.shape[1])
+    ]
+    real = [np.flatnonzero((stays | (jumps > 0.0)).all(axis=1)) for _, stays in names]
+    moved = [x[rows] + move[rows] for (move, _), rows in zip(names, real, strict=True)]
+    return np.concatenate(moved), np.concatenate(real)

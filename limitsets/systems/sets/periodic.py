@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,7 @@ from limitsets.systems.sets.closing import (
     NEAR,
     Array,
     Closed,
+    Cycle,
     Cycles,
     Ints,
     closed,
@@ -436,7 +438,13 @@ def _followed(
 
 
 def cycles_from(
-    params: Any, starts: ArrayLike, side: ArrayLike, up_to: int, *, domain: Domain | None = None
+    params: Any,
+    starts: ArrayLike,
+    side: ArrayLike,
+    up_to: int,
+    *,
+    domain: Domain | None = None,
+    most_cycles: float = math.inf,
 ) -> Cycles:
     """Find periodic orbits of a map of the plane, or on axes that close, by Newton's method from given starts.
 
@@ -452,6 +460,8 @@ def cycles_from(
         Largest period.
     domain : Domain, optional
         With axes that close: an orbit closes there up to whole periods, and is shown in the domain.
+    most_cycles : float
+        Number of cycles beyond which no longer ones are looked for.
 
     Returns
     -------
@@ -484,7 +494,8 @@ def cycles_from(
     x = np.asarray(starts, dtype=np.float64).reshape(-1, kind.dimension)
     sides = np.array(np.broadcast_to(np.asarray(side, dtype=np.int64), (len(x),)))
     scale = float(np.abs(x).max())
-    closed_orbits: list[Closed] = []
+    answer: list[Cycle] = []
+    how = "by Newton's method from many starts: completeness not claimed"
 
     def slopes(at: Array, on: Ints, _: Ints) -> Array:
         return _returned(params, 1, at, on, domain)[1]
@@ -495,12 +506,11 @@ def cycles_from(
         _, one_of_each = np.unique(keys, axis=0, return_index=True)
         orbits = _followed(params, roots[one_of_each], on[one_of_each], period, domain)
         seams = len(kind.branches) == 1
-        closed_orbits += closed(params, *orbits, scale, slopes, seams=seams, domain=domain)
-    return Cycles(
-        distinct(closed_orbits),
-        complete=False,
-        how="by Newton's method from many starts: completeness not claimed",
-    )
+        answer += distinct(closed(params, *orbits, scale, slopes, seams=seams, domain=domain))
+        if len(answer) > most_cycles:
+            how += f", up to period {period}: there are more than {most_cycles} cycles"
+            break
+    return Cycles(answer, complete=False, how=how)
 
 
 MOST_STARTS = 20_000
@@ -568,8 +578,14 @@ def cycles(graph: TransitionGraph, up_to: int, within: Any = None) -> Cycles:
         raise AnswerError(
             "the set to look in", shown(within), "cells, or an answer with cells", "pass an attractor"
         )
-    answer = cycles_from(graph.map, *_middles(cells), up_to, domain=domain)
-    if within is None:
-        return answer
+    return cycles_near(graph.map, cells, up_to, everywhere=within is None)
+
+
+def cycles_near(
+    params: Any, cells: CellSet, up_to: int, *, everywhere: bool = False, most_cycles: float = math.inf
+) -> Cycles:
+    """Find cycles by Newton's method from the middles of cells, that lie in these, or `everywhere` in the domain."""
+    answer = cycles_from(params, *_middles(cells), up_to, domain=cells.grid.domain, most_cycles=most_cycles)
+    cells = CellSet(cells.grid, np.ones_like(cells.mask)) if everywhere else cells
     inside = (cycle for cycle in answer if cells.holds(cycle.x, cycle.side).all())
     return Cycles(inside, complete=False, how=answer.how)

@@ -20,6 +20,7 @@ from limitsets.systems.cells import Grid
 from limitsets.systems.graph.images.undecided import SamplePoints, every_branch, mark_bends, split
 from limitsets.systems.graph.target import Target, TargetBoxes, merged, place
 from limitsets.systems.maps import codes, images, kind_of
+from limitsets.systems.maps.contract import compiled_kind_of
 from limitsets.systems.maps.drivers import judged
 from limitsets.systems.maps.kernels import fallback, image, on_side, pick, put
 
@@ -186,6 +187,8 @@ def _boxes_of_side(
 ) -> TargetBoxes:
     """Boxes of all cells of one side."""
     samples = method(grid, side, **options)
+    if samples.split:
+        compiled_kind_of(params, 'transitions by "end-points", or a method that cuts cells as it does,')
     dimension, shape = grid.dimension, grid.shape[side]
     n = int(shape.prod())
     count = int(np.prod([axis.size for axis in samples.axes]))
