@@ -130,7 +130,7 @@ _PUBLIC = {
     "sweep": "parameters.atlas",
     "tables": "base.tables",
     "thrower": "feeder.thrower",
-    "topology": "systems.topology",
+    "topology": "systems.sets.topology",
     "trays": "cell.trays",
 }
 

@@ -20,7 +20,7 @@ from limitsets.systems.graph.components import strong_components
 from limitsets.systems.graph.ranges import Ranges
 from limitsets.systems.maps import INWARD, images
 from limitsets.systems.maps.pieces import point_of
-from limitsets.systems.topology import topologies
+from limitsets.systems.sets.topology import topologies
 from tests.bench.leslie_rivals import morse_by_cmgdb
 from tests.bench.measure import Turns, limit, take_turns, versus
 from tests.browsers import browser

@@ -17,7 +17,7 @@ from limitsets.parameters.atlas.of_topology import topology
 from limitsets.parameters.atlas.plan import Block, registered
 from limitsets.parameters.atlas.subjects import SceneSubject
 from limitsets.systems.maps import advance
-from limitsets.systems.topology import topologies
+from limitsets.systems.sets.topology import topologies
 
 # ----------------------------------------------------------------
 # Numbers along an attractor: topological entropy of its own bands, errors of means; against other ways to them.

@@ -13,7 +13,7 @@ from rich.progress import track
 
 import limitsets as ls
 from limitsets.systems.maps.pieces import point_of
-from limitsets.systems.topology import DOUBTS
+from limitsets.systems.sets.topology import DOUBTS
 from tests.topology.compare import class_of, differences
 from tests.topology.reference import STARTS, reference
 from tests.topology.window import HEIGHT, SPEED, points_of

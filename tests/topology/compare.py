@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.systems.topology import Topologies
+from limitsets.systems.sets.topology import Topologies
 from tests.topology.reference import Reference
 
 EXTENT, SHARE = 1e-6, 0.02

@@ -9,8 +9,8 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.systems.maps.pieces import point_of, stacked
-from limitsets.systems.topology import topologies
-from limitsets.systems.topology.points import LEVELS
+from limitsets.systems.sets.topology import topologies
+from limitsets.systems.sets.topology.points import LEVELS
 from tests.maps_of_tests import Contraction, Tent
 from tests.topology.compare import differences
 from tests.topology.maps_with_answers import Grazing, Two, rotations, tongue_of

@@ -13,7 +13,7 @@ from limitsets import maps
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.systems.maps import INWARD, advance
 from limitsets.systems.maps.pieces import point_of, stacked
-from limitsets.systems.topology import topologies
+from limitsets.systems.sets.topology import topologies
 from tests.test_paper import LIMIT_SETS
 
 # ----------------------------------------------------------------

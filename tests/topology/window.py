@@ -9,7 +9,7 @@ import numpy as np
 
 import limitsets as ls
 from limitsets.feeder.scene.arrays import ThrowStack, throw_stack
-from limitsets.systems.topology import Topologies, topologies
+from limitsets.systems.sets.topology import Topologies, topologies
 from tests.topology.compare import class_of
 
 # The window of the atlas: speed [deg/s], height of the surface [in].

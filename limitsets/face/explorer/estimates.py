@@ -27,8 +27,8 @@ from limitsets.systems.graph import transitions
 from limitsets.systems.maps import Orbit, critical_points, has_slope, kind_of, orbit
 from limitsets.systems.maps.pieces import stacked
 from limitsets.systems.sets import Attractor, attractors, basins
-from limitsets.systems.topology import Topologies, topologies
-from limitsets.systems.topology.work import DECIDED
+from limitsets.systems.sets.topology import Topologies, topologies
+from limitsets.systems.sets.topology.work import DECIDED
 
 # ----------------------------------------------------------------
 # Knobs: the numbers of a scene, or of a map, that sliders move, and the scene or map after a move.

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from limitsets.base import AnswerError
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import Deviation, Scene, ThrowStack, throw_stack
-from limitsets.systems.topology import Topologies, reaches, region_of
-from limitsets.systems.topology.work import DECIDED, Floats, Ints
+from limitsets.systems.sets.topology import Topologies, reaches, region_of
+from limitsets.systems.sets.topology.work import DECIDED, Floats, Ints
 
 Values: TypeAlias = Mapping[str, Floats]
 

@@ -19,8 +19,8 @@ from limitsets.systems.maps import advance
 from limitsets.systems.maps.pieces import chosen, point_of
 from limitsets.systems.sets.end_points import IntervalMap
 from limitsets.systems.sets.measure import topological_entropy
-from limitsets.systems.topology import DOUBTS, Topologies, topologies
-from limitsets.systems.topology.work import (
+from limitsets.systems.sets.topology import DOUBTS, Topologies, topologies
+from limitsets.systems.sets.topology.work import (
     BANDS_JOIN,
     DECIDED,
     MOST_ATTRACTORS,

@@ -12,7 +12,7 @@ from typing import Any
 from limitsets.numbers.jit import kernel
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.kernels import decision, fallback, image, image_on, margin
-from limitsets.systems.topology.work import MOST_PIECES, Pieces, Region, Samples
+from limitsets.systems.sets.topology.work import MOST_PIECES, Pieces, Region, Samples
 
 # Steps of a search for a change or for the bottom of a dip, and how close its ends come, as a share of the side.
 MOST_STEPS, CLOSE = 100, 1e-15

@@ -16,7 +16,7 @@ from limitsets.numbers.jit import kernel, row_of
 from limitsets.systems.maps.contract import has_slope, kind_of
 from limitsets.systems.maps.kernels import image_on, on_side
 from limitsets.systems.maps.pieces import point_of, size_of
-from limitsets.systems.topology.bands import (
+from limitsets.systems.sets.topology.bands import (
     ANY,
     GAP,
     IMAGE,
@@ -33,8 +33,8 @@ from limitsets.systems.topology.bands import (
     settle,
     stays_around,
 )
-from limitsets.systems.topology.cells import fill_cells, find_components, shares
-from limitsets.systems.topology.orbits import (
+from limitsets.systems.sets.topology.cells import fill_cells, find_components, shares
+from limitsets.systems.sets.topology.orbits import (
     CLOSES,
     DOUBTFUL,
     INNER,
@@ -46,8 +46,8 @@ from limitsets.systems.topology.orbits import (
     remaining,
     visits_all,
 )
-from limitsets.systems.topology.pieces import find_pieces
-from limitsets.systems.topology.work import (
+from limitsets.systems.sets.topology.pieces import find_pieces
+from limitsets.systems.sets.topology.work import (
     BANDS_JOIN,
     DECIDED,
     MOST_ATTRACTORS,

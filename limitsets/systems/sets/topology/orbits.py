@@ -8,9 +8,9 @@ from typing import Any
 from limitsets.numbers.jit import kernel
 from limitsets.systems.maps.drivers import fill_images, step
 from limitsets.systems.maps.kernels import image_on
-from limitsets.systems.topology.bands import COVERED, PUSHED, SET, copy, merge, put
-from limitsets.systems.topology.cells import cell_of
-from limitsets.systems.topology.work import Cells, Components, Pieces, Starts, Unions
+from limitsets.systems.sets.topology.bands import COVERED, PUSHED, SET, copy, merge, put
+from limitsets.systems.sets.topology.cells import cell_of
+from limitsets.systems.sets.topology.work import Cells, Components, Pieces, Starts, Unions
 
 # Throws of the orbits from cells that recur though they are left, and those between two looks at where they are.
 THROWS, LOOKED = 160, 8

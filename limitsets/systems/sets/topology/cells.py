@@ -14,7 +14,7 @@ from limitsets.systems.graph.ranges import Runs
 from limitsets.systems.maps import codes
 from limitsets.systems.maps.drivers import fill_images
 from limitsets.systems.maps.kernels import image_on, on_side
-from limitsets.systems.topology.work import MOST_ATTRACTORS, Cells, Components, Pieces, Region
+from limitsets.systems.sets.topology.work import MOST_ATTRACTORS, Cells, Components, Pieces, Region
 
 # Bits of the ways out: beyond the domain or out of the model; back to the joint.
 LEAVES, COLLAPSES = 1, 2

@@ -11,8 +11,8 @@ from typing import Any
 from limitsets.numbers.jit import kernel
 from limitsets.systems.maps.drivers import step
 from limitsets.systems.maps.kernels import image_on, on_side
-from limitsets.systems.topology.cells import cell_of
-from limitsets.systems.topology.work import MOST_INTERVALS, Cells, Components, Pieces, Region, Unions
+from limitsets.systems.sets.topology.cells import cell_of
+from limitsets.systems.sets.topology.work import MOST_INTERVALS, Cells, Components, Pieces, Region, Unions
 
 # Rows of `Unions`.
 SET, IMAGE, PUSHED, COVERED = 0, 1, 2, 3
