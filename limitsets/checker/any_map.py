@@ -3,6 +3,7 @@
 docs/certificates.md, "Certificates of any map": the map in the header, the parameters of a box, and "One cell".
 """
 
+import functools
 import itertools
 import math
 import operator
@@ -128,8 +129,9 @@ class Map:
         values = {n: number(lo, n).union(number(hi, n)) for n, (lo, hi) in parameters.items()}
         wide = [name for name, (lo, hi) in parameters.items() if lo != hi]
         self.ranges = [floats_around(values[name]) for name in wide]
-        self.image = {key: Program(f, self.dimension, values, wide) for key, f in shape.images.items()}
-        self.margin = [Program(f, self.dimension, values, wide) for f in shape.margins]
+        self.program_of = functools.partial(Program, dimension=self.dimension, values=values, wide=wide)
+        self.image = {key: self.program_of(f) for key, f in shape.images.items()}
+        self.margin = [self.program_of(f) for f in shape.margins]
 
     def piece(self, box: list[Pair]) -> "CellPiece":
         """Return the piece of all x in a box and all parameters."""

@@ -12,6 +12,7 @@ from .any_map import Map
 from .balls import Array, UnprovedError, about, prove, reason_of
 from .cells import Crew
 from .claims import Failed, failing
+from .map_average import check_average
 from .map_cells import MapCells, map_tasks
 from .map_cycles import Cycle
 from .map_file import OF_ORBITS, Goal, MapFile, Part, Regions
@@ -36,6 +37,8 @@ def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[Fail
         failed |= check_cells(part, number, file, cycles, crew)
         if "almost-every" in part.claims and "almost-every" not in failed:
             failed |= failing(["almost-every"], check_weights, the_map, part.cells)
+        if part.average is not None and "average" not in failed:
+            failed |= failing(["average"], check_average, the_map, part.cells, part.average)
     return failed, cycles
 
 
@@ -86,7 +89,7 @@ def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], cre
     if failed:
         return failed
     hulls = [hull for _, k in part.drawn for hull in cycles[k].hulls]
-    needing = set() if attracting.any() else {"invariant", "trapping", "expanding"}
+    needing = set() if attracting.any() else {"invariant", "trapping", "expanding", "average"}
     needing |= set() if attracting.any() or part.drawn else {"basin", "attracts-all", "ends-in"}
     failed = dict.fromkeys(needing & set(claims), "there are no attracting cells")
     if "escapes" in claims:

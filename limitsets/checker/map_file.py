@@ -19,6 +19,7 @@ from .file import (
     table,
     whole_number,
 )
+from .map_average import Average, read_average
 from .map_cells import MapCells
 from .map_cycles import Begins, Listed, read_begins, read_box, read_cycles
 from .map_orbits import Every, read_every
@@ -36,6 +37,7 @@ CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "expanding": "least",
     "escapes": "",
     "almost-every": "",
+    "average": "of components lower upper",
     "refuted": "",
 }
 OF_ORBITS = (
@@ -68,6 +70,7 @@ class Part(NamedTuple):
     max_rank: int
     least: float  # the slope of `expanding`, 0 where that is not claimed
     cells: MapCells | None
+    average: Average | None
 
 
 class MapFile(NamedTuple):
@@ -152,7 +155,22 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     cells = MapCells(arrays, box["prefix"], shape, **labels) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
     numbers = read_numbers(known, shape, where)
-    return Part(parameters, known, unknown, cycles, begins, every=every, drawn=drawn, **numbers, cells=cells)
+    average = None
+    if "average" in known:
+        require("converges" not in known, f"{where}: average does not stand beside converges")
+        average = read_average(known["average"], arrays, box["prefix"], shape, where)
+    return Part(
+        parameters,
+        known,
+        unknown,
+        cycles,
+        begins,
+        every=every,
+        drawn=drawn,
+        **numbers,
+        cells=cells,
+        average=average,
+    )
 
 
 def read_numbers(known: dict[str, Any], shape: Shape, where: str) -> dict[str, Any]:

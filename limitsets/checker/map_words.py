@@ -10,6 +10,7 @@ from .any_map import Shape, parameter_in_words
 from .balls import Array, Pair
 from .claims import entropy_of
 from .file import plain
+from .map_average import average_in_words
 from .map_cells import MapCells
 from .map_cycles import Cycle, interval_in_words
 from .map_file import CLAIMS_OF_MAP, OF_ORBITS, Goal, Part, Regions
@@ -49,7 +50,7 @@ def holds_for(part: Part) -> str:
     wide = [named(name) for name, (lo, hi) in part.parameters.items() if lo != hi]
     names = [name for name in CLAIMS_OF_MAP if name in part.claims]
     # who ends in the ball of a cycle tends to it, and stays, for one value only
-    fixed = {*OF_ORBITS, *(("attracts-all", "ends-in") if part.drawn else ())}
+    fixed = {*OF_ORBITS, "average", *(("attracts-all", "ends-in") if part.drawn else ())}
     groups = (
         ("fixed in time", [name for name in names if name in fixed]),
         ("changed at every step too", [name for name in names if name not in fixed]),
@@ -156,6 +157,14 @@ class Proved:
         domain = domain_in_words(self.cells, self.shape)
         return f"almost every start in {domain} (all but a set of length 0) {ways}"
 
+    def averaged(self) -> str:
+        """Say what the average of a function is."""
+        average = self.part.average
+        assert average is not None
+        return average_in_words(
+            average, {k: component_in_words(self.cells, k) for k in sorted(average.bounds)}
+        )
+
 
 SENTENCES: dict[str, Callable[[Proved], str]] = {
     "cycles": Proved.cycle_list,
@@ -171,6 +180,7 @@ SENTENCES: dict[str, Callable[[Proved], str]] = {
     "expanding": Proved.growth,
     "escapes": Proved.leaving,
     "almost-every": Proved.almost,
+    "average": Proved.averaged,
     "refuted": lambda proved: (
         f"an open set of starts, around a point of a cycle, violates: {proved.of_goal()}"
     ),

@@ -128,6 +128,26 @@ def slope_of_power(n: int, x: Arb, _: Arb) -> Arb:
     return ONE if n == 1 else n * power(x, n - 1)
 
 
+def bend_of_power(n: int, x: Arb, _: Arb) -> Arb:
+    """Return the second derivative of x^n."""
+    return ZERO if n == 1 else arb(n * (n - 1)) * (ONE if n == 2 else power(x, n - 2))
+
+
+BENDS: dict[str, Callable[[Arb, Arb], Arb]] = {
+    "neg": lambda _, __: ZERO,
+    "abs": lambda x, _: ZERO if sign(x).is_exact() else NAN,
+    "sqrt": lambda _, v: -1 / (4 * v * v * v),
+    "exp": lambda _, v: v,
+    "log": lambda x, _: -1 / (x * x),
+    "sin": lambda _, v: -v,
+    "cos": lambda _, v: -v,
+    "tan": lambda _, v: 2 * v * (1 + v * v),
+    "tanh": lambda _, v: -2 * v * (1 - v * v),
+    "floor": UNARY["floor"][1],
+}
+"""Second derivatives of operations on one number, at x, from the value v too; nan where a kink or jump may lie."""
+
+
 # ----------------------------------------------------------------
 # Reading.
 
@@ -248,6 +268,57 @@ class Program:
             factor = slope(x, value) if value.is_finite() else NAN
             by[k] = [None if u is None else factor * u for u in by[a]]
         return [[ZERO if u is None else u for u in by[k]] for k in self.out]
+
+    def bend(self, inputs: list[Arb]) -> tuple[Arb, Arb, Arb]:
+        """Enclose the one result, its derivative by x0 and the second; nan where a kink or a jump may lie.
+
+        Finite ones are so only where the formula is twice differentiable on the balls of the inputs.
+        """
+        balls = self.known.copy()
+        by: list[tuple[Arb, Arb] | None] = [None] * len(balls)  # None where x0 does not matter
+        for k, j in self.inputs:
+            balls[k], by[k] = inputs[j], (ONE, ZERO) if j == 0 else None
+        for k, function, a, b in self.steps:
+            word, _, exponent = self.formulas.operations[k]
+            x = balls[a]
+            value = balls[k] = function(x) if b < 0 else function(x, balls[b])
+            own = by[a] if b < 0 else by[a] or by[b]
+            if own is None:
+                continue
+            if not value.is_finite():
+                by[k] = NAN, NAN
+            elif b >= 0:
+                by[k] = bend_of_two(
+                    word, (x, *(by[a] or (ZERO, ZERO))), (balls[b], *(by[b] or (ZERO, ZERO))), value
+                )
+            else:
+                power_of = word == "pow"
+                slope = slope_of_power(exponent, x, value) if power_of else UNARY[word][1](x, value)
+                second = bend_of_power(exponent, x, value) if power_of else BENDS[word](x, value)
+                by[k] = slope * own[0], second * own[0] * own[0] + slope * own[1]
+        k = self.out[0]
+        return balls[k], *(by[k] or (ZERO, ZERO))
+
+
+Jet = tuple[Arb, Arb, Arb]  # a value, its derivative and the second
+
+
+def bend_of_two(word: str, x: Jet, y: Jet, value: Arb) -> tuple[Arb, Arb]:
+    """Return the two derivatives of an operation on two numbers."""
+    (x0, x1, x2), (y0, y1, y2) = x, y
+    if word in ("add", "sub"):
+        return (x1 + y1, x2 + y2) if word == "add" else (x1 - y1, x2 - y2)
+    if word == "mul":
+        return x1 * y0 + x0 * y1, x2 * y0 + 2 * x1 * y1 + x0 * y2
+    if word == "div":
+        slope = (x1 - value * y1) / y0
+        return slope, (x2 - 2 * slope * y1 - value * y2) / y0
+    if word in ("min", "max"):
+        first = (x0 - y0 > 0) == (word == "max") if x0 - y0 > 0 or x0 - y0 < 0 else None
+        return (NAN, NAN) if first is None else (x1, x2) if first else (y1, y2)
+    whole = y0 * y0 + x0 * x0 if y0 > 0 or x0 > 0 or x0 < 0 else NAN  # atan2 of x, y: not on its cut
+    slope = (x1 * y0 - x0 * y1) / whole
+    return slope, (x2 * y0 - x0 * y2 - slope * 2 * (x0 * x1 + y0 * y1)) / whole
 
 
 def summed(first: Arb, u: Arb | None, second: Arb, v: Arb | None) -> Arb | None:

@@ -43,7 +43,29 @@ from limitsets.systems.maps import kind_of
 from limitsets.systems.sets.basin import passing
 
 # Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
-OF_SLOPES = ("all-cycles", "almost-every", "converges", "cycles", "expanding")
+OF_SLOPES = ("all-cycles", "almost-every", "average", "converges", "cycles", "expanding")
+
+
+@dataclass(frozen=True, eq=False)
+class Average:
+    """The average of a function along orbits, between two numbers on each attracting component.
+
+    Attributes
+    ----------
+    section : dict
+        The claim as a certificate has it: `of`, `components`, `lower` and `upper` (floats in hexadecimal).
+    arrays : dict of str to ndarray
+        ``average.upper``, ``average.lower`` (u of both ends), ``average.weight`` (w), ``average.runs``.
+    """
+
+    section: dict[str, Any]
+    arrays: Arrays
+
+    @property
+    def bounds(self) -> dict[int, tuple[float, float]]:
+        """By component the least and the largest number that the average of almost every start there can tend to."""
+        columns = (self.section[key] for key in ("components", "lower", "upper"))
+        return {k: (float.fromhex(lo), float.fromhex(hi)) for k, lo, hi in zip(*columns, strict=True)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +91,8 @@ class ProofOfMap(Saved):
     final : ndarray of int32, shape (n_cells,), or None
         If "converges" was asked for: the cells whose orbits tend to the first cycle with a ball (0), the second (1)
         and so on, -1 elsewhere.
+    average : Average or None
+        If `limitsets.average` was asked: the bounds, and the numbers that prove them.
     """
 
     map: Any
@@ -80,6 +104,7 @@ class ProofOfMap(Saved):
     seconds: float
     goal: GoalOfMap | None = None
     final: NDArray[np.int32] | None = None
+    average: Average | None = None
 
     @property
     def proved(self) -> bool:
@@ -137,7 +162,8 @@ class ProofOfMap(Saved):
     def denied(self, claims: Mapping[str, str]) -> ProofOfMap:
         """Return the proof where the checker denies some claims: these are undecided."""
         cycles = () if "cycles" in claims else self.cycles
-        return replace(self, claims=left_of(self.claims, claims), cycles=cycles)
+        average = None if "average" in claims else self.average
+        return replace(self, claims=left_of(self.claims, claims), cycles=cycles, average=average)
 
     def part(self) -> Part:
         """Give what a certificate holds of this box of parameters; a refuted goal stands by itself."""
@@ -160,6 +186,8 @@ class ProofOfMap(Saved):
             arrays = (
                 arrays | {"weight": np.asarray(self.weights)} | targets_beyond(arrays, self._images, thin)
             )
+        if "average" in claims and self.average is not None:
+            arrays = arrays | self.average.arrays
         return Part((self.map, self.upper), claims, arrays)
 
     def functions(self, claim: str) -> str:
@@ -204,6 +232,8 @@ class ProofOfMap(Saved):
                 share = f"{math.floor(1000 * each.section['share']) / 10} % of it"
                 out = CellSet(self.graph.grid, self.exits >= 0)
                 tables.append(_region(out, "Leaving cells", f"{within}; {share}"))
+        if self.average is not None:
+            tables.append(_average_table(self.average))
         if not len(self.cells):
             return tuple(tables)
         kind = "no image leads out" if self.final is None else "no image leads out, or orbits tend to a cycle"
@@ -238,6 +268,16 @@ def _cycle_table(cycles: tuple[CycleOfMap, ...]) -> Table:
     return Table(
         ("period", "side", *spans, "kind"), rows, "Periodic orbits", "proved: each by one of its points"
     )
+
+
+def _average_table(average: Average) -> Table:
+    """Say between which numbers the average lies on each component."""
+    kinds = {"lyapunov": "the Lyapunov exponent, ln |dx'/dx|", "share": "the share of steps in the places"}
+    what = kinds.get(next(iter(average.section["of"])), "the function")
+    rows = [(component, *ends) for component, ends in average.bounds.items()]
+    ends = (Column("lo", show=".12g"), Column("hi", show=".12g"))
+    said = "proved: of almost every start in the component, and of every invariant density"
+    return Table(("component", *ends), rows, f"Average of {what}", said)
 
 
 def _region(cells: CellSet, caption: str, proved: str, note: str = "") -> Table:

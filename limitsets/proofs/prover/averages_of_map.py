@@ -1,0 +1,537 @@
+"""The average of a function along almost every orbit of an expanding map on a line: what the checker confirms.
+
+docs/certificates.md, "Certificates of any map", the claim `average`, and limitsets/checker/map_average.py, which has
+the theorem: numbers u and w by cell that satisfy two inequalities on every cell prove the bound c.  Nothing in the
+proof depends on how they are found.  Here, in floats: u by relative value iteration (White, "Dynamic programming,
+Markov chains, and the method of successive approximations", 1963, with half steps), w from below; the terms of w enter
+the function that is averaged, and both are found anew until c stays.  What is found is proved once the checker, which
+shares no code with this, has confirmed it.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from limitsets.base import AnswerError, Progress, arguments_checked, shown, shown_in_notebooks
+from limitsets.base.arrays import Array, Ints, Mask
+from limitsets.proofs.prover.certificate import DeniedError
+from limitsets.proofs.prover.certificate_of_map import IMPOSSIBLE, OF_SIZE, hexed
+from limitsets.proofs.prover.of_map import certify_map
+from limitsets.proofs.prover.programs import evaluate
+from limitsets.proofs.prover.proof import Claim, undecided
+from limitsets.proofs.prover.proof_of_map import Average, ProofOfMap
+from limitsets.proofs.prover.recording import names_of, recorded
+from limitsets.systems.cells import Grid
+from limitsets.systems.maps import coerce, images, kind_of
+from limitsets.systems.maps.contract import between
+from limitsets.systems.maps.critical import margins
+from limitsets.systems.maps.derived import branch_boxes
+
+# Steps of an iteration; by how much the span of its changes is smaller each time, and after how many times without a
+# nearer bound there are no more.
+STEPS, LESS_SPAN, WORSE = 20_000, 0.7, 6
+# Runs beside a change of branch are this share of the cells of a component; half of that where there is no w.
+RUN = 0.25
+# By how much s, D and what remains between the bounds are larger than floats give: the checker's are wider by less.
+WIDER, WIDEST = 1.02, (0.02, 0.2, 2.0)
+LEAST_S, ROUNDED = 2.0**-60, 1e-11
+# Half the width of a cell that holds a change, as a share of its side; and steps that find it.
+TINY, BISECTIONS = 2.0**-40, 60
+
+
+# ---------------------------------------------------------------- what is averaged
+
+
+class Observable(NamedTuple):
+    """A function that is averaged: as a certificate names it, its values at places of a side, and its kind."""
+
+    section: dict[str, Any]
+    values: Callable[[Array, int, Array], Array]  # of places, side and the slope there
+
+
+@np.errstate(divide="ignore")  # a slope of 0, where nothing is proved
+def _logarithm(_: Array, __: int, slope: Array) -> Array:
+    return np.asarray(np.log(np.abs(slope)))
+
+
+def observable_of(of: Any, params: Any) -> Observable:
+    """Read what is averaged: the word "lyapunov", boxes whose share of time is asked for, or a function of x."""
+    if of == "lyapunov":
+        return Observable({"lyapunov": True}, _logarithm)
+    if callable(of):
+        program = recorded(lambda _, x, __: of(x), params, 1, 0)
+        numbers = dict(names_of(params))
+        formula = {key: program[key] for key in ("ops", "out")}
+        return Observable(
+            {"formula": formula}, lambda x, _, __: np.asarray(evaluate(program, x[:, None], numbers)[:, 0])
+        )
+    try:
+        boxes = {0: of} if not isinstance(of, dict) else of
+        spans = [(int(side), float(lo), float(hi)) for side, listed in boxes.items() for lo, hi in listed]
+    except (TypeError, ValueError):
+        spans = []
+    if not spans or not all(lo < hi for _, lo, hi in spans):
+        allowed = '"lyapunov", a function of x, or ranges [(lo, hi)] whose share of time is asked for'
+        raise AnswerError("the function to average", shown(of), allowed, 'pass "lyapunov"')
+    listed = [{"side": side, "box": hexed(np.array([[lo, hi]]))} for side, lo, hi in spans]
+
+    def share(x: Array, side: int, _: Array) -> Array:
+        inside = [(lo <= x) & (x <= hi) for s, lo, hi in spans if s == side]
+        return np.asarray(np.any([np.zeros(x.size, dtype=bool), *inside], axis=0), dtype=np.float64)
+
+    return Observable({"share": listed}, share)
+
+
+# ---------------------------------------------------------------- cells that hold a change of branch
+
+
+def cut_at_changes(lower: Any, upper: Any, grid: Grid) -> Grid:
+    """Cut the cells of a line so that changes of branch lie in very small ones, where an inequality loses nothing."""
+    edges = []
+    for side, (borders,) in enumerate(grid.edges):
+        tiny = TINY * (borders[-1] - borders[0])
+        first, last = (_changes_at(params, grid, side) for params in (lower, upper))
+        if len(first) != len(last):  # changes come and go between the corners
+            edges.append((borders,))
+            continue
+        for lo, hi in zip(np.minimum(first, last) - tiny, np.maximum(first, last) + tiny, strict=True):
+            if borders[0] + tiny < lo and hi < borders[-1] - tiny:  # else f begins or ends on the seam
+                kept = (borders < lo - tiny) | (borders > hi + tiny)
+                borders = np.sort(np.concatenate([borders[kept], [lo, hi]]))
+        edges.append((borders,))
+    return Grid(grid.domain, tuple(edges))
+
+
+def _changes_at(params: Any, grid: Grid, side: int) -> Array:
+    """Find where the branch changes between borders of cells, or the image passes the seam of an axis that closes."""
+    borders, first = grid.edges[side][0], grid.domain.lo[side, 0]
+    period = grid.domain.hi[side, 0] - first
+
+    def level(x: Array) -> Array:
+        if kind_of(params).has_margin:
+            return np.asarray(margins(params, x, side) > 0.0, dtype=np.float64)
+        after = images(params, x, side).x.ravel()
+        return np.floor((after - first) / period) if grid.domain.closes else np.zeros(x.size)
+
+    at = level(borders)
+    k = np.flatnonzero(at[1:] != at[:-1])
+    lo, hi, below = borders[k], borders[k + 1], at[k]
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (lo + hi)
+        same = level(middle) == below
+        lo, hi = np.where(same, middle, lo), np.where(same, hi, middle)
+    return np.asarray(np.sort(0.5 * (lo + hi)))
+
+
+# ---------------------------------------------------------------- cells in floats
+
+
+class Steps(NamedTuple):
+    """Cells of one component on their branches, one row each; and the cells that each image meets, one row each."""
+
+    cell: Ints
+    way: Ints  # of an undecided cell 0 below its change, 1 above
+    least: Array  # slope
+    bend: Array  # |f''|/f'^2
+    mean: Array  # of the function, its least and its largest value
+    low: Array
+    high: Array
+    length: Array  # of the image
+    begin: Ints  # first row of the cells met; they follow one another
+    met: Ints
+    part: Array  # of the image in each
+
+
+def _steps(proof: ProofOfMap, own: Mask, undecided: Mask, observable: Observable) -> Steps:
+    """Find what the inequalities need of the cells of a component."""
+    grid, branches = proof.graph.grid, sum(name.startswith("target.") for name in proof.arrays)
+    parts, met, part, begin = [], [], [], 0
+    for side, branch in np.ndindex(grid.sides, branches):
+        target = proof.arrays[f"target.{branch}"]
+        mine = np.flatnonzero(
+            own & (target[:, 0] != IMPOSSIBLE) & (grid.side_of(np.arange(grid.n_cells)) == side)
+        )
+        if not mine.size:
+            continue
+        lo, hi = grid.boxes(mine, side)
+
+        def at(x: Array, y: Array, side: int = side, branch: int = branch) -> tuple[Array, Array]:
+            boxes = branch_boxes(proof.map, proof.upper, side, branch, x, y)
+            slopes = 0.5 * (boxes.slope_lo + boxes.slope_hi)[:, 0, 0]
+            return 0.5 * (boxes.lo + boxes.hi)[:, 0], slopes
+
+        whole = branch_boxes(proof.map, proof.upper, side, branch, lo, hi)
+        low, high = whole.slope_lo[:, 0, 0], whole.slope_hi[:, 0, 0]
+        least = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
+        (first, slope_first), (last, slope_last) = at(lo, lo), at(hi, hi)
+        middle = 0.5 * (lo + hi)
+        values = [
+            observable.values(x[:, 0], side, slope)
+            for x, slope in ((lo, slope_first), (middle, at(middle, middle)[1]), (hi, slope_last))
+        ]
+        width = (hi - lo)[:, 0]
+        bend = np.abs(slope_last - slope_first) / width / np.maximum(least, LEAST_S) ** 2
+        bend = WIDER * np.maximum.reduce([bend, np.roll(bend, 1), np.roll(bend, -1)])
+        to, edges = int(grid.offset[whole.side]), grid.edges[whole.side][0]
+        ends, covered = np.sort(np.stack([first, last]), axis=0), target[mine].T.astype(np.int64)
+        rows = np.arange(mine.size)
+        way = np.zeros(mine.size, np.int64)
+        if grid.domain.closes:
+            ends, covered, rows, way = _cut_at_seam(edges, ends, slope_first > 0.0)
+            undecided[mine[rows[mine.size :]]] = True
+        # of a cell with two branches the checker takes the neighbours of the target cells too
+        beyond = np.clip(np.add(covered, [[-1], [1]]), 0, edges.size - 2)
+        covered = np.where(undecided[mine[rows]] & own[to + beyond], beyond, covered)
+        sizes = covered[1] - covered[0] + 1
+        row = np.repeat(np.arange(rows.size), sizes)
+        k = np.arange(row.size) - np.repeat(np.cumsum(sizes) - sizes, sizes) + covered[0][row]
+        inside = np.minimum(edges[k + 1], ends[1, row]) - np.maximum(edges[k], ends[0, row])
+        begins = begin + np.cumsum(sizes) - sizes
+        if branches > 1 and undecided[mine].any():
+            way[undecided[mine]] = _ways(proof, mine[undecided[mine]], side, branch)
+        alike = (least, bend, values[1], np.minimum.reduce(values), np.maximum.reduce(values))
+        parts.append((mine[rows], way, *(each[rows] for each in alike), ends[1] - ends[0], begins))
+        met.append(to + k)
+        part.append(np.maximum(inside, 0.0))
+        begin += row.size
+    columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    return Steps(*(*columns, np.concatenate(met), np.concatenate(part)))
+
+
+def _cut_at_seam(edges: Array, ends: Array, rises: Mask) -> tuple[Array, Ints, Ints, Ints]:
+    """Turn images to the first period; those that pass the seam, an end of the cells, have two rows."""
+    period = edges[-1] - edges[0]
+    ends = ends - np.floor((ends.mean(axis=0) - edges[0]) / period) * period
+    ends += np.where(ends[0] < edges[0], period, 0.0)
+    passes = np.flatnonzero(ends[1] > edges[-1])
+    below, above = np.minimum(ends, edges[-1]), np.maximum(ends[:, passes] - period, edges[0])
+    ends = np.concatenate([below, above], axis=1)
+    way = np.concatenate([np.zeros(rises.size, np.int64), rises[passes].astype(np.int64)])
+    way[passes] = 1 - way[rises.size :]
+    # an image that ends on a border meets the neighbour too
+    slack = OF_SIZE * (np.abs(edges[0]) + period)
+    first = np.searchsorted(edges, ends[0] - slack, "left") - 1
+    last = np.searchsorted(edges, ends[1] + slack, "right") - 1
+    first, last = (np.clip(each, 0, edges.size - 2) for each in (first, last))
+    return ends, np.stack([first, last]), np.concatenate([np.arange(rises.size), passes]), way
+
+
+def _ways(proof: ProofOfMap, cells: Ints, side: int, branch: int) -> Ints:
+    """Say of cells with two branches on which side of the change a branch is taken: 0 below, 1 above."""
+    lo, hi = proof.graph.grid.boxes(cells, side)
+    middle = between(proof.map, proof.upper)
+    rising = margins(middle, hi[:, 0], side) > margins(middle, lo[:, 0], side)
+    return np.where(rising, branch, 1 - branch)
+
+
+class Change(NamedTuple):
+    """One side of a change of branch: the row of its undecided cell, and the cells beside it, nearest first."""
+
+    row: int
+    beside: Ints
+
+
+def _changes(grid: Grid, own: Mask, steps: Steps, undecided: Mask) -> list[Change] | str:
+    """List the sides of the changes of branch by undecided cell: below, then above; or say what is missing."""
+    listed = list[Change]()
+    row_of = {
+        (c, way): k for k, (c, way) in enumerate(zip(steps.cell.tolist(), steps.way.tolist(), strict=True))
+    }
+    for cell in np.flatnonzero(undecided).tolist():
+        borders = grid.of_side(int(grid.side_of(np.array([cell]))[0]))
+        for way, cells in enumerate(
+            (np.arange(cell - 1, borders.start - 1, -1), np.arange(cell + 1, borders.stop))
+        ):
+            stop = np.flatnonzero(~own[cells])
+            cells = cells[: stop[0]] if stop.size else cells
+            if not cells.size:
+                return f"no cell of the attractor lies beside cell {cell}, in which the branch changes"
+            listed.append(Change(row_of[cell, way], cells))
+    return listed
+
+
+# ---------------------------------------------------------------- u and w
+
+
+@dataclass
+class Search:
+    """Steps of one component, and the two operators on functions by cell."""
+
+    steps: Steps
+    undecided: Mask
+    width: Array
+    changes: list[Change]
+    runs: list[int]
+
+    def _by_cell(self, rows: Array, reduce: Any, empty: float) -> Array:
+        out = np.full(self.width.size, empty)
+        reduce.at(out, self.steps.cell, rows)
+        return out
+
+    def largest(self, values: Array) -> Array:
+        """Return by step the largest value that its image meets."""
+        return np.asarray(np.maximum.reduceat(values[self.steps.met], self.steps.begin))
+
+    def after(self, u: Array, sign: float) -> Array:
+        """Bound by cell the mean of sign g + u after a step."""
+        steps, both = self.steps, self.undecided[self.steps.cell]
+        mean = np.add.reduceat(u[steps.met] * steps.part, steps.begin) / np.maximum(steps.length, 1e-300)
+        of_g = sign * steps.mean
+        if both.any():
+            largest = self._by_cell(np.maximum(sign * steps.low, sign * steps.high), np.maximum, -np.inf)
+            of_u = self._by_cell(self.largest(u), np.maximum, -np.inf)
+            return self._by_cell(
+                np.where(both, (largest + of_u)[steps.cell], of_g + mean), np.maximum, -np.inf
+            )
+        return self._by_cell(of_g + mean, np.maximum, -np.inf)
+
+    def slack(self, u: Array) -> tuple[Array, Array]:
+        """Bound by cell the integrals s, and by how much the mean of u over an image is off."""
+        steps = self.steps
+        mean = np.add.reduceat(u[steps.met] * steps.part, steps.begin) / np.maximum(steps.length, 1e-300)
+        sizes = np.diff(np.append(steps.begin, steps.met.size))
+        partial = np.cumsum((u[steps.met] - np.repeat(mean, sizes)) * steps.part)
+        partial -= np.repeat(
+            partial[steps.begin] - (u[steps.met[steps.begin]] - mean) * steps.part[steps.begin], sizes
+        )
+        r = np.maximum.reduceat(np.abs(partial), steps.begin)
+        wide, spread = self.width[steps.cell], steps.high - steps.low
+        s = self._by_cell(
+            r * (1.0 / steps.least + 2.0 * wide * steps.bend) + wide * spread / 4.0, np.maximum, 0.0
+        )
+        off = self._by_cell(steps.bend * r, np.maximum, 0.0)
+        apart = sum(  # of the function and of u, over both sides of a change
+            self._by_cell(high, np.maximum, -np.inf) + self._by_cell(-low, np.maximum, -np.inf)
+            for low, high in ((steps.low, steps.high), (-self.largest(-u), self.largest(u)))
+        )
+        s = np.where(self.undecided, self.width * apart / 4.0, s)
+        return WIDER * s + LEAST_S, np.where(self.undecided, 0.0, off)
+
+    def terms(self, w: Array) -> tuple[Array, Array]:
+        """Return by cell what w adds to the inequality of variations, and to that of means."""
+        steps, largest = self.steps, self.largest(w)
+        widest = self._by_cell(largest, np.maximum, 0.0)
+        of_a = widest / self._by_cell(steps.least, np.minimum, np.inf)
+        of_b = widest * self._by_cell(steps.bend, np.maximum, 0.0)
+        for change, count in zip(self.changes, self.runs, strict=True):
+            cells = change.beside[:count]
+            jump, widths = largest[change.row] / steps.least[change.row], self.width[cells]
+            length = widths.sum()
+            of_a[cells] += jump * np.cumsum(widths[::-1])[::-1] / length
+            of_a[steps.cell[change.row]] += jump
+            of_b[cells] += jump / length
+        return of_a, of_b
+
+    def weights(self, s: Array) -> Array | None:
+        """Find w from below, with room for the checker; None where there is none."""
+        w, room = s.copy(), 0.05 * s
+        for _ in range(STEPS):
+            after = (s + room + self.terms(w)[0]) * (1.0 + 2.0 * ROUNDED)
+            if not np.isfinite(after).all() or after.max() > 1e12 * s.max():
+                return None
+            if (after - w <= 0.8 * room + ROUNDED * w).all():
+                return w
+            w = after
+        return None
+
+    def iterated(self, u: Array, sign: float, more: Array, span: float) -> Array:
+        """Find u by relative value iteration of sign g + more, until what it brings spans no more than that."""
+        for _ in range(STEPS):
+            change = self.after(u, sign) + more - u
+            low, high = float(change.min()), float(change.max())
+            if high - low <= max(span, 1e-13 * float(np.abs(u).max())):
+                break
+            u = u + 0.5 * change
+            u -= u.mean()
+        return u
+
+
+class Bounds(NamedTuple):
+    """Numbers by cell that prove two bounds: u of the upper end and of the lower end, w."""
+
+    upper: Array
+    lower: Array
+    weight: Array
+    low: float
+    high: float
+
+
+def _found(search: Search) -> Bounds | str:
+    """Find u of both ends, w, and the two bounds; or say what is missing.
+
+    More steps of the iteration leave less of g, and make u rougher, which asks for larger w: the best is between.
+    """
+    count, best = search.width.size, None
+    u, more = [np.zeros(count), np.zeros(count)], [np.zeros(count), np.zeros(count)]
+    span, worse = float(search.steps.high.max() - search.steps.low.min()) + 1e-12, 0
+    while worse < WORSE and span > 1e-15:
+        u = [
+            search.iterated(each, sign, off, span)
+            for each, sign, off in zip(u, (1.0, -1.0), more, strict=True)
+        ]
+        slack = [search.slack(each) for each in u]
+        w = search.weights(np.maximum(slack[0][0], slack[1][0]))
+        if w is not None:
+            of_b = search.terms(w)[1]
+            more = [off + of_b for _, off in slack]
+            high, low = (
+                float((search.after(each, sign) + off - each).max())
+                for each, sign, off in zip(u, (1.0, -1.0), more, strict=True)
+            )
+            now = Bounds(u[0], u[1], w, -low, high)
+            worse = 0 if best is None or high + low < best.high - best.low else worse + 1
+            best = now if worse == 0 else best
+        elif best is None:  # u becomes rougher from here on
+            return "the inequality of variations has no solution"
+        span *= LESS_SPAN
+    assert best is not None  # the first step gives one, or ends the search
+    return best
+
+
+def _on_component(proof: ProofOfMap, own: Mask, observable: Observable) -> tuple[list[int], Bounds | str]:
+    """Search on one component, with shorter runs where longer ones have no solution."""
+    grid, number = proof.graph.grid, np.cumsum(own) - 1
+    possible = [each[:, 0] != IMPOSSIBLE for name, each in proof.arrays.items() if name.startswith("target.")]
+    undecided = own & (np.sum(possible, axis=0) > 1)
+    steps = _steps(proof, own, undecided, observable)
+    if not (steps.least > 0.0).all() or not np.isfinite(steps.bend).all():
+        cell = int(steps.cell[np.argmin(np.where(np.isfinite(steps.bend), steps.least, -1.0))])
+        return [], f"the slope may be 0 or jump at cell {cell}"
+    changes = _changes(grid, own, steps, undecided)
+    if isinstance(changes, str):
+        return [], changes
+    local = steps._replace(cell=number[steps.cell], met=number[steps.met])
+    changes = [change._replace(beside=number[change.beside]) for change in changes]
+    longest = int(own.sum()) * RUN
+    while True:
+        runs = [max(1, min(change.beside.size, int(longest))) for change in changes]
+        answer = _found(Search(local, undecided[own], grid.measure[own], changes, runs))
+        if not isinstance(answer, str) or longest < 1.0:
+            return runs, answer
+        longest /= 2.0
+
+
+# ---------------------------------------------------------------- the answer
+
+
+def _average(proof: ProofOfMap, observable: Observable, share: float) -> Average | str:
+    """Find the numbers of all components, with bounds that are wider by a share; or say what is missing."""
+    grid, component = proof.graph.grid, proof.arrays["component"]
+    upper, lower, weight = np.zeros((3, grid.n_cells))
+    runs, columns = list[tuple[int, int]](), list[tuple[int, str, str]]()
+    for number in range(int(component.max()) + 1):
+        own = component == number
+        beside, found = _on_component(proof, own, observable)
+        if isinstance(found, str):
+            return found
+        upper[own], lower[own], weight[own], low, high = found
+        runs += list(zip(beside[::2], beside[1::2], strict=True))
+        wide = share * (high - low) + 2.0**-42 * (
+            max(abs(low), abs(high), 1.0) + float(np.abs([upper[own], lower[own]]).max())
+        )
+        columns.append((number, (low - wide).hex(), (high + wide).hex()))
+    components, lower_ends, upper_ends = (list(column) for column in zip(*columns, strict=True))
+    section = {"of": observable.section, "components": components, "lower": lower_ends, "upper": upper_ends}
+    arrays = {"average.upper": upper, "average.lower": lower, "average.weight": weight}
+    return Average(section, arrays | {"average.runs": np.array(runs, np.int32).reshape(len(runs), 2)})
+
+
+UNSOLVED = (
+    "{reason}: an average is proved where steps stretch: no cycle that attracts or is neutral, no slope 0, no change of"
+    " branch that comes back to its own side too soon; finer cells may help"
+)
+
+
+def averaged(proof: ProofOfMap, of: Any) -> ProofOfMap:
+    """Prove between which numbers the average of a function lies, as the checker confirms it; the claim `average`."""
+    observable = observable_of(of, proof.map)
+    if not len(proof.cells):
+        return replace(proof, claims=(undecided("average", "there are no attracting cells"),))
+    reason = ""
+    for share in WIDEST:
+        average = _average(proof, observable, share)
+        if isinstance(average, str):
+            return replace(proof, claims=(undecided("average", UNSOLVED.format(reason=average)),))
+        claim = Claim("average", "proved", "", average.section)
+        answer = replace(proof, claims=(*proof.claims, claim), average=average)
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                answer.save(Path(folder) / "average.proof.zip")
+            except DeniedError as error:
+                reason = error.claims.get("average", "")
+            else:
+                return answer
+    return replace(proof, claims=(undecided("average", f"the checker does not confirm it: {reason}"),))
+
+
+@shown_in_notebooks
+@arguments_checked
+def average(
+    map: Any,  # noqa: A002  # the field's word
+    grid: Grid | None = None,
+    of: Any = "lyapunov",
+    *,
+    upper: Any = None,
+    progress: Progress | None = None,
+) -> ProofOfMap:
+    """Prove between which numbers the average of a function along almost every orbit lies.
+
+    For a map of a line whose steps stretch distances, on average.  For almost every start in an attracting component
+    the average of the function over n steps converges, to a number between the two; so does its mean over every
+    invariant density.  Single starts, such as those on a periodic orbit, may have other averages.
+
+    Parameters
+    ----------
+    map : NamedTuple
+        A map of one coordinate, or the lower corner of a box of its parameters.  Kinks and jumps of its formulas have
+        to be changes between its two branches, ``limitsets.map(pieces=(f, g), margin=m)``, or where the image passes
+        the seam of an axis that closes: ``b * x`` on ``limitsets.grid([(0, 1)], cells=1000, periodic=True)`` is b x
+        modulo 1.
+    grid : Grid
+        The cells: the bounds come nearer as 1/cells.
+    of : "lyapunov", callable or sequence of (float, float)
+        What is averaged: "lyapunov" for ln |dx'/dx|, a function of x, or ranges of x for the share of steps that are
+        in them (a dict gives ranges by side).
+    upper : NamedTuple, optional
+        The upper corner of the parameters; the bounds hold for every fixed value between.
+    progress : callable, optional
+        Called with the step, how much of it is done, and of how much.
+
+    Returns
+    -------
+    ProofOfMap
+        With the claim `average`; its `average.bounds` has by component the two numbers, where it is proved.
+
+    Raises
+    ------
+    AnswerError
+        For a scene, a map of more coordinates, or what is none of these functions.
+
+    Examples
+    --------
+    >>> import math
+    >>> import limitsets as ls
+    >>> def stretched(x, b): return b * x  # modulo 1
+    >>> circle = ls.grid([(0.0, 1.0)], cells=200, periodic=True)
+    >>> proof = ls.average(ls.map(stretched, b=2.6), circle)
+    >>> lo, hi = proof.average.bounds[0]
+    >>> lo < math.log(2.6) < hi, hi - lo < 1e-9
+    (True, True)
+    """
+    if not isinstance(map, tuple):
+        way = "make one with limitsets.map; of a scene limitsets.noise_statistics samples such numbers"
+        raise AnswerError("the map of an average", shown(map), "a map of a line, and no scene", way)
+    if grid is None:
+        way = "limitsets.average(map, limitsets.grid([(lo, hi)], cells=1000))"
+        raise AnswerError("the grid of an average", None, "the cells to prove it on", f"pass {way}")
+    if grid.dimension != 1:
+        raise AnswerError("the grid of an average", f"{grid.dimension} axes", "one", "averages are of a line")
+    corners = coerce(map), coerce(map if upper is None else upper)
+    cells = cut_at_changes(*corners, grid)
+    return averaged(certify_map(map, cells, ["invariant"], upper=upper, progress=progress), of)

@@ -1,0 +1,324 @@
+"""Averages along almost every orbit: known answers, sampled averages, files that are forged, maps without an answer."""
+
+import math
+
+import numpy as np
+import pytest
+
+import limitsets as ls
+from limitsets.base.errors import AnswerError
+from limitsets.checker.map_average import LEAST_WEIGHT
+from tests.proofs.forge import opened
+
+GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
+
+
+def stretched(x, b):
+    return b * x
+
+
+def lanford(x):
+    return 2.0 * x + x * (1.0 - x) / 2.0
+
+
+def rising(x, b):
+    return b * x
+
+
+def falling(x, b):
+    return b * (1.0 - x)
+
+
+def half(x, b):
+    return x - 0.5
+
+
+def place(x):
+    return x
+
+
+def tent(b):
+    return ls.map(pieces=(rising, falling), margin=half, b=b)
+
+
+def circle(cells):
+    return ls.grid([(0.0, 1.0)], cells=cells, periodic=True)
+
+
+def line(cells):
+    return ls.grid([(0.0, 1.0)], cells=cells)
+
+
+def bounds(proof):
+    assert proof.average is not None, proof.claims[0].reason
+    ((lo, hi),) = proof.average.bounds.values()
+    return lo, hi
+
+
+# Densities are constant for the doubling map and on the two intervals between the orbit of 1/2 of the golden tent; that
+# of x -> b x mod 1 is (b^2 + b/2) / (...) on two steps (Renyi, Acta Math. Hung. 8, 1957); Lanford's exponent is printed
+# by Galatolo and Nisoli (SIAM J. Appl. Dyn. Syst. 13, 2014).
+KNOWN = {
+    "doubling, mean": (ls.map(stretched, b=2.0), circle, place, 0.5, 2e-3),
+    "doubling, exponent": (ls.map(stretched, b=2.0), circle, "lyapunov", math.log(2.0), 1e-11),
+    "doubling, share": (ls.map(stretched, b=2.0), circle, [(0.25, 0.5)], 0.25, 5e-3),
+    "golden mean, mean": (ls.map(stretched, b=GOLDEN), circle, place, 1.0 / math.sqrt(5.0), 5e-3),
+    "golden tent, mean": (tent(GOLDEN), line, place, 0.5854101966249684, 1e-3),
+    "tent of 1.7, exponent": (tent(1.7), line, "lyapunov", math.log(1.7), 1e-11),
+    "Lanford's map, exponent": (ls.map(lanford), circle, "lyapunov", 0.6576617800, 2e-3),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_averages_that_are_known(name, tmp_path):
+    params, grid, of, known, width = KNOWN[name]
+    proof = ls.average(params, grid(1000), of)
+    lo, hi = bounds(proof)
+    assert lo < known < hi
+    assert hi - lo < width
+    proof.save(tmp_path / "own.proof.zip")
+    report = ls.recheck(tmp_path / "own.proof.zip")
+    assert report.verdict == "proved"
+    said = f"converges to a number from {lo!r} to {hi!r}; means over invariant densities lie there too"
+    assert report.statement[-1].endswith(said)
+    assert f"{lo:.12g}" in str(proof)
+
+
+def test_bounds_come_nearer_with_the_cells():
+    widths = [np.diff(bounds(ls.average(tent(GOLDEN), line(cells), place)))[0] for cells in (500, 4000)]
+    assert widths[1] < 0.2 * widths[0]
+
+
+def test_the_mean_of_the_golden_tent_by_its_density():
+    """The points a < 1/2 < t of the orbit of 1/2 cut the attractor: [a, 1/2] goes onto [1/2, t], and that onto both."""
+    t = GOLDEN / 2.0
+    a = GOLDEN * (1.0 - t)
+    assert GOLDEN * a == pytest.approx(0.5)
+    low, high = 0.5 - a, t - 0.5
+    share = low / (low + high)  # of the mass of the upper interval that goes to the lower one
+    mass = np.array([share, 1.0]) / (1.0 + share)
+    mean = mass @ np.array([(a + 0.5) / 2.0, (0.5 + t) / 2.0])
+    assert mean == pytest.approx(KNOWN["golden tent, mean"][3], abs=1e-12)
+
+
+def sampled(step, of, seeds, throws=4000):
+    """The mean over orbits from random places, and its standard error; rounding keeps it off unstable cycles."""
+    random = np.random.default_rng(5)
+    x = random.uniform(0.2, 0.8, seeds)
+    total = np.zeros(seeds)
+    for k in range(throws + 100):
+        x = np.clip(step(x) + random.uniform(-1e-13, 1e-13, seeds), 0.0, 1.0)
+        total += of(x) if k >= 100 else 0.0
+    means = total / throws
+    return means.mean(), means.std() / math.sqrt(seeds)
+
+
+def bent(x, left, bend):
+    return left * x + bend * x * x
+
+
+def back(x, left, bend, right, top):
+    return top - right * (x - 0.5) - bend * (x - 0.5) * (x - 0.5)
+
+
+def ready(x):
+    return x - 0.5
+
+
+def first_piece(x, left, bend, right, top):
+    return bent(x, left, bend)
+
+
+def second_piece(x, left, bend, right, top):
+    return back(x, left, bend, right, top)
+
+
+def random_map(seed):
+    """A map of two bent pieces on [0, 1], which stretches by 1.5 at least."""
+    random = np.random.default_rng(seed)
+    bend = random.uniform(-0.1, 0.3)
+    left = random.uniform(1.65, 1.8)
+    top = random.uniform(0.85, 0.95)
+    right = random.uniform(1.5, 2.0 * top - 0.16)
+    return {"left": left, "bend": bend, "right": right, "top": top}
+
+
+def require_sampled_inside(seed):
+    values = random_map(seed)
+    params = ls.map(pieces=(first_piece, second_piece), margin=ready, **values)
+    lo, hi = bounds(ls.average(params, line(1500), place))
+
+    def step(x):
+        return np.where(x > 0.5, second_piece(x, **values), first_piece(x, **values))
+
+    mean, error = sampled(step, lambda x: x, 400)
+    assert lo - 6.0 * error < mean < hi + 6.0 * error
+    assert hi - lo < 0.1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sampled_averages_lie_inside(seed):
+    require_sampled_inside(seed)
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("seed", range(3, 40))
+def test_sampled_averages_of_many_maps_lie_inside(seed):
+    require_sampled_inside(seed)
+
+
+# ---------------------------------------------------------------- no answer
+
+
+def narrow(x, b):
+    return (x - 0.5) * (x - 0.5001) * (x - 0.5002)
+
+
+def neutral(x):
+    return x + 2.0 * x * x
+
+
+def flat(x, a):
+    return a * x * (1.0 - x)
+
+
+def jumps(x, b):
+    return b * x - np.floor(b * x)
+
+
+def kink(x, b):
+    return b * (0.5 - np.abs(x - 0.5))
+
+
+def stays(x):
+    return 0.5 * x + 0.25
+
+
+HOPELESS = {
+    "an attracting fixed point": (ls.map(stays), line, "the inequality of variations has no solution"),
+    "a neutral fixed point": (
+        ls.map(neutral),
+        circle,
+        "the inequality of variations has no solution",
+    ),
+    "a turning point with slope 0": (ls.map(flat, a=3.9), line, "the slope may be 0 or jump"),
+    "a kink inside a cell": (ls.map(kink, b=1.7), line, ""),
+    "a jump inside a cell": (ls.map(jumps, b=1.7), circle, "the slope may be 0 or jump"),
+    "three changes of branch in a cell": (
+        ls.map(pieces=(rising, falling), margin=narrow, b=1.7),
+        line,
+        "that it holds one change of branch at most is not proved",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HOPELESS)
+def test_no_average_is_proved_where_steps_do_not_stretch(name):
+    params, grid, why = HOPELESS[name]
+    proof = ls.average(params, grid(499), place)
+    assert proof.average is None
+    (claim,) = proof.claims
+    assert (claim.claim, claim.verdict) == ("average", "undecided")
+    assert why in claim.reason
+
+
+def test_what_cannot_be_averaged_is_refused():
+    plane = ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=8)
+    with pytest.raises(AnswerError, match="one"):
+        ls.average(tent(1.7), plane)
+    with pytest.raises(AnswerError, match="no scene"):
+        ls.average(ls.load("paper-designed"), line(64))
+    with pytest.raises(AnswerError, match="the grid of an average"):
+        ls.average(tent(1.7))
+    for of in ("mean", [(0.5, 0.2)], 3.0, [(0.1, 0.2, 0.3)]):
+        with pytest.raises(AnswerError, match="the function to average"):
+            ls.average(tent(1.7), line(64), of)
+
+
+# ---------------------------------------------------------------- forged
+
+
+@pytest.fixture(scope="module")
+def tent_file(tmp_path_factory):
+    file = tmp_path_factory.mktemp("average") / "tent.proof.zip"
+    ls.average(tent(GOLDEN), line(600), place).save(file)
+    return file
+
+
+def section(forged):
+    return next(c["section"] for c in forged.header["boxes"][0]["claims"] if c["claim"] == "average")
+
+
+def narrower(forged):
+    lo, hi = (float.fromhex(section(forged)[key][0]) for key in ("lower", "upper"))
+    section(forged)["upper"] = [(hi - 0.3 * (hi - lo)).hex()]
+
+
+def other_lower(forged):
+    lo, hi = (float.fromhex(section(forged)[key][0]) for key in ("lower", "upper"))
+    section(forged)["lower"] = [(lo + 0.3 * (hi - lo)).hex()]
+
+
+def array(word, change):
+    def forged(file):
+        name = f"0.average.{word}"
+        file.arrays[name] = np.ascontiguousarray(change(file.arrays[name]))
+
+    return forged
+
+
+def at_least(values):
+    return np.maximum(values, LEAST_WEIGHT)
+
+
+FORGED = {
+    "a narrower upper end": (narrower, "upper end of the average is not proved"),
+    "a narrower lower end": (other_lower, "lower end of the average is not proved"),
+    "no weights": (array("weight", lambda w: 0.0 * w), "weight is not between"),
+    "small weights": (array("weight", lambda w: at_least(0.9 * w)), "weight is smaller"),
+    "large weights": (array("weight", lambda w: 10.0 * w), "end of the average is not proved"),
+    "another u": (array("upper", lambda u: -u), "is not proved"),
+    "u of both ends exchanged": (array("lower", lambda u: -u), "is not proved"),
+    "a run that leaves its component": (array("runs", lambda r: r + 5000), "a run beside it"),
+    "an empty run": (array("runs", lambda r: 0 * r), "a run beside it"),
+    "a run on the wrong side": (array("runs", lambda r: -r), "a run beside it"),
+    "no runs": (array("runs", lambda r: r[:0]), "no runs beside it"),
+    "a component without cells": (lambda f: section(f).update(components=[3]), "component 3 has no cells"),
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_a_forged_average_is_denied(name, tent_file, tmp_path):
+    forged = opened(tent_file)
+    change, why = FORGED[name]
+    change(forged)
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    assert (report.verdict, why in report.reason) == ("failed", True), report.reason
+
+
+BAD = {
+    "a number that is not finite": array("upper", lambda u: u + np.inf),
+    "too few numbers": lambda f: section(f).update(lower=[]),
+    "two functions": lambda f: section(f).update(of={"lyapunov": True, "share": []}),
+    "no function": lambda f: section(f).update(of={}),
+    "one more run": array("runs", lambda r: np.concatenate([r, r])),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_file_that_is_none_is_told(name, tent_file, tmp_path):
+    forged = opened(tent_file)
+    BAD[name](forged)
+    report = ls.recheck(forged.seal().write(tmp_path / "bad.zip"))
+    print(report.verdict, report.reason)
+    assert report.verdict == "bad file"
+
+
+def test_numbers_that_are_found_otherwise_are_as_good(tent_file, tmp_path):
+    """Nothing depends on how u and w were found: larger w and another constant in u prove wider bounds."""
+    forged = opened(tent_file)
+    forged.arrays["0.average.upper"] += 3.0
+    forged.arrays["0.average.weight"] *= 1.5
+    lo, hi = (float.fromhex(section(forged)[key][0]) for key in ("lower", "upper"))
+    section(forged).update(lower=[(lo - (hi - lo)).hex()], upper=[(hi + (hi - lo)).hex()])
+    assert ls.recheck(forged.seal().write(tmp_path / "other.zip")).verdict == "proved"
