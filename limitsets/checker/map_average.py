@@ -233,7 +233,7 @@ def enclosed_cell(
     off = max(math.nextafter(hi - lo, math.inf) for lo, hi in spans)
     bend = floats_around(abs(second) / (slope * slope))[1]
     if average.places is not None:
-        g = share_of(average.places, key[0], ends)
+        g = indicator_of(average.places, key[0], ends)
     elif average.formula is not None:
         g = bounds_of_formula(the_map.program_of(average.formula), x, middle, ranges)
     else:
@@ -262,7 +262,7 @@ def bounds_of_formula(program: Program, x: Arb, middle: Arb, ranges: list[Arb]) 
     return least, most, least, most, math.nextafter(most - least, math.inf)
 
 
-def share_of(places: list[Any], side: int, ends: tuple[float, float]) -> tuple[float, ...]:
+def indicator_of(places: list[Any], side: int, ends: tuple[float, float]) -> tuple[float, ...]:
     """Bound the indicator of some places: 1 in one of them, 0 off all but for borders, else between."""
     own = [box[0] for s, box in places if s == side]
     inside = any(lo <= ends[0] and ends[1] <= hi for lo, hi in own)
