@@ -190,6 +190,10 @@ def kink(x, b):
     return b * (0.5 - np.abs(x - 0.5))
 
 
+def bent_rising(x, b):
+    return b * x + 0.05 * np.abs(x - 0.33)
+
+
 def stays(x):
     return 0.5 * x + 0.25
 
@@ -204,6 +208,11 @@ HOPELESS = {
     "a turning point with slope 0": (ls.map(flat, a=3.9), line, "the slope may be 0 or jump"),
     "a kink inside a cell": (ls.map(kink, b=1.7), line, ""),
     "a jump inside a cell": (ls.map(jumps, b=1.7), circle, "the slope may be 0 or jump"),
+    "a kink that keeps the sign of the slope": (
+        ls.map(pieces=(bent_rising, falling), margin=half, b=1.6),
+        line,
+        "twice differentiable",
+    ),
     "three changes of branch in a cell": (
         ls.map(pieces=(rising, falling), margin=narrow, b=1.7),
         line,

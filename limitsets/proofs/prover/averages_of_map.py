@@ -362,7 +362,7 @@ class Bounds(NamedTuple):
     high: float
 
 
-def _found(search: Search) -> Bounds | str:
+def _bounds_of(search: Search) -> Bounds | str:
     """Find u of both ends, w, and the two bounds; or say what is missing.
 
     More steps of the iteration leave less of g, and make u rougher, which asks for larger w: the best is between.
@@ -411,7 +411,7 @@ def _on_component(proof: ProofOfMap, own: Mask, observable: Observable) -> tuple
     longest = int(own.sum()) * RUN
     while True:
         runs = [max(1, min(change.beside.size, int(longest))) for change in changes]
-        answer = _found(Search(local, undecided[own], grid.measure[own], changes, runs))
+        answer = _bounds_of(Search(local, undecided[own], grid.measure[own], changes, runs))
         if not isinstance(answer, str) or longest < 1.0:
             return runs, answer
         longest /= 2.0
@@ -427,10 +427,10 @@ def _average(proof: ProofOfMap, observable: Observable, share: float) -> Average
     runs, columns = list[tuple[int, int]](), list[tuple[int, str, str]]()
     for number in range(int(component.max()) + 1):
         own = component == number
-        beside, found = _on_component(proof, own, observable)
-        if isinstance(found, str):
-            return found
-        upper[own], lower[own], weight[own], low, high = found
+        beside, numbers = _on_component(proof, own, observable)
+        if isinstance(numbers, str):
+            return numbers
+        upper[own], lower[own], weight[own], low, high = numbers
         runs += list(zip(beside[::2], beside[1::2], strict=True))
         wide = share * (high - low) + 2.0**-42 * (
             max(abs(low), abs(high), 1.0) + float(np.abs([upper[own], lower[own]]).max())
