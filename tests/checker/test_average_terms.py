@@ -185,9 +185,7 @@ def test_the_checker_asks_for_each_term(file, seed, end, tmp_path):
         if (np.abs(w - before) < 1e-12 * w).all():
             break
     c, _ = asked(edges, own, u, w, runs, sign, closes, targets)
-    assert smallest(lambda end: accepted(end, w), c - 1.0, c + 1.0) == pytest.approx(c, rel=1e-5, abs=1e-5), (
-        reasons[-1]
-    )
+    assert smallest(lambda end: accepted(end, w), c - 1.0, c + 1.0) == pytest.approx(c, rel=1e-5, abs=1e-5)
     assert smallest(lambda share: accepted(1e6, share * w), 0.5, 1.0) == pytest.approx(1.0, abs=3e-4)
     for k in random.choice(own, 6, replace=False):  # and of single cells
         less = w.copy()
