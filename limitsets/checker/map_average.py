@@ -38,16 +38,17 @@ parts with 1/|f'|, whose variation on I is at most |I| D.  Ends of images are kn
 ubar is off by 2 d (osc u)/l.
 """
 
+import functools
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb
 
 from .any_map import Map, Shape, floats_around
-from .balls import Arb, Array, prove
+from .balls import Arb, Array, UnprovedError, prove
 from .file import Arrays, hex_float, is_whole, read_side, require, rows, table
 from .map_cells import MapCells
 from .map_cycles import read_box
@@ -153,13 +154,13 @@ def enclosed_steps(the_map: Map, c: MapCells, average: Average, own: Array) -> I
             continue
         period, edges = c.periods[to][0], c.edges[to][0]
         prove(period is None or len(possible) == 1, "an axis closes, of a map of two branches")
-        listed, ways = list[Enclosed](), list[int]()
-        for cell in cells.tolist():
-            _, box = c.box(cell)
-            ways.append(way_of(the_map, c, cell, branch) if both[cell] else 0)
-            listed.append(
-                enclosed_cell(the_map, average, (side, branch), box[0], (c.name(cell), edges[0], period))
-            )
+        listed, ways, g = list[Enclosed](), list[int](), observed(the_map, average, (side, branch))
+        for cell, ends in zip(cells.tolist(), c.ends(cells, side).tolist(), strict=True):
+            try:
+                ways.append(way_of(the_map, (side, branch), ends) if both[cell] else 0)
+                listed.append(enclosed_cell(the_map, g, (side, branch), ends, (edges[0], period)))
+            except UnprovedError as error:
+                raise UnprovedError(f"{c.name(cell)}: {error}") from None
         target = np.where(both[cells, None], c.target[branch][cells].astype(np.int64), -1)
         passes = np.array([one.passes for one in listed])
         steps = [step_of(cells, to, listed, target, both[cells] | passes, np.array(ways))]
@@ -192,31 +193,35 @@ def step_of(
     )  # fmt: skip
 
 
-def way_of(the_map: Map, c: MapCells, cell: int, branch: int) -> int:
+def way_of(the_map: Map, key: tuple[int, int], ends: list[float]) -> int:
     """Return on which side of its change of branch an undecided cell takes a branch; there is one change at most."""
-    side, box = c.box(cell)
-    slope = the_map.margin[side].gradients(the_map.piece(box).balls)[0][0]
-    prove(slope > 0 or slope < 0, f"{c.name(cell)}: that it holds one change of branch at most is not proved")
+    side, branch = key
+    slope = the_map.margin[side].gradients(the_map.piece([(ends[0], ends[1])]).balls)[0][0]
+    prove(slope > 0 or slope < 0, "that it holds one change of branch at most is not proved")
     return branch if slope > 0 else 1 - branch
+
+
+Observed = Callable[[list[float], Arb, Arb, Arb], tuple[float, ...]]
+"""Five numbers of g on a cell, from its ends, their ball, its middle, and the derivative of ln |f'| there."""
 
 
 def enclosed_cell(
     the_map: Map,
-    average: Average,
+    g: Observed,
     key: tuple[int, int],
-    ends: tuple[float, float],
-    where: tuple[str, float, Arb | None],
+    ends: list[float],
+    axis: tuple[float, Arb | None],
 ) -> Enclosed:
-    """Enclose what the inequalities need of a cell; `where`: its name, then first edge and period where f leads."""
-    program, ranges, (name, first_edge, period) = the_map.image[key], the_map.piece([]).balls, where
+    """Enclose what the inequalities need of a cell; `axis` has the first edge and the period where f leads."""
+    program, ranges, (first_edge, period) = the_map.image[key], the_map.piece([]).balls, axis
     x, middle = arb(ends[0]).union(arb(ends[1])), (arb(ends[0]) + arb(ends[1])) / 2
     _, slope, second = program.bend([x, *ranges])
     regular = second.is_finite() and (slope > 0 or slope < 0)
     least = floats_around(abs(slope))[0] if regular else 0.0
     why = "that the formula is twice differentiable, with a slope of one sign, is not proved"
-    prove(least >= LEAST_WEIGHT, f"{name}: {why}")
+    prove(least >= LEAST_WEIGHT, why)
     images = [program.at([arb(end), *ranges])[0] for end in (ends if slope > 0 else ends[::-1])]
-    prove(all(y.is_finite() for y in images), f"{name}: an image is not bounded")
+    prove(all(y.is_finite() for y in images), "an image is not bounded")
     passes = False
     if period is not None:
         turns = (((images[0] + images[1]) / 2 - first_edge) / period).mid().floor()
@@ -227,20 +232,28 @@ def enclosed_cell(
             passes = True
         passes = passes or not images[1] <= arb(first_edge) + period
         fits = images[0] > first_edge and images[1] < first_edge + 2 * period
-        prove(fits or not passes, f"{name}: its image is as long as the axis")
+        prove(fits or not passes, "its image is as long as the axis")
     spans = [floats_around(y) for y in images]
     near = [0.5 * (lo + hi) for lo, hi in spans]
     off = max(math.nextafter(hi - lo, math.inf) for lo, hi in spans)
     bend = floats_around(abs(second) / (slope * slope))[1]
+    values = g(ends, x, middle, second / slope)
+    prove(all(map(math.isfinite, values)), "the function is not bounded")
+    return Enclosed((least, bend, *near, off, *values), passes, bool(slope > 0))
+
+
+def observed(the_map: Map, average: Average, key: tuple[int, int]) -> Observed:
+    """Return the function that bounds g on the cells of a side and branch."""
+    program, ranges = the_map.image[key], the_map.piece([]).balls
     if average.places is not None:
-        g = indicator_of(average.places, key[0], ends)
-    elif average.formula is not None:
-        g = bounds_of_formula(the_map.program_of(average.formula), x, middle, ranges)
-    else:
-        at_middle = program.gradients([middle, *ranges])[0][0]
-        g = bounds_of_g(abs(at_middle).log(), second / slope, x)
-    prove(all(map(math.isfinite, g)), f"{name}: the function is not bounded")
-    return Enclosed((least, bend, *near, off, *g), passes, bool(slope > 0))
+        return functools.partial(indicator_of, average.places, key[0])
+    if average.formula is not None:
+        return functools.partial(bounds_of_formula, the_map.program_of(average.formula), ranges)
+
+    def exponent(_: list[float], x: Arb, middle: Arb, bend: Arb) -> tuple[float, ...]:
+        return bounds_of_g(abs(program.gradients([middle, *ranges])[0][0]).log(), bend, x)
+
+    return exponent
 
 
 def bounds_of_g(middle: Arb, slope: Arb, x: Arb) -> tuple[float, ...]:
@@ -253,7 +266,9 @@ def bounds_of_g(middle: Arb, slope: Arb, x: Arb) -> tuple[float, ...]:
     return lo, hi, least, most, floats_around(2 * largest)[1]
 
 
-def bounds_of_formula(program: Program, x: Arb, middle: Arb, ranges: list[Arb]) -> tuple[float, ...]:
+def bounds_of_formula(
+    program: Program, ranges: list[Arb], _: list[float], x: Arb, middle: Arb, __: Arb
+) -> tuple[float, ...]:
     """Bound a formula on a cell: by its slopes, or by its ball where it has a kink or jump."""
     slope = program.gradients([x, *ranges])[0][0]
     if slope.is_finite():
@@ -262,7 +277,7 @@ def bounds_of_formula(program: Program, x: Arb, middle: Arb, ranges: list[Arb]) 
     return least, most, least, most, math.nextafter(most - least, math.inf)
 
 
-def indicator_of(places: list[Any], side: int, ends: tuple[float, float]) -> tuple[float, ...]:
+def indicator_of(places: list[Any], side: int, ends: list[float], *_: Arb) -> tuple[float, ...]:
     """Bound the indicator of some places: 1 in one of them, 0 off all but for borders, else between."""
     own = [box[0] for s, box in places if s == side]
     inside = any(lo <= ends[0] and ends[1] <= hi for lo, hi in own)
