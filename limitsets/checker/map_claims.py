@@ -89,7 +89,7 @@ def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], cre
     if failed:
         return failed
     hulls = [hull for _, k in part.drawn for hull in cycles[k].hulls]
-    needing = set() if attracting.any() else {"invariant", "trapping", "expanding", "average"}
+    needing = set() if attracting.any() else {"invariant", "trapping", "expanding"}
     needing |= set() if attracting.any() or part.drawn else {"basin", "attracts-all", "ends-in"}
     failed = dict.fromkeys(needing & set(claims), "there are no attracting cells")
     if "escapes" in claims:

@@ -7,7 +7,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from limitsets.checker.map_average import LEAST_WEIGHT
+from limitsets.checker.map_average import LEAST_WEIGHT, indicator_of
 from tests.proofs.forge import opened
 
 GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
@@ -99,6 +99,33 @@ def test_the_mean_of_the_golden_tent_by_its_density():
     mass = np.array([share, 1.0]) / (1.0 + share)
     mean = mass @ np.array([(a + 0.5) / 2.0, (0.5 + t) / 2.0])
     assert mean == pytest.approx(KNOWN["golden tent, mean"][3], abs=1e-12)
+
+
+def test_bounds_for_every_value_of_a_range(tmp_path):
+    """They hold the averages of both ends, and are of values that stay."""
+    lower, upper = tent(1.7), tent(1.7005)
+    proof = ls.average(lower, line(800), place, upper=upper)
+    lo, hi = bounds(proof)
+    for b in (1.7, 1.7005):
+        inner = bounds(ls.average(tent(b), line(800), place))
+        assert lo < inner[0] < inner[1] < hi
+    assert hi - lo < 0.1
+    proof.save(tmp_path / "range.proof.zip")
+    report = ls.recheck(tmp_path / "range.proof.zip")
+    assert report.verdict == "proved"
+    assert "fixed in time: average" in str(report.map) + " ".join(report.statement)
+
+
+def test_places_that_cut_a_cell():
+    places = [(0, [(0.2, 0.4)]), (0, [(0.6, 0.7)])]
+    for ends, least, most in (
+        ([0.3, 0.5], 0, 1),
+        ([0.4, 0.6], 0, 0),
+        ([0.25, 0.4], 1, 1),
+        ([0.39, 0.61], 0, 1),
+    ):
+        assert indicator_of(places, 0, ends) == (least, most, least, most, most - least)
+    assert indicator_of(places, 1, [0.3, 0.35])[3] == 0
 
 
 def sampled(step, of, seeds, throws=4000):
@@ -288,7 +315,8 @@ FORGED = {
     "large weights": (array("weight", lambda w: 10.0 * w), "end of the average is not proved"),
     "another u": (array("upper", lambda u: -u), "is not proved"),
     "u of both ends exchanged": (array("lower", lambda u: -u), "is not proved"),
-    "a run that leaves its component": (array("runs", lambda r: r + 5000), "a run beside it"),
+    "a run that leaves its component": (array("runs", lambda r: r + 150), "a run beside it"),
+    "a run that leaves its side": (array("runs", lambda r: r + 5000), "a run beside it"),
     "an empty run": (array("runs", lambda r: 0 * r), "a run beside it"),
     "a run on the wrong side": (array("runs", lambda r: -r), "a run beside it"),
     "no runs": (array("runs", lambda r: r[:0]), "no runs beside it"),

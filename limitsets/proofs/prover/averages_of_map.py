@@ -139,6 +139,7 @@ class Steps(NamedTuple):
     way: Ints  # of an undecided cell 0 below its change, 1 above
     least: Array  # slope
     bend: Array  # |f''|/f'^2
+    off: Array  # what the ends of the image are known to
     mean: Array  # of the function, its least and its largest value
     low: Array
     high: Array
@@ -161,19 +162,19 @@ def _steps(proof: ProofOfMap, own: Mask, undecided: Mask, observable: Observable
             continue
         lo, hi = grid.boxes(mine, side)
 
-        def at(x: Array, y: Array, side: int = side, branch: int = branch) -> tuple[Array, Array]:
-            boxes = branch_boxes(proof.map, proof.upper, side, branch, x, y)
+        def at(x: Array, side: int = side, branch: int = branch) -> tuple[Array, Array, Array]:
+            boxes = branch_boxes(proof.map, proof.upper, side, branch, x, x)
             slopes = 0.5 * (boxes.slope_lo + boxes.slope_hi)[:, 0, 0]
-            return 0.5 * (boxes.lo + boxes.hi)[:, 0], slopes
+            return 0.5 * (boxes.lo + boxes.hi)[:, 0], slopes, 0.5 * (boxes.hi - boxes.lo)[:, 0]
 
         whole = branch_boxes(proof.map, proof.upper, side, branch, lo, hi)
         low, high = whole.slope_lo[:, 0, 0], whole.slope_hi[:, 0, 0]
         least = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
-        (first, slope_first), (last, slope_last) = at(lo, lo), at(hi, hi)
+        (first, slope_first, off_first), (last, slope_last, off_last) = at(lo), at(hi)
         middle = 0.5 * (lo + hi)
         values = [
             observable.values(x[:, 0], side, slope)
-            for x, slope in ((lo, slope_first), (middle, at(middle, middle)[1]), (hi, slope_last))
+            for x, slope in ((lo, slope_first), (middle, at(middle)[1]), (hi, slope_last))
         ]
         width = (hi - lo)[:, 0]
         bend = np.abs(slope_last - slope_first) / width / np.maximum(least, LEAST_S) ** 2
@@ -185,9 +186,15 @@ def _steps(proof: ProofOfMap, own: Mask, undecided: Mask, observable: Observable
         if grid.domain.closes:
             ends, covered, rows, way = _cut_at_seam(edges, ends, slope_first > 0.0)
             undecided[mine[rows[mine.size :]]] = True
-        # of a cell with two branches the checker takes the neighbours of the target cells too
-        beyond = np.clip(np.add(covered, [[-1], [1]]), 0, edges.size - 2)
-        covered = np.where(undecided[mine[rows]] & own[to + beyond], beyond, covered)
+        # of a cell with two branches the checker takes the neighbours of the target cells too, and of others the cells
+        # that the image may meet, by what is known of its ends
+        off = 2.0 * np.maximum(off_first, off_last)
+        first_met = np.searchsorted(edges, ends[0] - off[rows], "left") - 1
+        last_met = np.searchsorted(edges, ends[1] + off[rows], "right") - 1
+        near = np.stack([np.minimum(first_met, covered[0]), np.maximum(last_met, covered[1])])
+        beyond = np.where(undecided[mine[rows]], np.add(covered, [[-1], [1]]), near)
+        beyond = np.clip(beyond, 0, edges.size - 2)
+        covered = np.where(own[to + beyond], beyond, covered)
         sizes = covered[1] - covered[0] + 1
         row = np.repeat(np.arange(rows.size), sizes)
         k = np.arange(row.size) - np.repeat(np.cumsum(sizes) - sizes, sizes) + covered[0][row]
@@ -195,7 +202,7 @@ def _steps(proof: ProofOfMap, own: Mask, undecided: Mask, observable: Observable
         begins = begin + np.cumsum(sizes) - sizes
         if branches > 1 and undecided[mine].any():
             way[undecided[mine]] = _ways(proof, mine[undecided[mine]], side, branch)
-        alike = (least, bend, values[1], np.minimum.reduce(values), np.maximum.reduce(values))
+        alike = (least, bend, off, values[1], np.minimum.reduce(values), np.maximum.reduce(values))
         parts.append((mine[rows], way, *(each[rows] for each in alike), ends[1] - ends[0], begins))
         met.append(to + k)
         part.append(np.maximum(inside, 0.0))
@@ -300,17 +307,19 @@ class Search:
         partial -= np.repeat(
             partial[steps.begin] - (u[steps.met[steps.begin]] - mean) * steps.part[steps.begin], sizes
         )
-        r = np.maximum.reduceat(np.abs(partial), steps.begin)
+        apart = self.largest(u) + self.largest(-u)
+        r = np.maximum.reduceat(np.abs(partial), steps.begin) + 4.0 * steps.off * apart
         wide, spread = self.width[steps.cell], steps.high - steps.low
         s = self._by_cell(
             r * (1.0 / steps.least + 2.0 * wide * steps.bend) + wide * spread / 4.0, np.maximum, 0.0
         )
-        off = self._by_cell(steps.bend * r, np.maximum, 0.0)
-        apart = sum(  # of the function and of u, over both sides of a change
+        shortest = np.maximum(steps.length - 2.0 * steps.off, 0.1 * steps.length + 1e-300)
+        off = self._by_cell(steps.bend * r + 2.0 * steps.off * apart / shortest, np.maximum, 0.0)
+        both = sum(  # of the function and of u, over both sides of a change
             self._by_cell(high, np.maximum, -np.inf) + self._by_cell(-low, np.maximum, -np.inf)
             for low, high in ((steps.low, steps.high), (-self.largest(-u), self.largest(u)))
         )
-        s = np.where(self.undecided, self.width * apart / 4.0, s)
+        s = np.where(self.undecided, self.width * both / 4.0, s)
         return WIDER * s + LEAST_S, np.where(self.undecided, 0.0, off)
 
     def terms(self, w: Array) -> tuple[Array, Array]:
