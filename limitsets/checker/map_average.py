@@ -11,12 +11,12 @@ file and on each cell I, on every branch that is possible there,
     c >= mean of (g + u o f) - u + D (largest w) + sum over ends whose run J holds I of W / (m_c |J|)            (b)
 
 An *end* is either side of a change of branch inside N.  The seam of an axis that closes is an end of N, and a place
-whose image lies there a change of branch.  Changes lie in *undecided* cells B: both branches are possible, and the
-slope of the margin has a sign; or the image may pass the seam, and is shorter than the axis.  So B holds one change at
-most.  J is a run of cells next to B, W the largest w that the image of B meets on the branch of that side, m_c its
-least slope; p is 1 on B, and on a cell of J its largest distance from the far end of J by |J|.  On B the mean is at
-most the largest g plus the largest u that is met on both branches, and s = |B| (osc g + osc u)/4.  Then for every
-density rho of bounded variation on N:
+inside N whose image lies there a change of branch.  Changes lie in *undecided* cells B: both branches are possible, and
+the slope of the margin has a sign; or the image of the closed cell may pass the seam, or may come to the seam otherwise
+than by an end of N, and is shorter than the axis.  So B holds one change at most.  J is a run of cells next to B, W the
+largest w that the image of B meets on the branch of that side, m_c its least slope; p is 1 on B, and on a cell of J its
+largest distance from the far end of J by |J|.  On B the mean is at most the largest g plus the largest u that is met on
+both branches, and s = |B| (osc g + osc u)/4.  Then for every density rho of bounded variation on N:
 
 * (i) The integral of (g + u o f - u) rho over a cell is at most the mean of that function times the mass of the cell,
   plus s times the variation of rho inside (integrate by parts).
@@ -54,7 +54,7 @@ from .map_cells import MapCells
 from .map_cycles import read_box
 from .program import Formulas, Program, in_words, read_formulas
 
-MOST_CHANGES = 4_096
+MOST_CHANGES = 2_048
 LEAST_WEIGHT, MOST_WEIGHT, LEAST_S = 2.0**-100, 2.0**100, 2.0**-200
 # Of the largest part of a sum: what rounding of 4096 operations comes to is less, and of a few dozen.
 ROUNDED, FEW = 2.0**-40, 2.0**-46
@@ -158,7 +158,8 @@ def enclosed_steps(the_map: Map, c: MapCells, average: Average, own: Array) -> I
         for cell, ends in zip(cells.tolist(), c.ends(cells, side).tolist(), strict=True):
             try:
                 ways.append(way_of(the_map, (side, branch), ends) if both[cell] else 0)
-                listed.append(enclosed_cell(the_map, g, (side, branch), ends, (edges[0], period)))
+                outer = [cell == c.start[side], cell == c.start[side + 1] - 1]
+                listed.append(enclosed_cell(the_map, g, (side, branch), ends, (edges[0], period, outer)))
             except UnprovedError as error:
                 raise UnprovedError(f"{c.name(cell)}: {error}") from None
         target = np.where(both[cells, None], c.target[branch][cells].astype(np.int64), -1)
@@ -210,10 +211,14 @@ def enclosed_cell(
     g: Observed,
     key: tuple[int, int],
     ends: list[float],
-    axis: tuple[float, Arb | None],
+    axis: tuple[float, Arb | None, list[bool]],
 ) -> Enclosed:
-    """Enclose what the inequalities need of a cell; `axis` has the first edge and the period where f leads."""
-    program, ranges, (first_edge, period) = the_map.image[key], the_map.piece([]).balls, axis
+    """Enclose what the inequalities need of a cell.
+
+    `axis` has the first edge and the period where f leads, and whether the ends of the cell are the first and the last
+    edge of its own side, hence ends of N.
+    """
+    program, ranges, (first_edge, period, outer) = the_map.image[key], the_map.piece([]).balls, axis
     x, middle = arb(ends[0]).union(arb(ends[1])), (arb(ends[0]) + arb(ends[1])) / 2
     _, slope, second = program.bend([x, *ranges])
     regular = second.is_finite() and (slope > 0 or slope < 0)
@@ -226,11 +231,14 @@ def enclosed_cell(
     if period is not None:
         turns = (((images[0] + images[1]) / 2 - first_edge) / period).mid().floor()
         images = [y - turns * period for y in images]
-        # an image that begins or ends on the seam exactly, as by f(0) = 0, does not pass it
-        if not images[0] >= first_edge:
+        # an image may begin or end on the seam exactly, as by f(0) = 0, where the cell does so at an end of N; at a
+        # border inside N there would be a change of branch between two cells
+        below, above = outer if slope > 0 else outer[::-1]
+        first, last = arb(first_edge), arb(first_edge) + period
+        if not (images[0] > first or (below and images[0] >= first)):
             images = [y + period for y in images]
             passes = True
-        passes = passes or not images[1] <= arb(first_edge) + period
+        passes = passes or not (images[1] < last or (above and images[1] <= last))
         fits = images[0] > first_edge and images[1] < first_edge + 2 * period
         prove(fits or not passes, "its image is as long as the axis")
     spans = [floats_around(y) for y in images]
@@ -480,9 +488,9 @@ def cell_terms(
 def add_run(c: MapCells, own: Array, run: tuple[int, int], term: float, sides: Sides, *, above: bool) -> None:
     """Add the terms of one side of a change to the cells of its run, from the first to the last."""
     first, last = run
-    side = int(c.side_of(np.array([last if above else first])).clip(0)[0]) if first <= last else 0
-    edges, begin, end = c.edges[side][0], int(c.start[side]), int(c.start[side + 1])
     next_to = first - 1 if above else last + 1
+    side = int(c.side_of(np.array([next_to]))[0])
+    edges, begin, end = c.edges[side][0], int(c.start[side]), int(c.start[side + 1])
     fits = begin <= min(first, next_to) and max(last, next_to) < end and first <= last
     prove(
         fits and bool(own[first : last + 1].all()),
@@ -509,7 +517,7 @@ def average_in_words(average: Average, components: dict[int, str]) -> str:
     else:
         what = "of ln |dx'/dx|, the Lyapunov exponent,"
     said = [
-        f"in {name} the average {what} converges to a number from {lo!r} to {hi!r}"
+        f"of almost every start in {name} the average {what} converges to a number from {lo!r} to {hi!r}"
         for (_, (lo, hi)), name in zip(sorted(average.bounds.items()), components.values(), strict=True)
     ]
-    return f"for almost every start: {'; '.join(said)}; means over invariant densities lie there too"
+    return f"{'; '.join(said)}; means over invariant densities lie there too"

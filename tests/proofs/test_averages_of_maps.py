@@ -317,6 +317,10 @@ FORGED = {
     "u of both ends exchanged": (array("lower", lambda u: -u), "is not proved"),
     "a run that leaves its component": (array("runs", lambda r: r + 150), "a run beside it"),
     "a run that leaves its side": (array("runs", lambda r: r + 5000), "a run beside it"),
+    "a run beyond the last cell": (
+        array("runs", lambda r: r + np.array([[0, 10**6]], r.dtype)),
+        "a run beside it",
+    ),
     "an empty run": (array("runs", lambda r: 0 * r), "a run beside it"),
     "a run on the wrong side": (array("runs", lambda r: -r), "a run beside it"),
     "no runs": (array("runs", lambda r: r[:0]), "no runs beside it"),
@@ -331,6 +335,55 @@ def test_a_forged_average_is_denied(name, tent_file, tmp_path):
     change(forged)
     report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
     assert (report.verdict, why in report.reason) == ("failed", True), report.reason
+
+
+def downward(x, b):
+    return -b * x
+
+
+# Maps whose change of branch, at a border of two cells, comes to the seam exactly: each image ends there, and f is linear,
+# so that the average by the lengths of images, as if they were chances, would solve both inequalities.
+BETWEEN = {
+    "two cells": (stretched, 1.5, 0.75, [0.0, 0.5, 0.75]),
+    "a falling map": (downward, 2.5, 0.9375, [0.0, 0.375, 0.75, 0.9375]),
+    "even cells": (stretched, 2.5, 0.9375, np.linspace(0.0, 0.9375, 16)),
+}
+
+
+@pytest.mark.parametrize("name", BETWEEN)
+def test_a_change_on_the_border_of_two_cells_is_not_overlooked(name, tmp_path):
+    function, b, period, edges = BETWEEN[name]
+    edges, sign = np.array(edges), -1.0 if function is downward else 1.0
+    own = ls.grid([(0.0, period)], cells=60, periodic=True)
+    ls.average(ls.map(function, b=b), own, place).save(tmp_path / "honest.zip")
+    forged = opened(tmp_path / "honest.zip")
+    n, chances = len(edges) - 1, np.zeros((len(edges) - 1, len(edges) - 1))
+    for i, k, turn in np.ndindex(n, n, 7):
+        lo, hi = sorted(sign * b * edges[[i, i + 1]] + (turn - 3) * period)
+        chances[i, k] += max(0.0, min(hi, edges[k + 1]) - max(lo, edges[k])) / (hi - lo)
+    assert chances.sum(axis=1) == pytest.approx(1.0)
+    values, vectors = np.linalg.eig(chances.T)
+    law = vectors[:, np.argmin(np.abs(values - 1.0))].real
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    wrong = float(law @ middles / law.sum())
+    equations = np.vstack([np.eye(n) - chances, np.ones(n)])
+    u = np.linalg.lstsq(equations, np.append(middles - wrong, 0.0), rcond=None)[0]
+    forged.arrays.clear()
+    forged.arrays |= {
+        "0.edges.0.0": edges[:-1].copy(),
+        "0.rank": np.zeros(n, np.int32),
+        "0.component": np.zeros(n, np.int32),
+        "0.target.0": np.array([[0, n - 1]] * n, np.int32),
+        "0.average.upper": u,
+        "0.average.lower": -u,
+        "0.average.weight": np.full(n, 100.0),
+        "0.average.runs": np.zeros((0, 2), np.int32),
+    }
+    section(forged).update(lower=[(wrong - 1e-9).hex()], upper=[(wrong + 1e-9).hex()])
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    assert report.verdict == "failed"
+    whys = ("an undecided cell has no runs beside it", "its image is as long as the axis")
+    assert any(why in report.reason for why in whys), report.reason
 
 
 BAD = {
