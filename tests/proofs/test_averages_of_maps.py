@@ -341,8 +341,8 @@ def downward(x, b):
     return -b * x
 
 
-# Maps whose change of branch, at a border of two cells, comes to the seam exactly: each image ends there, and f is linear,
-# so that the average by the lengths of images, as if they were chances, would solve both inequalities.
+# Maps whose change of branch, at a border of two cells, comes to the seam exactly: each image ends there, and f is
+# linear, so that the average by the lengths of images, as if they were chances, would solve both inequalities.
 BETWEEN = {
     "two cells": (stretched, 1.5, 0.75, [0.0, 0.5, 0.75]),
     "a falling map": (downward, 2.5, 0.9375, [0.0, 0.375, 0.75, 0.9375]),
