@@ -62,6 +62,7 @@ KNOWN = {
     "doubling, mean": (ls.map(stretched, b=2.0), circle, place, 0.5, 2e-3),
     "doubling, exponent": (ls.map(stretched, b=2.0), circle, "lyapunov", math.log(2.0), 1e-11),
     "doubling, share": (ls.map(stretched, b=2.0), circle, [(0.25, 0.5)], 0.25, 5e-3),
+    "doubling, share of places that cut cells": (ls.map(stretched, b=2.0), circle, [(0.1, 0.35)], 0.25, 5e-3),
     "golden mean, mean": (ls.map(stretched, b=GOLDEN), circle, place, 1.0 / math.sqrt(5.0), 5e-3),
     "golden tent, mean": (tent(GOLDEN), line, place, 0.5854101966249684, 1e-3),
     "tent of 1.7, exponent": (tent(1.7), line, "lyapunov", math.log(1.7), 1e-11),
@@ -114,6 +115,26 @@ def test_bounds_for_every_value_of_a_range(tmp_path):
     report = ls.recheck(tmp_path / "range.proof.zip")
     assert report.verdict == "proved"
     assert "fixed in time: average" in str(report.map) + " ".join(report.statement)
+
+
+def bumpy(x, a):
+    return 2.0 * x + a + 0.3 * np.sin(x)
+
+
+def test_a_range_of_a_map_whose_change_moves():
+    """Where the image passes the seam depends on the parameter, and lies in one cell for all of its values."""
+    turn = ls.grid([(0.0, math.tau)], cells=300, periodic=True)
+    lo, hi = bounds(ls.average(ls.map(bumpy, a=0.7), turn, upper=ls.map(bumpy, a=0.701)))
+    one = bounds(ls.average(ls.map(bumpy, a=0.7), turn))
+    assert lo < one[0] < one[1] < hi
+    share = bounds(ls.average(ls.map(bumpy, a=0.7), turn, [(1.0, 2.5)]))
+
+    def step(x):
+        return bumpy(math.tau * x, 0.7) / math.tau % 1.0
+
+    mean, error = sampled(step, lambda x: (x >= 1.0 / math.tau) & (x <= 2.5 / math.tau), 400)
+    assert share[0] - 6.0 * error < mean < share[1] + 6.0 * error
+    assert share[1] - share[0] < 0.01
 
 
 def test_places_that_cut_a_cell():

@@ -11,7 +11,7 @@ shares no code with this, has confirmed it.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -35,24 +35,29 @@ from limitsets.systems.maps.derived import branch_boxes
 
 # Steps of an iteration; by how much the span of its changes is smaller each time, and after how many times without a
 # nearer bound there are no more.
-STEPS, LESS_SPAN, WORSE = 20_000, 0.7, 6
+STEPS, LESS_SPAN, NEARER, WORSE = 2_000, 0.7, 0.999, 4
 # Runs beside a change of branch are this share of the cells of a component; half of that where there is no w.
 RUN = 0.25
-# By how much s, D and what remains between the bounds are larger than floats give: the checker's are wider by less.
-WIDER, WIDEST = 1.02, (0.02, 0.2, 2.0)
-LEAST_S, ROUNDED = 2.0**-60, 1e-11
-# Half the width of a cell that holds a change, as a share of its side; and steps that find it.
-TINY, BISECTIONS = 2.0**-40, 60
+# By how much s and D are larger than floats give, and what remains between the bounds: the checker's are wider by less,
+# if not at the first time.
+WIDER = ((1.02, 0.02), (1.2, 0.2), (2.0, 2.0))
+LEAST_S = 2.0**-60
+# What balls differ by from our boxes, as a share: their radii have 30 bits.
+ROUNDED = 1e-8
+# Half the width of a cell that holds a change, as a share of its side, and beyond what a range of parameters makes it;
+# steps that find it.
+TINY, MORE, BISECTIONS = 2.0**-40, 2.0**-20, 60
 
 
 # ---------------------------------------------------------------- what is averaged
 
 
 class Observable(NamedTuple):
-    """A function that is averaged: as a certificate names it, its values at places of a side, and its kind."""
+    """A function that is averaged: as a certificate names it, its values, and where it jumps, by side."""
 
     section: dict[str, Any]
     values: Callable[[Array, int, Array], Array]  # of places, side and the slope there
+    jumps: Sequence[tuple[int, float]] = ()
 
 
 @np.errstate(divide="ignore")  # a slope of 0, where nothing is proved
@@ -85,24 +90,31 @@ def observable_of(of: Any, params: Any) -> Observable:
         inside = [(lo <= x) & (x <= hi) for s, lo, hi in spans if s == side]
         return np.asarray(np.any([np.zeros(x.size, dtype=bool), *inside], axis=0), dtype=np.float64)
 
-    return Observable({"share": listed}, share)
+    return Observable({"share": listed}, share, [(side, end) for side, *ends in spans for end in ends])
 
 
 # ---------------------------------------------------------------- cells that hold a change of branch
 
 
-def cut_at_changes(lower: Any, upper: Any, grid: Grid) -> Grid:
-    """Cut the cells of a line so that changes of branch lie in very small ones, where an inequality loses nothing."""
+def cut_at_changes(lower: Any, upper: Any, grid: Grid, jumps: Sequence[tuple[int, float]]) -> Grid:
+    """Cut the cells of a line at jumps of what is averaged, and so that changes of branch lie in very small ones."""
     edges = []
     for side, (borders,) in enumerate(grid.edges):
         tiny = TINY * (borders[-1] - borders[0])
+        for end in [end for s, end in jumps if s == side and borders[0] + tiny < end < borders[-1] - tiny]:
+            borders = np.sort(np.append(borders[np.abs(borders - end) > tiny], end))
         first, last = (_changes_at(params, grid, side) for params in (lower, upper))
         if len(first) != len(last):  # changes come and go between the corners
             edges.append((borders,))
             continue
-        for lo, hi in zip(np.minimum(first, last) - tiny, np.maximum(first, last) + tiny, strict=True):
+        # the checker's balls of a range of parameters are wider by a share of it, and next to the change no cell may be
+        # shorter than what its ends move by
+        least, most, moves = np.minimum(first, last), np.maximum(first, last), np.abs(last - first)
+        beyond = tiny + MORE * moves
+        for lo, hi, apart in zip(least - beyond, most + beyond, tiny + 8.0 * moves, strict=True):
             if borders[0] + tiny < lo and hi < borders[-1] - tiny:  # else f begins or ends on the seam
-                kept = (borders < lo - tiny) | (borders > hi + tiny)
+                kept = (borders < lo - apart) | (borders > hi + apart)
+                kept[[0, -1]] = True
                 borders = np.sort(np.concatenate([borders[kept], [lo, hi]]))
         edges.append((borders,))
     return Grid(grid.domain, tuple(edges))
@@ -149,7 +161,7 @@ class Steps(NamedTuple):
     part: Array  # of the image in each
 
 
-def _steps(proof: ProofOfMap, own: Mask, undecided: Mask, observable: Observable) -> Steps:
+def _steps(proof: ProofOfMap, own: Mask, undecided: Mask, observable: Observable, wider: float) -> Steps:
     """Find what the inequalities need of the cells of a component."""
     grid, branches = proof.graph.grid, sum(name.startswith("target.") for name in proof.arrays)
     parts, met, part, begin = [], [], [], 0
@@ -178,7 +190,7 @@ def _steps(proof: ProofOfMap, own: Mask, undecided: Mask, observable: Observable
         ]
         width = (hi - lo)[:, 0]
         bend = np.abs(slope_last - slope_first) / width / np.maximum(least, LEAST_S) ** 2
-        bend = WIDER * np.maximum.reduce([bend, np.roll(bend, 1), np.roll(bend, -1)])
+        bend = wider * np.maximum.reduce([bend, np.roll(bend, 1), np.roll(bend, -1)])
         to, edges = int(grid.offset[whole.side]), grid.edges[whole.side][0]
         ends, covered = np.sort(np.stack([first, last]), axis=0), target[mine].T.astype(np.int64)
         rows = np.arange(mine.size)
@@ -275,6 +287,7 @@ class Search:
     width: Array
     changes: list[Change]
     runs: list[int]
+    wider: float
 
     def _by_cell(self, rows: Array, reduce: Any, empty: float) -> Array:
         out = np.full(self.width.size, empty)
@@ -320,7 +333,7 @@ class Search:
             for low, high in ((steps.low, steps.high), (-self.largest(-u), self.largest(u)))
         )
         s = np.where(self.undecided, self.width * both / 4.0, s)
-        return WIDER * s + LEAST_S, np.where(self.undecided, 0.0, off)
+        return self.wider * s + LEAST_S, np.where(self.undecided, 0.0, off)
 
     def terms(self, w: Array) -> tuple[Array, Array]:
         """Return by cell what w adds to the inequality of variations, and to that of means."""
@@ -349,16 +362,19 @@ class Search:
             w = after
         return None
 
-    def iterated(self, u: Array, sign: float, more: Array, span: float) -> Array:
-        """Find u by relative value iteration of sign g + more, until what it brings spans no more than that."""
+    def iterated(self, u: Array, sign: float, more: Array, span: float) -> Array | None:
+        """Find u by relative value iteration of sign g + more, until what it brings spans no more than that.
+
+        None where it ends before: rounding, and maxima over images, leave more.
+        """
         for _ in range(STEPS):
             change = self.after(u, sign) + more - u
             low, high = float(change.min()), float(change.max())
-            if high - low <= max(span, 1e-13 * float(np.abs(u).max())):
-                break
+            if high - low <= span:
+                return u
             u = u + 0.5 * change
             u -= u.mean()
-        return u
+        return None
 
 
 class Bounds(NamedTuple):
@@ -380,10 +396,13 @@ def _bounds_of(search: Search) -> Bounds | str:
     u, more = [np.zeros(count), np.zeros(count)], [np.zeros(count), np.zeros(count)]
     span, worse = float(search.steps.high.max() - search.steps.low.min()) + 1e-12, 0
     while worse < WORSE and span > 1e-15:
-        u = [
+        after = [
             search.iterated(each, sign, off, span)
             for each, sign, off in zip(u, (1.0, -1.0), more, strict=True)
         ]
+        if after[0] is None or after[1] is None:
+            break
+        u = [after[0], after[1]]
         slack = [search.slack(each) for each in u]
         w = search.weights(np.maximum(slack[0][0], slack[1][0]))
         if w is not None:
@@ -394,21 +413,22 @@ def _bounds_of(search: Search) -> Bounds | str:
                 for each, sign, off in zip(u, (1.0, -1.0), more, strict=True)
             )
             now = Bounds(u[0], u[1], w, -low, high)
-            worse = 0 if best is None or high + low < best.high - best.low else worse + 1
+            worse = 0 if best is None or high + low < NEARER * (best.high - best.low) else worse + 1
             best = now if worse == 0 else best
         elif best is None:  # u becomes rougher from here on
             return "the inequality of variations has no solution"
         span *= LESS_SPAN
-    assert best is not None  # the first step gives one, or ends the search
-    return best
+    return "the iteration of averages does not settle" if best is None else best
 
 
-def _on_component(proof: ProofOfMap, own: Mask, observable: Observable) -> tuple[list[int], Bounds | str]:
+def _on_component(
+    proof: ProofOfMap, own: Mask, observable: Observable, wider: float
+) -> tuple[list[int], Bounds | str]:
     """Search on one component, with shorter runs where longer ones have no solution."""
     grid, number = proof.graph.grid, np.cumsum(own) - 1
     possible = [each[:, 0] != IMPOSSIBLE for name, each in proof.arrays.items() if name.startswith("target.")]
     undecided = own & (np.sum(possible, axis=0) > 1)
-    steps = _steps(proof, own, undecided, observable)
+    steps = _steps(proof, own, undecided, observable, wider)
     if not (steps.least > 0.0).all() or not np.isfinite(steps.bend).all():
         cell = int(steps.cell[np.argmin(np.where(np.isfinite(steps.bend), steps.least, -1.0))])
         return [], f"the slope may be 0 or jump at cell {cell}"
@@ -420,7 +440,7 @@ def _on_component(proof: ProofOfMap, own: Mask, observable: Observable) -> tuple
     longest = int(own.sum()) * RUN
     while True:
         runs = [max(1, min(change.beside.size, int(longest))) for change in changes]
-        answer = _bounds_of(Search(local, undecided[own], grid.measure[own], changes, runs))
+        answer = _bounds_of(Search(local, undecided[own], grid.measure[own], changes, runs, wider))
         if not isinstance(answer, str) or longest < 1.0:
             return runs, answer
         longest /= 2.0
@@ -429,14 +449,14 @@ def _on_component(proof: ProofOfMap, own: Mask, observable: Observable) -> tuple
 # ---------------------------------------------------------------- the answer
 
 
-def _average(proof: ProofOfMap, observable: Observable, share: float) -> Average | str:
+def _average(proof: ProofOfMap, observable: Observable, wider: float, share: float) -> Average | str:
     """Find the numbers of all components, with bounds that are wider by a share; or say what is missing."""
     grid, component = proof.graph.grid, proof.arrays["component"]
     upper, lower, weight = np.zeros((3, grid.n_cells))
     runs, columns = list[tuple[int, int]](), list[tuple[int, str, str]]()
     for number in range(int(component.max()) + 1):
         own = component == number
-        beside, numbers = _on_component(proof, own, observable)
+        beside, numbers = _on_component(proof, own, observable, wider)
         if isinstance(numbers, str):
             return numbers
         upper[own], lower[own], weight[own], low, high = numbers
@@ -463,8 +483,8 @@ def averaged(proof: ProofOfMap, of: Any) -> ProofOfMap:
     if not len(proof.cells):
         return replace(proof, claims=(undecided("average", "there are no attracting cells"),))
     reason = ""
-    for share in WIDEST:
-        average = _average(proof, observable, share)
+    for room in WIDER:
+        average = _average(proof, observable, *room)
         if isinstance(average, str):
             return replace(proof, claims=(undecided("average", UNSOLVED.format(reason=average)),))
         claim = Claim("average", "proved", "", average.section)
@@ -542,5 +562,5 @@ def average(
     if grid.dimension != 1:
         raise AnswerError("the grid of an average", f"{grid.dimension} axes", "one", "averages are of a line")
     corners = coerce(map), coerce(map if upper is None else upper)
-    cells = cut_at_changes(*corners, grid)
+    cells = cut_at_changes(*corners, grid, observable_of(of, corners[0]).jumps)
     return averaged(certify_map(map, cells, ["invariant"], upper=upper, progress=progress), of)
