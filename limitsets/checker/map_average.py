@@ -202,6 +202,27 @@ def way_of(the_map: Map, key: tuple[int, int], ends: list[float]) -> int:
     return branch if slope > 0 else 1 - branch
 
 
+def turned_images(
+    images: list[Arb], axis: tuple[Arb, Arb], outer: tuple[bool, bool]
+) -> tuple[list[Arb], bool]:
+    """Turn the ends of an image to the first period of an axis that closes, and say whether it may pass the seam.
+
+    An image may begin or end on the seam exactly, as by f(0) = 0, where `outer` says that the cell does so at an end of
+    N; at a border inside N there would be a change of branch between two cells.
+    """
+    (first, last), (below, above), passes = axis, outer, False
+    period = last - first
+    turns = (((images[0] + images[1]) / 2 - first) / period).mid().floor()
+    images = [y - turns * period for y in images]
+    if not (images[0] > first or (below and images[0] >= first)):
+        images = [y + period for y in images]
+        passes = True
+    passes = passes or not (images[1] < last or (above and images[1] <= last))
+    fits = images[0] > first and images[1] < last + period
+    prove(fits or not passes, "its image is as long as the axis")
+    return images, passes
+
+
 Observed = Callable[[list[float], Arb, Arb, Arb], tuple[float, ...]]
 """Five numbers of g on a cell, from its ends, their ball, its middle, and the derivative of ln |f'| there."""
 
@@ -227,20 +248,10 @@ def enclosed_cell(
     prove(least >= LEAST_WEIGHT, why)
     images = [program.at([arb(end), *ranges])[0] for end in (ends if slope > 0 else ends[::-1])]
     prove(all(y.is_finite() for y in images), "an image is not bounded")
+    below, above = outer if slope > 0 else outer[::-1]
     passes = False
     if period is not None:
-        turns = (((images[0] + images[1]) / 2 - first_edge) / period).mid().floor()
-        images = [y - turns * period for y in images]
-        # an image may begin or end on the seam exactly, as by f(0) = 0, where the cell does so at an end of N; at a
-        # border inside N there would be a change of branch between two cells
-        below, above = outer if slope > 0 else outer[::-1]
-        first, last = arb(first_edge), arb(first_edge) + period
-        if not (images[0] > first or (below and images[0] >= first)):
-            images = [y + period for y in images]
-            passes = True
-        passes = passes or not (images[1] < last or (above and images[1] <= last))
-        fits = images[0] > first_edge and images[1] < first_edge + 2 * period
-        prove(fits or not passes, "its image is as long as the axis")
+        images, passes = turned_images(images, (arb(first_edge), arb(first_edge) + period), (below, above))
     spans = [floats_around(y) for y in images]
     near = [0.5 * (lo + hi) for lo, hi in spans]
     off = max(math.nextafter(hi - lo, math.inf) for lo, hi in spans)
