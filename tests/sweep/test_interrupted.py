@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -87,6 +88,18 @@ def test_a_killed_driver_is_continued_and_leaves_no_workers(seed, tmp_path, whol
         gone, left = psutil.wait_procs(workers, timeout=30)
         assert not left
         assert len(gone) == len(workers)
+    run(store)
+    assert bytes_of(store) == whole
+
+
+def test_an_array_whose_making_was_cut_off_is_made_anew(tmp_path, whole):
+    """A driver may be killed after it made the folder of an array, and before it wrote what the array is."""
+    store = tmp_path / "s.zarr"
+    run(store)
+    shutil.rmtree(store / "chunk_checksum" / "c")
+    shutil.rmtree(store / "height")
+    (store / "height").mkdir()
+    (store / "height" / "zarr.json.1f.partial").write_bytes(b"{")
     run(store)
     assert bytes_of(store) == whole
 

@@ -135,15 +135,9 @@ class Store:
 
     def _opened(self, library: Any) -> zarr.Group:
         """Open a store of this very plan."""
-        try:
+        with self._refusing_others():
             group = library.open_group(str(self.path), mode="r+", zarr_format=3, use_consolidated=False)
             theirs, digest = (dict(group.attrs)[name] for name in ("plan", "plan_hash"))
-            dict(group.arrays())[CHECKSUM]
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise LimitsetsError(
-                "the store", str(self.path), "a new folder, or a store that limitsets atlas began",
-                f"it is none, or damaged ({type(error).__name__}): {_REMEDY}",
-            ) from None  # fmt: skip
         if digest_of(theirs) != digest:
             raise _damaged(self.path, "its plan")
         wrong = list(differences(self.plan.record, theirs))
@@ -160,6 +154,13 @@ class Store:
         assert self.path is not None
         for left in self.path.rglob("*.partial"):  # by a driver that was killed while it wrote
             left.unlink(missing_ok=True)
+        for (
+            begun
+        ) in self.path.iterdir():  # or while it made an array: zarr warns of a folder without its zarr.json
+            if begun.is_dir() and not any(begun.iterdir()):
+                begun.rmdir()
+        with self._refusing_others():
+            dict(group.arrays())[CHECKSUM]
         return group  # type: ignore[no-any-return]  # zarr is imported where it is used
 
     def _is_done(self, number: int) -> bool:
@@ -225,6 +226,17 @@ class Store:
             )
         told = {key: value for key, value in attributes.items() if key != SEAL} | _flags(both)
         attributes.update(told | {SEAL: _seal_of(array, told)})
+
+    @contextmanager
+    def _refusing_others(self) -> Iterator[None]:
+        """Refuse a folder that is no store."""
+        try:
+            yield
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise LimitsetsError(
+                "the store", str(self.path), "a new folder, or a store that limitsets atlas began",
+                f"it is none, or damaged ({type(error).__name__}): {_REMEDY}",
+            ) from None  # fmt: skip
 
     @contextmanager
     def _written(self) -> Iterator[None]:
