@@ -92,35 +92,81 @@ def by_atan2(y: Arb, x: Arb, _: Arb) -> tuple[Arb, Arb]:
     return x / whole, -y / whole
 
 
+Jet = tuple[Arb, Arb, Arb]  # a value, its derivative by x0 and the second
+
+
+def bend_of_product(x: Jet, y: Jet, _: Arb) -> tuple[Arb, Arb]:
+    """Return the two derivatives of x y by x0."""
+    (x0, x1, x2), (y0, y1, y2) = x, y
+    return x1 * y0 + x0 * y1, x2 * y0 + 2 * x1 * y1 + x0 * y2
+
+
+def bend_of_quotient(x: Jet, y: Jet, ratio: Arb) -> tuple[Arb, Arb]:
+    """Return those of x / y."""
+    (_, x1, x2), (y0, y1, y2) = x, y
+    slope = (x1 - ratio * y1) / y0
+    return slope, (x2 - 2 * slope * y1 - ratio * y2) / y0
+
+
+def bend_of_largest(x: Jet, y: Jet, _: Arb) -> tuple[Arb, Arb]:
+    """Return those of max(x, y); nan where neither is surely larger."""
+    apart = x[0] - y[0]
+    return x[1:] if apart > 0 else y[1:] if apart < 0 else (NAN, NAN)
+
+
+def bend_of_least(x: Jet, y: Jet, _: Arb) -> tuple[Arb, Arb]:
+    """Return those of min(x, y)."""
+    apart = y[0] - x[0]
+    return x[1:] if apart > 0 else y[1:] if apart < 0 else (NAN, NAN)
+
+
+def bend_of_atan2(y: Jet, x: Jet, _: Arb) -> tuple[Arb, Arb]:
+    """Return those of atan2(y, x); nan where the box meets the cut."""
+    (y0, y1, y2), (x0, x1, x2) = y, x
+    whole = x0 * x0 + y0 * y0 if x0 > 0 or y0 > 0 or y0 < 0 else NAN
+    slope = (y1 * x0 - y0 * x1) / whole
+    return slope, (y2 * x0 - y0 * x2 - slope * 2 * (x0 * x1 + y0 * y1)) / whole
+
+
 Function = Callable[..., Arb]
 Partials = Callable[[Arb, Arb, Arb], tuple[Arb, Arb]]
-BINARY: dict[str, tuple[Function, Partials]] = {
-    "add": (operator.add, lambda _, __, ___: (ONE, ONE)),
-    "sub": (operator.sub, lambda _, __, ___: (ONE, -ONE)),
-    "mul": (operator.mul, lambda x, y, _: (y, x)),
-    "div": (operator.truediv, by_quotient),
-    "min": (arb.min, by_least),
-    "max": (arb.max, by_largest),
-    "atan2": (arb.atan2, by_atan2),
+Bends = Callable[[Jet, Jet, Arb], tuple[Arb, Arb]]
+BINARY: dict[str, tuple[Function, Partials, Bends]] = {
+    "add": (operator.add, lambda _, __, ___: (ONE, ONE), lambda x, y, _: (x[1] + y[1], x[2] + y[2])),
+    "sub": (operator.sub, lambda _, __, ___: (ONE, -ONE), lambda x, y, _: (x[1] - y[1], x[2] - y[2])),
+    "mul": (operator.mul, lambda x, y, _: (y, x), bend_of_product),
+    "div": (operator.truediv, by_quotient, bend_of_quotient),
+    "min": (arb.min, by_least, bend_of_least),
+    "max": (arb.max, by_largest, bend_of_largest),
+    "atan2": (arb.atan2, by_atan2, bend_of_atan2),
 }
-"""Operations on two numbers, and their partial derivatives at x, y, from the value too."""
+"""Operations on two numbers, their partial derivatives at x, y, from the value too, and derivatives by x0 from those."""
 
-UNARY: dict[str, tuple[Function, Callable[[Arb, Arb], Arb]]] = {
-    "neg": (operator.neg, lambda _, __: -ONE),
-    "abs": (magnitude, lambda x, _: sign(x)),
-    "sqrt": (arb.sqrt, lambda _, v: 1 / (2 * v)),
-    "exp": (arb.exp, lambda _, v: v),
-    "log": (arb.log, lambda x, _: 1 / x),
-    "sin": (arb.sin, lambda x, _: x.cos()),
-    "cos": (arb.cos, lambda x, _: -x.sin()),
-    "tan": (arb.tan, lambda _, v: 1 + v * v),
-    "tanh": (arb.tanh, lambda _, v: 1 - v * v),
-    "floor": (
-        arb.floor,
-        lambda _, v: ZERO if v.is_exact() else NAN,
-    ),  # constant where its ball is one integer
+
+def flat_unless_at_kink(x: Arb, _: Arb) -> Arb:
+    """Return the second derivative of |x|; nan where the kink may lie."""
+    return ZERO if sign(x).is_exact() else NAN
+
+
+def flat_between_jumps(_: Arb, v: Arb) -> Arb:
+    """Return both derivatives of the floor: it is constant where its ball is one integer."""
+    return ZERO if v.is_exact() else NAN
+
+
+Slope = Callable[[Arb, Arb], Arb]
+UNARY: dict[str, tuple[Function, Slope, Slope]] = {
+    "neg": (operator.neg, lambda _, __: -ONE, lambda _, __: ZERO),
+    "abs": (magnitude, lambda x, _: sign(x), flat_unless_at_kink),
+    "sqrt": (arb.sqrt, lambda _, v: 1 / (2 * v), lambda _, v: -1 / (4 * v * v * v)),
+    "exp": (arb.exp, lambda _, v: v, lambda _, v: v),
+    "log": (arb.log, lambda x, _: 1 / x, lambda x, _: -1 / (x * x)),
+    "sin": (arb.sin, lambda x, _: x.cos(), lambda _, v: -v),
+    "cos": (arb.cos, lambda x, _: -x.sin(), lambda _, v: -v),
+    "tan": (arb.tan, lambda _, v: 1 + v * v, lambda _, v: 2 * v * (1 + v * v)),
+    "tanh": (arb.tanh, lambda _, v: 1 - v * v, lambda _, v: -2 * v * (1 - v * v)),
+    "floor": (arb.floor, flat_between_jumps, flat_between_jumps),
 }
-"""Operations on one number, and their derivatives at x, from the value v too."""
+"""Operations on one number, and their first and second derivatives at x, from the value v too."""
 
 
 def slope_of_power(n: int, x: Arb, _: Arb) -> Arb:
@@ -133,19 +179,9 @@ def bend_of_power(n: int, x: Arb, _: Arb) -> Arb:
     return ZERO if n == 1 else arb(n * (n - 1)) * (ONE if n == 2 else power(x, n - 2))
 
 
-BENDS: dict[str, Callable[[Arb, Arb], Arb]] = {
-    "neg": lambda _, __: ZERO,
-    "abs": lambda x, _: ZERO if sign(x).is_exact() else NAN,
-    "sqrt": lambda _, v: -1 / (4 * v * v * v),
-    "exp": lambda _, v: v,
-    "log": lambda x, _: -1 / (x * x),
-    "sin": lambda _, v: -v,
-    "cos": lambda _, v: -v,
-    "tan": lambda _, v: 2 * v * (1 + v * v),
-    "tanh": lambda _, v: -2 * v * (1 - v * v),
-    "floor": UNARY["floor"][1],
-}
-"""Second derivatives of operations on one number, at x, from the value v too; nan where a kink or jump may lie."""
+def powers_of(n: int) -> tuple[Slope, Slope]:
+    """Return the two derivatives of x^n as functions, as `UNARY` has them."""
+    return functools.partial(slope_of_power, n), functools.partial(bend_of_power, n)
 
 
 # ----------------------------------------------------------------
@@ -264,7 +300,7 @@ class Program:
                 first, second = BINARY[word][1](x, y, value) if value.is_finite() else (NAN, NAN)
                 by[k] = [summed(first, u, second, v) for u, v in zip(by[a], by[b], strict=True)]
                 continue
-            slope = functools.partial(slope_of_power, exponent) if word == "pow" else UNARY[word][1]
+            slope = UNARY[word][1] if word != "pow" else powers_of(exponent)[0]
             factor = slope(x, value) if value.is_finite() else NAN
             by[k] = [None if u is None else factor * u for u in by[a]]
         return [[ZERO if u is None else u for u in by[k]] for k in self.out]
@@ -275,6 +311,7 @@ class Program:
         Finite ones are so only where the formula is twice differentiable on the balls of the inputs.
         """
         balls = self.known.copy()
+        flat = ZERO, ZERO
         by: list[tuple[Arb, Arb] | None] = [None] * len(balls)  # None where x0 does not matter
         for k, j in self.inputs:
             balls[k], by[k] = inputs[j], (ONE, ZERO) if j == 0 else None
@@ -288,37 +325,14 @@ class Program:
             if not value.is_finite():
                 by[k] = NAN, NAN
             elif b >= 0:
-                by[k] = bend_of_two(
-                    word, (x, *(by[a] or (ZERO, ZERO))), (balls[b], *(by[b] or (ZERO, ZERO))), value
-                )
+                first, second = (balls[a], *(by[a] or flat)), (balls[b], *(by[b] or flat))
+                by[k] = BINARY[word][2](first, second, value)
             else:
-                power_of = word == "pow"
-                slope = slope_of_power(exponent, x, value) if power_of else UNARY[word][1](x, value)
-                second = bend_of_power(exponent, x, value) if power_of else BENDS[word](x, value)
-                by[k] = slope * own[0], second * own[0] * own[0] + slope * own[1]
+                slope_of, bend_of = UNARY[word][1:] if word != "pow" else powers_of(exponent)
+                slope, bend = slope_of(x, value), bend_of(x, value)
+                by[k] = slope * own[0], bend * own[0] * own[0] + slope * own[1]
         k = self.out[0]
-        return balls[k], *(by[k] or (ZERO, ZERO))
-
-
-Jet = tuple[Arb, Arb, Arb]  # a value, its derivative and the second
-
-
-def bend_of_two(word: str, x: Jet, y: Jet, value: Arb) -> tuple[Arb, Arb]:
-    """Return the two derivatives of an operation on two numbers."""
-    (x0, x1, x2), (y0, y1, y2) = x, y
-    if word in ("add", "sub"):
-        return (x1 + y1, x2 + y2) if word == "add" else (x1 - y1, x2 - y2)
-    if word == "mul":
-        return x1 * y0 + x0 * y1, x2 * y0 + 2 * x1 * y1 + x0 * y2
-    if word == "div":
-        slope = (x1 - value * y1) / y0
-        return slope, (x2 - 2 * slope * y1 - value * y2) / y0
-    if word in ("min", "max"):
-        first = (x0 - y0 > 0) == (word == "max") if x0 - y0 > 0 or x0 - y0 < 0 else None
-        return (NAN, NAN) if first is None else (x1, x2) if first else (y1, y2)
-    whole = y0 * y0 + x0 * x0 if y0 > 0 or x0 > 0 or x0 < 0 else NAN  # atan2 of x, y: not on its cut
-    slope = (x1 * y0 - x0 * y1) / whole
-    return slope, (x2 * y0 - x0 * y2 - slope * 2 * (x0 * x1 + y0 * y1)) / whole
+        return balls[k], *(by[k] or flat)
 
 
 def summed(first: Arb, u: Arb | None, second: Arb, v: Arb | None) -> Arb | None:
