@@ -140,7 +140,7 @@ BINARY: dict[str, tuple[Function, Partials, Bends]] = {
     "max": (arb.max, by_largest, bend_of_largest),
     "atan2": (arb.atan2, by_atan2, bend_of_atan2),
 }
-"""Operations on two numbers, their partial derivatives at x, y, from the value too, and derivatives by x0 from those."""
+"""Operations on two numbers, their partial derivatives at x, y from the value too, and their derivatives by x0."""
 
 
 def flat_unless_at_kink(x: Arb, _: Arb) -> Arb:
