@@ -279,6 +279,13 @@ def test_no_average_is_proved_where_steps_do_not_stretch(name):
     assert why in claim.reason
 
 
+def test_an_average_that_cannot_be_says_why():
+    (claim,) = ls.average(ls.map(stretched, b=2.6), circle(200), lambda x: 1.0 / x).claims
+    assert "the function is not finite on cell 0" in claim.reason
+    (claim,) = ls.average(ls.map(lanford), line(200)).claims
+    assert "periodic=True" in claim.reason
+
+
 def test_what_cannot_be_averaged_is_refused():
     plane = ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=8)
     with pytest.raises(AnswerError, match="one"):

@@ -326,6 +326,9 @@ def search_component(
     if not (steps.least > 0.0).all() or not np.isfinite(steps.bend).all():
         cell = int(steps.cell[np.argmin(np.where(np.isfinite(steps.bend), steps.least, -1.0))])
         return [], f"the slope may be 0 or jump at cell {cell}"
+    bounded = np.isfinite(steps.mean) & np.isfinite(steps.low) & np.isfinite(steps.high)
+    if not bounded.all():
+        return [], f"the function is not finite on cell {int(steps.cell[np.argmin(bounded)])}"
     changes = _changes(grid, own, steps, undecided)
     if isinstance(changes, str):
         return [], changes

@@ -164,7 +164,8 @@ def averaged(proof: ProofOfMap, of: Any) -> ProofOfMap:
     """Prove between which numbers the average of a function lies, as the checker confirms it; the claim `average`."""
     observable = observable_of(of, proof.map)
     if not len(proof.cells):
-        return replace(proof, claims=(undecided("average", "there are no attracting cells"),))
+        reason = "there are no attracting cells: widen the domain, or pass periodic=True for a map modulo its width"
+        return replace(proof, claims=(undecided("average", reason),))
     reason = ""
     for room in WIDER:
         average = _average(proof, observable, *room)
