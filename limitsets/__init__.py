@@ -70,7 +70,7 @@ _PUBLIC = {
     "assemble": "cell.assembly:assemble",
     "atlas": "parameters.atlas:atlas",
     "attractors": "systems.sets:attractors",
-    "average": "proofs.prover.averages_of_map:average",
+    "average": "proofs.prover.averaging:average",
     "audit": "proofs.auditing:audit",
     "basins": "systems.sets:basins",
     "certify": "proofs.prover:certify",

@@ -34,12 +34,15 @@ The files follow docs/certificates.md, and each imports only from those before i
     region       one cell of a plane of parameters                                "Regions"
     plane        a plane of parameters in cells, and its regions
     policy       a policy for a sensor of one bit, and its table                  "Policies"
+    program      formulas as operations: read, evaluated, printed                 "Certificates of any map"
+    observable   what is averaged along orbits                                    "Averages"
+    orbit_average  its average on a line: one inequality for each cell
+    throw_average  what this needs of throws
     claims       the claims of a file, and what each needs
     averages     means over a throw's deviations, in floats                       20, 21
     landings     the throws of one side of a noisy chain, and their branches      18, 19
     links        what a step needs of every cell, and the chain of it             20, 21
     brackets     a claim of probabilities, and its brackets                       22, "Probabilities"
-    program      formulas as operations: read, evaluated, printed                 "Certificates of any map"
     any_map      the map of a file, and one cell of it
     map_cells    the cells, their labels
     map_cycles   periodic orbits, and balls around them

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from flint import arb
 
-from .balls import ZERO, Arb, Pair
+from .balls import ZERO, Arb, Pair, floats_around
 from .cells import Failure
 from .file import is_whole, plain, read_side, require, rows, table
 from .program import Formulas, Program, in_words, named, number, rational, read_formulas
@@ -136,11 +136,6 @@ class Map:
     def piece(self, box: list[Pair]) -> "CellPiece":
         """Return the piece of all x in a box and all parameters."""
         return CellPiece([*box, *self.ranges])
-
-
-def floats_around(x: Arb) -> Pair:
-    """Return a float below a ball and one above it: a conversion is off by less than the step to the next float."""
-    return math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
 
 
 # ----------------------------------------------------------------

@@ -72,6 +72,11 @@ def float_above(value: Arb) -> float:
     return -float_below(-value)
 
 
+def floats_around(x: Arb) -> Pair:
+    """Return a float below a ball and one above it: a conversion is off by less than the step to the next float."""
+    return math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
+
+
 def float_of(value: Fraction, *, up: bool) -> float:
     """Round a rational number, up or down where it is no float."""
     x = float(value)

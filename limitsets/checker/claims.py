@@ -16,6 +16,7 @@ from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
 from .file import Cells, hex_float, plain, read_sections, require, rounded, table
 from .goals import GOALS, check_goal, read_goal_claim, speaks_of_all, statement_of_goal
 from .near_hinge import check_below_cells, check_near_joint, fixed_points_in_words, read_near_hinge
+from .observable import KEYS as OF_AVERAGES, Average, average_in_words
 from .refutations import (
     check_orbits,
     check_refuted,
@@ -25,6 +26,7 @@ from .refutations import (
     statement_of_refutation,
 )
 from .scene import Scene
+from .throw_average import check_throw_average
 
 Failed = dict[str, str]  # by claim the reason why it fails
 
@@ -113,6 +115,8 @@ def check_cell_claims(
         failed |= failing(["end-points"], check_ends, scene, c, claims["end-points"])
     if "cycles" in claims:
         failed |= failing(["cycles"], check_orbits, scene, c, claims["cycles"])
+    if "average" in claims:
+        failed |= failing(["average"], check_throw_average, scene, c, claims["average"]["read"])
     # the cells with a rank, and those without one that some claims are about too
     wide = {name for name in outside if name != "goal" or speaks_of_all(claims["goal"])}
     for names, mask in ((outside, c.rank >= 0), (wide, c.rank < 0)):
@@ -148,6 +152,18 @@ def expanding_statement(section: dict[str, Any], noisy: bool) -> str:
     return f"expanding: |dR'/dR| >= {least!r} on the attracting cells{entropy}"
 
 
+def average_statement(section: dict[str, Any], _: bool) -> str:
+    """Put averages in words."""
+    average: Average = section["read"]
+    numbers = average.components()
+    names = (
+        {k: f"component {k} of the attracting cells" for k in numbers}
+        if len(numbers) > 1
+        else dict.fromkeys(numbers, "the attracting cells")
+    )
+    return f"average: {average_in_words(average, names, ['jog', 'flip'])}"
+
+
 def entropy_of(least: float) -> str:
     """Write the logarithm of a slope, rounded down by more than its error."""
     return rounded(math.log(least) * (1 - 2.0**-40), up=False, digits=6)
@@ -172,6 +188,7 @@ CLAIMS = {
     "expanding": Kind("least_slope", read_expanding, expanding_statement),
     "end-points": Kind("images ends pieces", read_ends, ends_statement),
     "cycles": Kind("cycles complete", read_orbits, lambda section, _: orbits_statement(section)),
+    "average": Kind(OF_AVERAGES, lambda section, _: section, average_statement),
     "refuted": Kind(
         "goal nominal tolerance",
         read_refutation,

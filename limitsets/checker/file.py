@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb
 
-from .balls import Arb, Array, exact, span
+from .balls import Arb, Array, Pair, exact, span
 from .labels import Labelled, Way, range_max
 
 # ----------------------------------------------------------------
@@ -214,6 +214,14 @@ def hex_float(text: object, where: str) -> float:
         return float.fromhex(str(text))
     except OverflowError:
         raise BadFileError(f"{where} is too large") from None
+
+
+def read_box(raw: object, dimension: int, where: str) -> list[Pair]:
+    """Read the ends of a box."""
+    pairs = [rows(pair, where, 2, 2) for pair in rows(raw, where, dimension, dimension)]
+    box = [(hex_float(lo, where), hex_float(hi, where)) for lo, hi in pairs]
+    require(all(lo < hi for lo, hi in box), f"{where}: its ends do not ascend")
+    return box
 
 
 def model_in_words(model: dict[str, Any]) -> str:

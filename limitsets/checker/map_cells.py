@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from flint import arb
 
-from .any_map import Bound, CellClaim, Map, Shape, check_map_cell, floats_around, period_of
-from .balls import ZERO, Arb, Array, Pair, prove
+from .any_map import Bound, CellClaim, Map, Shape, check_map_cell, period_of
+from .balls import ZERO, Arb, Array, Pair, floats_around, prove
 from .cells import CHUNK, Checked, of_box
 from .file import Arrays, require
 from .labels import Labelled, Way, box_max

@@ -12,7 +12,7 @@ from .any_map import Map
 from .balls import Array, UnprovedError, about, prove, reason_of
 from .cells import Crew
 from .claims import Failed, failing
-from .map_average import check_average
+from .map_average import check_map_average
 from .map_cells import MapCells, map_tasks
 from .map_cycles import Cycle
 from .map_file import OF_ORBITS, Goal, MapFile, Part, Regions
@@ -38,7 +38,7 @@ def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[Fail
         if "almost-every" in part.claims and "almost-every" not in failed:
             failed |= failing(["almost-every"], check_weights, the_map, part.cells)
         if part.average is not None and "average" not in failed:
-            failed |= failing(["average"], check_average, the_map, part.cells, part.average)
+            failed |= failing(["average"], check_map_average, the_map, part.cells, part.average)
     return failed, cycles
 
 

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb, arb_mat
 
-from .any_map import Map, Shape, floats_around, possible
-from .balls import ONE, ZERO, Arb, Pair, UnprovedError, about, prove
-from .file import hex_float, is_whole, read_side, require, rounded, rows, table
+from .any_map import Map, Shape, possible
+from .balls import ONE, ZERO, Arb, Pair, UnprovedError, about, floats_around, prove
+from .file import hex_float, is_whole, read_box, read_side, require, rounded, rows, table
 from .map_cells import MapCells
 
 MOST_CYCLES, MOST_POINTS, MOST_TURNS = 1_000, 200, 2**53
@@ -34,14 +34,6 @@ class Listed(NamedTuple):
     frames: list[list[list[float]]]  # by point a matrix, [] where none is needed
     radius: float | None  # of the balls in these frames that the map contracts
     unstable: bool
-
-
-def read_box(raw: object, dimension: int, where: str) -> list[Pair]:
-    """Read the ends of a box."""
-    pairs = [rows(pair, where, 2, 2) for pair in rows(raw, where, dimension, dimension)]
-    box = [(hex_float(lo, where), hex_float(hi, where)) for lo, hi in pairs]
-    require(all(lo < hi for lo, hi in box), f"{where}: its ends do not ascend")
-    return box
 
 
 def read_cycle(raw: object, shape: Shape, where: str) -> Listed:

@@ -11,6 +11,7 @@ from .file import (
     Arrays,
     hex_float,
     is_whole,
+    read_box,
     read_boxes,
     read_sections,
     read_side,
@@ -19,11 +20,11 @@ from .file import (
     table,
     whole_number,
 )
-from .map_average import Average, read_average
 from .map_cells import MapCells
-from .map_cycles import Begins, Listed, read_begins, read_box, read_cycles
+from .map_cycles import Begins, Listed, read_begins, read_cycles
 from .map_orbits import Every, read_every
 from .map_plane import ParameterAxis, RegionPlace, read_axes, read_region_boxes
+from .observable import KEYS as OF_AVERAGES, Allowed, Average, read_average
 
 CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "cycles": "cycles",
@@ -37,7 +38,7 @@ CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "expanding": "least",
     "escapes": "",
     "almost-every": "",
-    "average": "of components lower upper",
+    "average": OF_AVERAGES,
     "refuted": "",
 }
 OF_ORBITS = (
@@ -158,7 +159,9 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     average = None
     if "average" in known:
         require("converges" not in known, f"{where}: average does not stand beside converges")
-        average = read_average(known["average"], arrays, box["prefix"], shape, where)
+        require(shape.dimension == 1, f"{where}: average is of one axis")
+        allowed = Allowed(shape.sides, shape.branches, shape.names)
+        average = read_average(known["average"], arrays, box["prefix"], allowed, where)
     return Part(
         parameters,
         known,

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 from flint import arb
 
-from .any_map import Map, Shape, floats_around, possible
-from .balls import Pair, UnprovedError, about, prove
-from .file import read_side, require, rows, table, whole_number
-from .map_cycles import MOST_POINTS, Boxes, Cycle, newton_image, read_box
+from .any_map import Map, Shape, possible
+from .balls import Pair, UnprovedError, about, floats_around, prove
+from .file import read_box, read_side, require, rows, table, whole_number
+from .map_cycles import MOST_POINTS, Boxes, Cycle, newton_image
 
 MOST_TUBES = 500_000  # of one period: a certificate that needs more is refused
 OPEN = -1  # a side or a branch that is not known yet

@@ -26,8 +26,8 @@ import itertools
 
 import numpy as np
 
-from .any_map import Map, floats_around
-from .balls import Array, UnprovedError
+from .any_map import Map
+from .balls import Array, UnprovedError, floats_around
 from .map_cells import MapCells
 
 SMALLEST, LARGEST = (

@@ -10,10 +10,10 @@ from .any_map import Shape, parameter_in_words
 from .balls import Array, Pair
 from .claims import entropy_of
 from .file import plain
-from .map_average import average_in_words
 from .map_cells import MapCells
 from .map_cycles import Cycle, interval_in_words
 from .map_file import CLAIMS_OF_MAP, OF_ORBITS, Goal, Part, Regions
+from .observable import average_in_words
 from .program import named
 
 MOST_NAMED = 6
@@ -161,9 +161,8 @@ class Proved:
         """Say what the average of a function is."""
         average = self.part.average
         assert average is not None
-        return average_in_words(
-            average, {k: component_in_words(self.cells, k) for k in sorted(average.bounds)}
-        )
+        names = {k: component_in_words(self.cells, k) for k in average.components()}
+        return average_in_words(average, names, ["take branch 0", "take branch 1"])
 
 
 SENTENCES: dict[str, Callable[[Proved], str]] = {

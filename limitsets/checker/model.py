@@ -75,8 +75,13 @@ def over_angles(s: Side, phi: Arb, R: Arb, kappa: Arb) -> tuple[int, Arb, Arb]:
         return decide_exact(s, spin, X, H, kappa), rise_of_jog(s, sin, cos), fall - X
     spin = s.rho2 - s.a * R + 2 * s.a * s.a + s.d * s.d + s.d * s.h
     V = kappa * (s.ell - s.d) - 2 * s.a * (R - s.a)
-    F = spin * (abs(spin) if s.signed else spin) * s.over_2m - V
+    F = excess(s, spin, V)
     return (1 if F > 0 else 0 if F < 0 else 2), -s.h, R - s.a - (kappa - s.small_d) * phi
+
+
+def excess(s: Side, spin: Any, V: Any) -> Any:
+    """Return what is positive where the part flips: sgn(om) K - V in the signed criterion, else K - V."""
+    return spin * (abs(spin) if s.signed else spin) * s.over_2m - V
 
 
 def decide_exact(s: Side, spin: Arb, X: Arb, H: Arb, kappa: Arb) -> int:
@@ -85,8 +90,7 @@ def decide_exact(s: Side, spin: Arb, X: Arb, H: Arb, kappa: Arb) -> int:
     X^2 + H^2 = ell^2 gives ell - H = X^2/(ell + H).  The right-hand side is narrow where H > 0, the left-hand side next
     to H = -ell; both hold wherever they are defined.
     """
-    V = kappa * barrier(s.ell, X, H, s.signed)
-    F = spin * (abs(spin) if s.signed else spin) * s.over_2m - V
+    F = excess(s, spin, kappa * barrier(s.ell, X, H, s.signed))
     if F > 0 or (X < 0 and not s.signed):
         return 1
     return 0 if F < 0 and (s.signed or X > 0) else 2
@@ -115,9 +119,15 @@ class Ratios(NamedTuple):
 
 
 def ratios(p: Arb) -> Ratios:
-    """Evaluate the ratios; W by two sums of 1/6 - p^2/120 + p^4/5040 - ..., which alternates and falls for p^2 < 42."""
-    low = ONE / 6 - p * p / 120
-    return Ratios(p, p.sinc(), HALF * (HALF * p).sinc() ** 2, low.union(low + p**4 / 5040))
+    """Evaluate the ratios; W by two sums of 1/6 - p^2/120 + p^4/5040 - ..., which alternates and falls for p^2 < 42.
+
+    Off 0 also by its definition, which is sharper at a single angle.
+    """
+    low, sine = ONE / 6 - p * p / 120, p.sinc()
+    W = low.union(low + p**4 / 5040)
+    if p > 0:
+        W = W.intersection((1 - sine) / (p * p))
+    return Ratios(p, sine, HALF * (HALF * p).sinc() ** 2, W)
 
 
 def landing_at(s: Side, r: Ratios, kappa: Arb) -> Arb:
@@ -128,6 +138,11 @@ def landing_at(s: Side, r: Ratios, kappa: Arb) -> Arb:
 def landing_slope(s: Side, r: Ratios, kappa: Arb) -> Arb:
     """Evaluate dR(p)/dp = kappa/2 - a (V - W) p - d (sin p/p - V)."""
     return HALF * kappa - s.a * (r.V - r.W) * r.p - s.d * (r.sine - r.V)
+
+
+def landing_bend(s: Side, r: Ratios, cos: Arb) -> Arb:
+    """Evaluate d2R(p)/dp2 = -a (sin p/p - 2 V + 2 W) - d (cos p - 2 sin p/p + 2 V)/p."""
+    return -s.a * (r.sine - 2 * (r.V - r.W)) - s.d * (cos - 2 * (r.sine - r.V)) / r.p
 
 
 def gain_at(a: Arb, d: Arb, h: Arb, r: Ratios) -> Arb:

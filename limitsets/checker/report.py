@@ -42,6 +42,7 @@ from .map_claims import check_parts, work_of_maps
 from .map_file import MapFile, read_map_file
 from .map_plane import region_in_words
 from .model import FORMULAS
+from .observable import Allowed, read_average
 from .plane import (
     Plane,
     area_shares,
@@ -202,8 +203,12 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
     n_sides = len(scenes[0].sides)
     require(all(len(s.sides) == n_sides for s in scenes), "the boxes do not have the same number of sides")
     cells = [read_cells(arrays, box["prefix"], n_sides) for box in boxes]
-    arrays.require_no_others()
     claims, unknown = read_claims(header["claims"], n_sides)
+    if "average" in claims:
+        allowed = Allowed(n_sides, 2, [])
+        average = read_average(claims["average"], arrays, boxes[0]["prefix"], allowed, "section of average")
+        claims["average"] = {"read": average}
+    arrays.require_no_others()
     return Certificate(
         raw,
         [box["parameters"] for box in boxes],
@@ -410,6 +415,9 @@ def failed_at_once(file: Certificate, gap: str, own: dict[str, Any] | None) -> d
         failed["end-points"] = "the landing place moves at every throw: not with noise of it"
     if "feeds" in claims and (file.tolerance is not None or len(file.scenes) > 1):
         failed["feeds"] = "it is about one scene: not with a tolerance"
+    single = file.noise is None and file.tolerance is None and len(file.scenes) == 1
+    if "average" in claims and not single:
+        failed["average"] = "it is about one scene: not with noise, nor with a tolerance"
     for name in {"goal", "refuted"} & set(claims):
         goal = claims[name].get("goal", claims[name])
         if own is not None and content_of_goal(goal) != content_of_goal(own):

@@ -1,6 +1,6 @@
 """The search for the numbers by cell that prove an average: u by value iteration, w from below, in floats.
 
-Theorem and inequalities stand in limitsets/checker/map_average.py; nothing in the proof depends on how u and w are
+Theorem and inequalities stand in limitsets/checker/orbit_average.py; nothing in the proof depends on how u and w are
 found.  u comes by relative value iteration (White, "Dynamic programming, Markov chains, and the method of successive
 approximations", 1963, with half steps); the terms of w enter the function that is averaged, and both are found anew
 until the bounds come no nearer.
@@ -8,139 +8,136 @@ until the bounds come no nearer.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.proofs.prover.certificate_of_map import IMPOSSIBLE, OF_SIZE
-from limitsets.proofs.prover.proof_of_map import ProofOfMap
+from limitsets.numbers.jit import kernel
 from limitsets.systems.cells import Grid
-from limitsets.systems.maps.contract import between
-from limitsets.systems.maps.critical import margins
-from limitsets.systems.maps.derived import branch_boxes
 
-# Steps of an iteration; by how much the span of its changes is smaller each time, and after how many times without a
-# nearer bound there are no more.
-STEPS, LESS_SPAN, NEARER, WORSE = 2_000, 0.7, 0.999, 4
-# Runs beside a change of branch are this share of the cells of a component; half of that where there is no w.
-RUN = 0.25
+# Steps of an iteration, and after how many it is looked whether they settle; by how much the span of its changes is
+# smaller each time, and after how many times without a nearer bound there are no more.
+STEPS, SWEEPS, LESS_SPAN, NEARER, WORSE = 2_000, 8, 0.5, 0.999, 3
+# Runs beside a change of branch are this share of the cells of a component, and each time this share of that, as long
+# as there is no w or the bounds come nearer.
+RUN, LESS_RUN = 0.125, 0.25
 LEAST_S = 2.0**-60
+# What weights leave to the checker, as a share of s; by which share of them they may still fall.
+ROOM, LARGER = 0.05, 3e-4
 # What balls differ by from our boxes, as a share: their radii have 30 bits.
 ROUNDED = 1e-8
 
-Values = Callable[[Array, int, Array], Array]
-"""The function that is averaged, at places of a side with the slopes there."""
+Values = Callable[[Array, Array, int, int], Array]
+"""The function that is averaged, at places, from the slopes there, the side and the branch."""
 
 
 # ---------------------------------------------------------------- cells in floats
 
 
-class Steps(NamedTuple):
-    """Cells of one component on their branches, one row each; and the cells that each image meets, one row each."""
+class Branch(NamedTuple):
+    """Cells of a component that take a branch from one side, one row each: what the inequalities need of them.
+
+    Of a cell with a change of branch `way` is 0 below the change, 1 above.
+    """
 
     cell: Ints
-    way: Ints  # of an undecided cell 0 below its change, 1 above
+    way: Ints
     least: Array  # slope
     bend: Array  # |f''|/f'^2
     off: Array  # what the ends of the image are known to
+    values: Array  # (functions, 3, n): mean, least and largest of what is averaged
+    ends: Array  # (2, n) of the image
+    covered: Ints  # (2, n) target cells, counted on the side where they lie
+    first: int  # cell of that side
+    edges: Array  # of its cells
+
+
+class Steps(NamedTuple):
+    """Cells of one component on their branches, rows in the order of the cells; and the cells that each image meets.
+
+    A cell with a change of branch has two rows, one for either side; every other cell has one.
+    """
+
+    cell: Ints
+    way: Ints
+    least: Array  # slope
+    bend: Array
+    off: Array
     mean: Array  # of the function, its least and its largest value
     low: Array
     high: Array
     length: Array  # of the image
-    begin: Ints  # first row of the cells met; they follow one another
+    begin: Ints  # (rows + 1) first entry of `met` of each row
     met: Ints
     part: Array  # of the image in each
+    first: Ints  # (cells + 1) first row of each cell
 
 
-def _steps(proof: ProofOfMap, own: Mask, undecided: Mask, values: Values, wider: float) -> Steps:
-    """Find what the inequalities need of the cells of a component."""
-    grid, branches = proof.graph.grid, sum(name.startswith("target.") for name in proof.arrays)
-    parts, met, part, begin = [], [], [], 0
-    for side, branch in np.ndindex(grid.sides, branches):
-        target = proof.arrays[f"target.{branch}"]
-        mine = np.flatnonzero(
-            own & (target[:, 0] != IMPOSSIBLE) & (grid.side_of(np.arange(grid.n_cells)) == side)
-        )
-        if not mine.size:
-            continue
-        lo, hi = grid.boxes(mine, side)
-
-        def at(x: Array, side: int = side, branch: int = branch) -> tuple[Array, Array, Array]:
-            boxes = branch_boxes(proof.map, proof.upper, side, branch, x, x)
-            slopes = 0.5 * (boxes.slope_lo + boxes.slope_hi)[:, 0, 0]
-            return 0.5 * (boxes.lo + boxes.hi)[:, 0], slopes, 0.5 * (boxes.hi - boxes.lo)[:, 0]
-
-        whole = branch_boxes(proof.map, proof.upper, side, branch, lo, hi)
-        low, high = whole.slope_lo[:, 0, 0], whole.slope_hi[:, 0, 0]
-        least = np.where(low > 0.0, low, np.where(high < 0.0, -high, 0.0))
-        (first, slope_first, off_first), (last, slope_last, off_last) = at(lo), at(hi)
-        middle = 0.5 * (lo + hi)
-        of_g = [
-            values(x[:, 0], side, slope)
-            for x, slope in ((lo, slope_first), (middle, at(middle)[1]), (hi, slope_last))
-        ]
-        width = (hi - lo)[:, 0]
-        bend = np.abs(slope_last - slope_first) / width / np.maximum(least, LEAST_S) ** 2
-        bend = wider * np.maximum.reduce([bend, np.roll(bend, 1), np.roll(bend, -1)])
-        to, edges = int(grid.offset[whole.side]), grid.edges[whole.side][0]
-        ends, covered = np.sort(np.stack([first, last]), axis=0), target[mine].T.astype(np.int64)
-        rows = np.arange(mine.size)
-        way = np.zeros(mine.size, np.int64)
-        if grid.domain.closes:
-            ends, covered, rows, way = _cut_at_seam(edges, ends, slope_first > 0.0)
-            undecided[mine[rows[mine.size :]]] = True
+def _steps(grid: Grid, branches: Sequence[Branch], own: Mask, undecided: Mask) -> tuple[Steps, Array]:
+    """Put the branches of a component together, its cells counted from 0; without and with the values of functions."""
+    number, lo, hi = np.cumsum(own) - 1, *(np.concatenate(ends) for ends in _ends(grid))
+    covered = []
+    for each in branches:
+        edges, ends = each.edges, each.ends
         # of a cell with two branches the checker takes the neighbours of the target cells too, and of others the cells
         # that the image may meet, by what is known of its ends
-        off = 2.0 * np.maximum(off_first, off_last)
-        first_met = np.searchsorted(edges, ends[0] - off[rows], "left") - 1
-        last_met = np.searchsorted(edges, ends[1] + off[rows], "right") - 1
-        near = np.stack([np.minimum(first_met, covered[0]), np.maximum(last_met, covered[1])])
-        beyond = np.where(undecided[mine[rows]], np.add(covered, [[-1], [1]]), near)
+        first_met = np.searchsorted(edges, ends[0] - each.off, "left") - 1
+        last_met = np.searchsorted(edges, ends[1] + each.off, "right") - 1
+        near = np.stack([np.minimum(first_met, each.covered[0]), np.maximum(last_met, each.covered[1])])
+        beyond = np.where(undecided[each.cell], np.add(each.covered, [[-1], [1]]), near)
         beyond = np.clip(beyond, 0, edges.size - 2)
-        covered = np.where(own[to + beyond], beyond, covered)
-        sizes = covered[1] - covered[0] + 1
-        row = np.repeat(np.arange(rows.size), sizes)
-        k = np.arange(row.size) - np.repeat(np.cumsum(sizes) - sizes, sizes) + covered[0][row]
-        inside = np.minimum(edges[k + 1], ends[1, row]) - np.maximum(edges[k], ends[0, row])
-        begins = begin + np.cumsum(sizes) - sizes
-        if branches > 1 and undecided[mine].any():
-            way[undecided[mine]] = _ways(proof, mine[undecided[mine]], side, branch)
-        alike = (least, bend, off, of_g[1], np.minimum.reduce(of_g), np.maximum.reduce(of_g))
-        parts.append((mine[rows], way, *(each[rows] for each in alike), ends[1] - ends[0], begins))
-        met.append(to + k)
-        part.append(np.maximum(inside, 0.0))
-        begin += row.size
-    columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    return Steps(*(*columns, np.concatenate(met), np.concatenate(part)))
+        covered.append(each.first + np.where(own[each.first + beyond], beyond, each.covered))
+    cell = np.concatenate([each.cell for each in branches])
+    order = np.argsort(cell, kind="stable")
+    ends, met = (np.concatenate(each, axis=1)[:, order] for each in ([b.ends for b in branches], covered))
+    sizes = met[1] - met[0] + 1
+    begin = np.concatenate([[0], np.cumsum(sizes)])
+    row = np.repeat(np.arange(sizes.size), sizes)
+    k = np.arange(row.size) - begin[row] + met[0][row]
+    inside = np.minimum(hi[k], ends[1, row]) - np.maximum(lo[k], ends[0, row])
+    alike = zip(*(each[1:5] for each in branches), strict=True)
+    way, least, bend, off = (np.concatenate(column)[order] for column in alike)
+    values = np.concatenate([each.values for each in branches], axis=2)[:, :, order]
+    cell = number[cell[order]]
+    steps = Steps(
+        cell, way, least, bend, off, *values[0], length=np.maximum(ends[1] - ends[0], 1e-300), begin=begin,
+        met=number[k], part=np.maximum(inside, 0.0), first=np.searchsorted(cell, np.arange(own.sum() + 1)),
+    )  # fmt: skip
+    return steps, values
 
 
-def _cut_at_seam(edges: Array, ends: Array, rises: Mask) -> tuple[Array, Ints, Ints, Ints]:
-    """Turn images to the first period; those that pass the seam, an end of the cells, have two rows."""
-    period = edges[-1] - edges[0]
-    ends = ends - np.floor((ends.mean(axis=0) - edges[0]) / period) * period
-    ends += np.where(ends[0] < edges[0], period, 0.0)
-    passes = np.flatnonzero(ends[1] > edges[-1])
-    below, above = np.minimum(ends, edges[-1]), np.maximum(ends[:, passes] - period, edges[0])
-    ends = np.concatenate([below, above], axis=1)
-    way = np.concatenate([np.zeros(rises.size, np.int64), rises[passes].astype(np.int64)])
-    way[passes] = 1 - way[rises.size :]
-    # an image that ends on a border meets the neighbour too
-    slack = OF_SIZE * (np.abs(edges[0]) + period)
-    first = np.searchsorted(edges, ends[0] - slack, "left") - 1
-    last = np.searchsorted(edges, ends[1] + slack, "right") - 1
-    first, last = (np.clip(each, 0, edges.size - 2) for each in (first, last))
-    return ends, np.stack([first, last]), np.concatenate([np.arange(rises.size), passes]), way
+def _ends(grid: Grid) -> tuple[list[Array], list[Array]]:
+    """Give the ends of all cells, by side."""
+    return [edges[:-1] for (edges,) in grid.edges], [edges[1:] for (edges,) in grid.edges]
 
 
-def _ways(proof: ProofOfMap, cells: Ints, side: int, branch: int) -> Ints:
-    """Say of cells with two branches on which side of the change a branch is taken: 0 below, 1 above."""
-    lo, hi = proof.graph.grid.boxes(cells, side)
-    middle = between(proof.map, proof.upper)
-    rising = margins(middle, hi[:, 0], side) > margins(middle, lo[:, 0], side)
-    return np.where(rising, branch, 1 - branch)
+def values_of(
+    functions: Sequence[Values], x: Sequence[Array], slopes: Sequence[Array], at: tuple[int, int]
+) -> Array:
+    """Give the values of a branch: each function at the ends and the middle of cells, on a side and a branch."""
+    of_g = np.array(
+        [[one(each, slope, *at) for each, slope in zip(x, slopes, strict=True)] for one in functions]
+    )
+    return np.stack([of_g[:, 1], of_g.min(axis=1), of_g.max(axis=1)], axis=1)
+
+
+def bends_of(width: Array, least: Array, slopes: Sequence[Array], wider: float) -> Array:
+    """Bound |f''|/f'^2 on cells by the slopes at their ends, with neighbours."""
+    bend = np.abs(slopes[-1] - slopes[0]) / width / np.maximum(least, LEAST_S) ** 2
+    return wider * np.maximum.reduce([bend, np.roll(bend, 1), np.roll(bend, -1)])
+
+
+class Runs(NamedTuple):
+    """Runs of cells beside changes: by change its row, and by cell of the run the share p; one after another."""
+
+    row: Ints
+    begin: Ints  # (changes + 1)
+    cell: Ints
+    share: Array
+    length: Array  # of the run
 
 
 class Change(NamedTuple):
@@ -150,125 +147,214 @@ class Change(NamedTuple):
     beside: Ints
 
 
-def _changes(grid: Grid, own: Mask, steps: Steps, undecided: Mask) -> list[Change] | str:
+def _changes(grid: Grid, own: Mask, steps: Steps) -> list[Change] | str:
     """List the sides of the changes of branch by undecided cell: below, then above; or say what is missing."""
-    listed = list[Change]()
-    row_of = {
-        (c, way): k for k, (c, way) in enumerate(zip(steps.cell.tolist(), steps.way.tolist(), strict=True))
-    }
-    for cell in np.flatnonzero(undecided).tolist():
+    listed, cells_of, number = list[Change](), np.flatnonzero(own), np.cumsum(own) - 1
+    for row in np.flatnonzero(np.diff(steps.first) == 2).tolist():
+        cell, first = int(cells_of[row]), int(steps.first[row])
         borders = grid.of_side(int(grid.side_of(np.array([cell]))[0]))
-        for way, cells in enumerate(
-            (np.arange(cell - 1, borders.start - 1, -1), np.arange(cell + 1, borders.stop))
-        ):
+        both = np.arange(cell - 1, borders.start - 1, -1), np.arange(cell + 1, borders.stop)
+        for way, cells in enumerate(both):
             stop = np.flatnonzero(~own[cells])
             cells = cells[: stop[0]] if stop.size else cells
             if not cells.size:
                 return f"no cell of the attractor lies beside cell {cell}, in which the branch changes"
-            listed.append(Change(row_of[cell, way], cells))
+            listed.append(Change(first + int(steps.way[first] != way), number[cells]))
     return listed
+
+
+def _runs(changes: Sequence[Change], counts: Sequence[int], width: Array) -> Runs:
+    """Cut the cells beside changes to runs of so many."""
+    cells = [change.beside[:count] for change, count in zip(changes, counts, strict=True)]
+    shares = [np.cumsum(width[some][::-1])[::-1] for some in cells]
+    length = np.array([share[0] for share in shares])
+    return Runs(
+        np.array([change.row for change in changes], np.int64),
+        np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        np.concatenate([np.zeros(0, np.int64), *cells]),
+        np.concatenate([np.zeros(0), *(share / share[0] for share in shares)]),
+        length,
+    )
 
 
 # ---------------------------------------------------------------- u and w
 
 
-@dataclass
-class Search:
-    """Steps of one component, and the two operators on functions by cell."""
+@kernel
+def _largest(steps: Any, values: Any, row: int) -> float:
+    """Return the largest value of the cells that the image of a row meets."""
+    out = values[steps.met[steps.begin[row]]]
+    for k in range(steps.begin[row] + 1, steps.begin[row + 1]):
+        out = max(out, values[steps.met[k]])
+    return out
+
+
+@kernel
+def _mean(steps: Any, values: Any, row: int) -> float:
+    """Return the mean of values over the image of a row."""
+    total = 0.0
+    for k in range(steps.begin[row], steps.begin[row + 1]):
+        total += values[steps.met[k]] * steps.part[k]
+    return total / steps.length[row]
+
+
+@kernel
+def _after_step(steps: Any, sign: float, values: Any, c: int) -> float:
+    """Bound the mean of sign g + u over a cell after a step."""
+    row = steps.first[c]
+    if steps.first[c + 1] == row + 1:
+        return sign * steps.mean[row] + _mean(steps, values, row)
+    of_g = max(sign * steps.low[row], sign * steps.high[row])
+    of_g = max(of_g, max(sign * steps.low[row + 1], sign * steps.high[row + 1]))
+    return of_g + max(_largest(steps, values, row), _largest(steps, values, row + 1))
+
+
+@kernel(entry=True)
+def _iterate(steps: Any, sign: float, more: Any, span: float, u: Any, change: Any) -> float:
+    """Improve u by relative value iteration until what a step brings spans no more than that; what it spans."""
+    apart = math.inf
+    for _ in range(STEPS):
+        low, high = math.inf, -math.inf
+        for c in range(u.size):
+            change[c] = _after_step(steps, sign, u, c) + more[c] - u[c]
+            low, high = min(low, change[c]), max(high, change[c])
+        apart = high - low
+        if not apart > span:
+            break
+        for c in range(u.size):
+            u[c] += 0.5 * (change[c] - 0.5 * (low + high))
+    return apart
+
+
+@kernel
+def _carried(steps: Any, w: Any, c: int) -> float:
+    """Return the largest weight that images of a cell meet, by its least slope."""
+    row = steps.first[c]
+    widest, least = _largest(steps, w, row), steps.least[row]
+    for k in range(row + 1, steps.first[c + 1]):
+        widest, least = max(widest, _largest(steps, w, k)), min(least, steps.least[k])
+    return widest / least
+
+
+@kernel
+def _fill_jumps(steps: Any, runs: Any, w: Any, jumps: Any) -> None:
+    """Fill in by cell what the changes add to the inequality of variations."""
+    jumps[:] = 0.0
+    for k in range(runs.row.size):
+        row = runs.row[k]
+        jump = _largest(steps, w, row) / steps.least[row]
+        jumps[steps.cell[row]] += jump
+        for i in range(runs.begin[k], runs.begin[k + 1]):
+            jumps[runs.cell[i]] += jump * runs.share[i]
+
+
+@kernel
+def _asked(steps: Any, s: Any, w: Any, jumps: Any, c: int) -> float:
+    """Return what the weight of a cell has to be, with room for the checker."""
+    return (s[c] * (1.0 + ROOM) + _carried(steps, w, c) + jumps[c]) * (1.0 + 2.0 * ROUNDED)
+
+
+@kernel(entry=True)
+def _find_weights(steps: Any, runs: Any, s: Any, w: Any, jumps: Any) -> bool:
+    """Find weights from others, each put in place at once; whether they have settled."""
+    most = 1e12 * s.max()
+    for _ in range(STEPS // SWEEPS):
+        for _ in range(SWEEPS):
+            _fill_jumps(steps, runs, w, jumps)
+            for c in range(w.size):
+                w[c] = _asked(steps, s, w, jumps, c)
+        _fill_jumps(steps, runs, w, jumps)
+        settled, largest = True, 0.0
+        for c in range(w.size):
+            missing = _asked(steps, s, w, jumps, c) - w[c]
+            settled &= (missing <= 0.8 * ROOM * s[c] + ROUNDED * w[c]) & (missing >= -LARGER * w[c])
+            largest = max(largest, w[c])
+        if settled or not largest < most:
+            return settled
+    return False
+
+
+@kernel(entry=True)
+def _highest(steps: Any, sign: float, more: Any, u: Any) -> float:
+    """Return the largest bound that u gives."""
+    high = -math.inf
+    for c in range(u.size):
+        high = max(high, _after_step(steps, sign, u, c) + more[c] - u[c])
+    return high
+
+
+@kernel
+def _apart(steps: Any, values: Any, row: int) -> tuple[float, float]:
+    """Return how far values over the image of a row lie apart, and the largest integral of these less their mean."""
+    mean, partial, r = _mean(steps, values, row), 0.0, 0.0
+    least = most = values[steps.met[steps.begin[row]]]
+    for k in range(steps.begin[row], steps.begin[row + 1]):
+        value = values[steps.met[k]]
+        least, most = min(least, value), max(most, value)
+        partial += (value - mean) * steps.part[k]
+        r = max(r, abs(partial))
+    return most - least, r
+
+
+@kernel(entry=True)
+def _fill_slack(steps: Any, width: Any, u: Any, s: Any, off: Any) -> None:
+    """Fill in by cell bounds of the integrals s, and by how much the mean of u over an image is off."""
+    for c in range(u.size):
+        row = steps.first[c]
+        if steps.first[c + 1] == row + 1:
+            apart, r = _apart(steps, u, row)
+            r += 4.0 * steps.off[row] * apart
+            s[c] = r * (1.0 / steps.least[row] + 2.0 * width[c] * steps.bend[row])
+            s[c] += width[c] * (steps.high[row] - steps.low[row]) / 4.0
+            shortest = max(steps.length[row] - 2.0 * steps.off[row], 0.1 * steps.length[row])
+            off[c] = steps.bend[row] * r + 2.0 * steps.off[row] * apart / shortest
+        else:  # of the function and of u, over both sides of the change
+            of_g = max(steps.high[row], steps.high[row + 1]) - min(steps.low[row], steps.low[row + 1])
+            least, most = math.inf, -math.inf
+            for k in range(steps.begin[row], steps.begin[row + 2]):
+                least, most = min(least, u[steps.met[k]]), max(most, u[steps.met[k]])
+            s[c], off[c] = width[c] * (of_g + most - least) / 4.0, 0.0
+
+
+@kernel(entry=True)
+def _fill_means(steps: Any, runs: Any, w: Any, of_b: Any) -> None:
+    """Fill in by cell what weights add to the inequality of means."""
+    for c in range(w.size):
+        widest, bend = 0.0, 0.0
+        for row in range(steps.first[c], steps.first[c + 1]):
+            widest, bend = max(widest, _largest(steps, w, row)), max(bend, steps.bend[row])
+        of_b[c] = widest * bend
+    for k in range(runs.row.size):
+        row = runs.row[k]
+        term = _largest(steps, w, row) / steps.least[row] / runs.length[k]
+        for i in range(runs.begin[k], runs.begin[k + 1]):
+            of_b[runs.cell[i]] += term
+
+
+class Search(NamedTuple):
+    """Steps of one component, widths of its cells, runs beside changes; by how much s is larger than in floats."""
 
     steps: Steps
-    undecided: Mask
     width: Array
-    changes: list[Change]
-    runs: list[int]
+    runs: Runs
     wider: float
-
-    def _by_cell(self, rows: Array, reduce: Any, empty: float) -> Array:
-        out = np.full(self.width.size, empty)
-        reduce.at(out, self.steps.cell, rows)
-        return out
-
-    def largest(self, values: Array) -> Array:
-        """Return by step the largest value that its image meets."""
-        return np.asarray(np.maximum.reduceat(values[self.steps.met], self.steps.begin))
-
-    def after(self, u: Array, sign: float) -> Array:
-        """Bound by cell the mean of sign g + u after a step."""
-        steps, both = self.steps, self.undecided[self.steps.cell]
-        mean = np.add.reduceat(u[steps.met] * steps.part, steps.begin) / np.maximum(steps.length, 1e-300)
-        of_g = sign * steps.mean
-        if both.any():
-            largest = self._by_cell(np.maximum(sign * steps.low, sign * steps.high), np.maximum, -np.inf)
-            of_u = self._by_cell(self.largest(u), np.maximum, -np.inf)
-            return self._by_cell(
-                np.where(both, (largest + of_u)[steps.cell], of_g + mean), np.maximum, -np.inf
-            )
-        return self._by_cell(of_g + mean, np.maximum, -np.inf)
 
     def slack(self, u: Array) -> tuple[Array, Array]:
         """Bound by cell the integrals s, and by how much the mean of u over an image is off."""
-        steps = self.steps
-        mean = np.add.reduceat(u[steps.met] * steps.part, steps.begin) / np.maximum(steps.length, 1e-300)
-        sizes = np.diff(np.append(steps.begin, steps.met.size))
-        partial = np.cumsum((u[steps.met] - np.repeat(mean, sizes)) * steps.part)
-        partial -= np.repeat(
-            partial[steps.begin] - (u[steps.met[steps.begin]] - mean) * steps.part[steps.begin], sizes
-        )
-        apart = self.largest(u) + self.largest(-u)
-        r = np.maximum.reduceat(np.abs(partial), steps.begin) + 4.0 * steps.off * apart
-        wide, spread = self.width[steps.cell], steps.high - steps.low
-        s = self._by_cell(
-            r * (1.0 / steps.least + 2.0 * wide * steps.bend) + wide * spread / 4.0, np.maximum, 0.0
-        )
-        shortest = np.maximum(steps.length - 2.0 * steps.off, 0.1 * steps.length + 1e-300)
-        off = self._by_cell(steps.bend * r + 2.0 * steps.off * apart / shortest, np.maximum, 0.0)
-        both = sum(  # of the function and of u, over both sides of a change
-            self._by_cell(high, np.maximum, -np.inf) + self._by_cell(-low, np.maximum, -np.inf)
-            for low, high in ((steps.low, steps.high), (-self.largest(-u), self.largest(u)))
-        )
-        s = np.where(self.undecided, self.width * both / 4.0, s)
-        return self.wider * s + LEAST_S, np.where(self.undecided, 0.0, off)
+        s, off = np.empty((2, u.size))
+        _fill_slack(self.steps, self.width, u, s, off)
+        return self.wider * s + LEAST_S, off
 
-    def terms(self, w: Array) -> tuple[Array, Array]:
-        """Return by cell what w adds to the inequality of variations, and to that of means."""
-        steps, largest = self.steps, self.largest(w)
-        widest = self._by_cell(largest, np.maximum, 0.0)
-        of_a = widest / self._by_cell(steps.least, np.minimum, np.inf)
-        of_b = widest * self._by_cell(steps.bend, np.maximum, 0.0)
-        for change, count in zip(self.changes, self.runs, strict=True):
-            cells = change.beside[:count]
-            jump, widths = largest[change.row] / steps.least[change.row], self.width[cells]
-            length = widths.sum()
-            of_a[cells] += jump * np.cumsum(widths[::-1])[::-1] / length
-            of_a[steps.cell[change.row]] += jump
-            of_b[cells] += jump / length
-        return of_a, of_b
+    def of_means(self, w: Array) -> Array:
+        """Return by cell what w adds to the inequality of means."""
+        of_b = np.empty(w.size)
+        _fill_means(self.steps, self.runs, w, of_b)
+        return of_b
 
-    def weights(self, s: Array) -> Array | None:
-        """Find w from below, with room for the checker; None where there is none."""
-        w, room = s.copy(), 0.05 * s
-        for _ in range(STEPS):
-            after = (s + room + self.terms(w)[0]) * (1.0 + 2.0 * ROUNDED)
-            if not np.isfinite(after).all() or after.max() > 1e12 * s.max():
-                return None
-            if (after - w <= 0.8 * room + ROUNDED * w).all():
-                return w
-            w = after
-        return None
-
-    def iterated(self, u: Array, sign: float, more: Array, span: float) -> Array | None:
-        """Find u by relative value iteration of sign g + more, until what it brings spans no more than that.
-
-        None where it ends before: rounding, and maxima over images, leave more.
-        """
-        for _ in range(STEPS):
-            change = self.after(u, sign) + more - u
-            low, high = float(change.min()), float(change.max())
-            if high - low <= span:
-                return u
-            u = u + 0.5 * change
-            u -= u.mean()
-        return None
+    def weights(self, s: Array, near: Array) -> Array | None:
+        """Find w from numbers near it; None where there is none."""
+        w = near.copy()
+        return w if _find_weights(self.steps, self.runs, s, w, np.empty(s.size)) else None
 
 
 class Bounds(NamedTuple):
@@ -286,27 +372,28 @@ def _bounds_of(search: Search) -> Bounds | str:
 
     More steps of the iteration leave less of g, and make u rougher, which asks for larger w: the best is between.
     """
-    count, best = search.width.size, None
-    u, more = [np.zeros(count), np.zeros(count)], [np.zeros(count), np.zeros(count)]
-    span, worse = float(search.steps.high.max() - search.steps.low.min()) + 1e-12, 0
+    count, best, steps = search.width.size, None, search.steps
+    u, more, change = np.zeros((2, count)), np.zeros((2, count)), np.empty(count)
+    span, worse = float(steps.high.max() - steps.low.min()) + 1e-12, 0
+    near = np.full(count, 1.0 / count)
     while worse < WORSE and span > 1e-15:
-        after = [
-            search.iterated(each, sign, off, span)
+        apart = [
+            _iterate(steps, sign, off, span, each, change)
             for each, sign, off in zip(u, (1.0, -1.0), more, strict=True)
         ]
-        if after[0] is None or after[1] is None:
+        if not max(apart) <= span:  # rounding, and maxima over images, leave more
             break
-        u = [after[0], after[1]]
         slack = [search.slack(each) for each in u]
-        w = search.weights(np.maximum(slack[0][0], slack[1][0]))
+        s = np.maximum(slack[0][0], slack[1][0])
+        w = search.weights(s, near * s.sum())
         if w is not None:
-            of_b = search.terms(w)[1]
-            more = [off + of_b for _, off in slack]
+            near = w / s.sum()
+            of_b = search.of_means(w)
+            more = np.array([off + of_b for _, off in slack])
             high, low = (
-                float((search.after(each, sign) + off - each).max())
-                for each, sign, off in zip(u, (1.0, -1.0), more, strict=True)
+                _highest(steps, sign, off, each) for each, sign, off in zip(u, (1.0, -1.0), more, strict=True)
             )
-            now = Bounds(u[0], u[1], w, -low, high)
+            now = Bounds(u[0].copy(), u[1].copy(), w, -low, high)
             worse = 0 if best is None or high + low < NEARER * (best.high - best.low) else worse + 1
             best = now if worse == 0 else best
         elif best is None:  # u becomes rougher from here on
@@ -316,28 +403,49 @@ def _bounds_of(search: Search) -> Bounds | str:
 
 
 def search_component(
-    proof: ProofOfMap, own: Mask, values: Values, wider: float
-) -> tuple[list[int], Bounds | str]:
-    """Search on one component, with shorter runs where longer ones have no solution."""
-    grid, number = proof.graph.grid, np.cumsum(own) - 1
-    possible = [each[:, 0] != IMPOSSIBLE for name, each in proof.arrays.items() if name.startswith("target.")]
-    undecided = own & (np.sum(possible, axis=0) > 1)
-    steps = _steps(proof, own, undecided, values, wider)
+    grid: Grid, own: Mask, undecided: Mask, branches: Sequence[Branch], wider: float
+) -> tuple[list[int], list[Bounds] | str]:
+    """Search on one component for the numbers of all functions: runs beside changes, and bounds.
+
+    Runs are shorter where there are no weights for longer ones, which does not depend on the function.
+    """
+    steps, values = _steps(grid, branches, own, undecided)
+    cells_of = np.flatnonzero(own)
     if not (steps.least > 0.0).all() or not np.isfinite(steps.bend).all():
-        cell = int(steps.cell[np.argmin(np.where(np.isfinite(steps.bend), steps.least, -1.0))])
-        return [], f"the slope may be 0 or jump at cell {cell}"
-    bounded = np.isfinite(steps.mean) & np.isfinite(steps.low) & np.isfinite(steps.high)
+        worst = np.argmin(np.where(np.isfinite(steps.bend), steps.least, -1.0))
+        return [], f"the slope may be 0 or jump at cell {int(cells_of[steps.cell[worst]])}"
+    bounded = np.isfinite(values).all(axis=(0, 1))
     if not bounded.all():
-        return [], f"the function is not finite on cell {int(steps.cell[np.argmin(bounded)])}"
-    changes = _changes(grid, own, steps, undecided)
+        return [], f"the function is not finite on cell {int(cells_of[steps.cell[np.argmin(bounded)]])}"
+    changes = _changes(grid, own, steps)
     if isinstance(changes, str):
         return [], changes
-    local = steps._replace(cell=number[steps.cell], met=number[steps.met])
-    changes = [change._replace(beside=number[change.beside]) for change in changes]
-    longest = int(own.sum()) * RUN
+    longest, best, width = int(own.sum()) * RUN, list[Bounds](), grid.measure[own]
+
+    def bounds(number: int, counts: list[int]) -> Bounds | str:
+        mean, low, high = values[number]
+        of_one = steps._replace(mean=mean, low=low, high=high)
+        return _bounds_of(Search(of_one, width, _runs(changes, counts, width), wider))
+
+    counts = list[int]()
     while True:
-        runs = [max(1, min(change.beside.size, int(longest))) for change in changes]
-        answer = _bounds_of(Search(local, undecided[own], grid.measure[own], changes, runs, wider))
-        if not isinstance(answer, str) or longest < 1.0:
-            return runs, answer
-        longest /= 2.0
+        shorter = [max(1, min(change.beside.size, int(longest))) for change in changes]
+        answer = bounds(0, shorter)
+        if isinstance(answer, str):
+            if best or longest < 1.0:
+                break
+        elif best and answer.high - answer.low > 0.995 * (best[0].high - best[0].low):
+            break
+        else:
+            best, counts = [answer], shorter
+        if shorter == counts and max(counts, default=1) == 1:
+            break
+        longest *= LESS_RUN
+    if not best:
+        return [], answer
+    for number in range(1, len(values)):
+        answer = bounds(number, counts)
+        if isinstance(answer, str):
+            return counts, answer
+        best.append(answer)
+    return counts, best

@@ -272,6 +272,7 @@ def write(
     *,
     noise: Mapping[str, str] | None,
     tolerance: Mapping[str, str] | None,
+    arrays: Mapping[str, NDArray[Any]] | None = None,
     recheck: bool = True,
     workers: int | None = 1,
 ) -> float | None:
@@ -287,6 +288,8 @@ def write(
         ``{"claim": ..., "section": {...}}`` each, and the ``verdict`` where it is not "proved".
     noise, tolerance : mapping or None
         Deviations of the parameters for which the claims are proved.
+    arrays : mapping of str to ndarray, optional
+        What claims need beside the cells of the first box.
     recheck : bool
         Whether to check it first.
     workers : int, optional
@@ -302,10 +305,10 @@ def write(
     DeniedError
         The checker does not confirm it: it is kept as NAME.denied.zip.
     """
-    arrays: Arrays = {}
+    packed: Arrays = {f"0.{name}": array for name, array in (arrays or {}).items()}
     boxes = []
     for number, proof in enumerate(proofs):
-        arrays |= arrays_of(proof, f"{number}.")
+        packed |= arrays_of(proof, f"{number}.")
         cover = proof.cover
         # the only effect here is a spread; a scene may leave the model to its defaults
         scene = {word: tidy(table) for word, table in cover.box.scene.items() if word != "effects"}
@@ -317,7 +320,7 @@ def write(
         path,
         _model(proofs[0].cover),
         claims,
-        arrays,
+        packed,
         boxes=boxes,
         noise=noise,
         tolerance=tolerance,

@@ -16,6 +16,7 @@ from limitsets.feeder.scene import Model, Scene
 from limitsets.feeder.scene.quantities import text_at, texts
 from limitsets.feeder.scene.units import convert, parse
 from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.averages import Average
 from limitsets.proofs.prover.certificate import Saved, require_proved, write
 from limitsets.proofs.prover.end_points import union_of
 from limitsets.proofs.prover.goals import State, hexed, rechecked
@@ -257,6 +258,8 @@ class Proof(Saved):
         One per claim asked for.
     seconds : float
         Time it took.
+    average : Average or None
+        If `limitsets.average` was asked: the bounds, and the numbers that prove them.
     """
 
     scene: Scene
@@ -265,6 +268,7 @@ class Proof(Saved):
     attractions: tuple[Attraction, ...]
     claims: tuple[Claim, ...]
     seconds: float
+    average: Average | None = None
 
     def __repr__(self) -> str:
         """Name its scene, and each claim with its verdict."""
@@ -317,7 +321,8 @@ class Proof(Saved):
             return (claims,)
         columns = ("side", Column("x", self.scene.unit, ".6f", ends=True))
         kept = bands_of(self.outer_extents())
-        return claims, Table(columns, kept, "Attracting cells", "proved: no throw leads out")
+        averages = () if self.average is None else (self.average.table(),)
+        return *averages, claims, Table(columns, kept, "Attracting cells", "proved: no throw leads out")
 
     def to_json(self) -> list[dict[str, Any]]:
         """Give it as plain tables for JSON, one per claim, in the words of docs/certificates.md."""
@@ -438,12 +443,14 @@ class Proof(Saved):
             good,
             noise=self.noise,
             tolerance=self.tolerance,
+            arrays={} if self.average is None else self.average.arrays,
             **how,
         )
 
     def denied(self, claims: Mapping[str, str]) -> Proof:
         """Return the proof where the checker denies some claims: these are undecided."""
-        return replace(self, claims=left_of(self.claims, claims))
+        average = None if "average" in claims else self.average
+        return replace(self, claims=left_of(self.claims, claims), average=average)
 
 
 def left_of(claims: Sequence[Claim], denied: Mapping[str, str]) -> tuple[Claim, ...]:

@@ -20,6 +20,7 @@ from limitsets.base import (
     picked,
 )
 from limitsets.base.arrays import Array, Arrays
+from limitsets.proofs.prover.averages import Average
 from limitsets.proofs.prover.certificate import Saved, require_proved
 from limitsets.proofs.prover.certificate_of_map import (
     Numbers,
@@ -44,28 +45,6 @@ from limitsets.systems.sets.basin import passing
 
 # Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
 OF_SLOPES = ("all-cycles", "almost-every", "average", "converges", "cycles", "expanding")
-
-
-@dataclass(frozen=True, eq=False)
-class Average:
-    """The average of a function along orbits, between two numbers on each attracting component.
-
-    Attributes
-    ----------
-    section : dict
-        The claim as a certificate has it: `of`, `components`, `lower` and `upper` (floats in hexadecimal).
-    arrays : dict of str to ndarray
-        ``average.upper``, ``average.lower`` (u of both ends), ``average.weight`` (w), ``average.runs``.
-    """
-
-    section: dict[str, Any]
-    arrays: Arrays
-
-    @property
-    def bounds(self) -> dict[int, tuple[float, float]]:
-        """By component the least and the largest number that the average of almost every start there can tend to."""
-        columns = (self.section[key] for key in ("components", "lower", "upper"))
-        return {k: (float.fromhex(lo), float.fromhex(hi)) for k, lo, hi in zip(*columns, strict=True)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +212,7 @@ class ProofOfMap(Saved):
                 out = CellSet(self.graph.grid, self.exits >= 0)
                 tables.append(_region(out, "Leaving cells", f"{within}; {share}"))
         if self.average is not None:
-            tables.append(_average_table(self.average))
+            tables.append(self.average.table())
         if not len(self.cells):
             return tuple(tables)
         kind = "no image leads out" if self.final is None else "no image leads out, or orbits tend to a cycle"
@@ -268,16 +247,6 @@ def _cycle_table(cycles: tuple[CycleOfMap, ...]) -> Table:
     return Table(
         ("period", "side", *spans, "kind"), rows, "Periodic orbits", "proved: each by one of its points"
     )
-
-
-def _average_table(average: Average) -> Table:
-    """Say between which numbers the average lies on each component."""
-    kinds = {"lyapunov": "the Lyapunov exponent, ln |dx'/dx|", "share": "the share of steps in the places"}
-    what = kinds.get(next(iter(average.section["of"])), "the function")
-    rows = [(component, *ends) for component, ends in average.bounds.items()]
-    ends = (Column("lo", show=".12g"), Column("hi", show=".12g"))
-    said = "proved: of almost every start in the component, and of every invariant density"
-    return Table(("component", *ends), rows, f"Average of {what}", said)
 
 
 def _region(cells: CellSet, caption: str, proved: str, note: str = "") -> Table:

@@ -1,0 +1,288 @@
+"""Averages of functions along almost every orbit: what is averaged, the numbers that prove it, and the answer.
+
+docs/certificates.md, "Averages", and limitsets/checker/orbit_average.py, which has the theorem: numbers u and w by cell
+that satisfy two inequalities on every cell prove the bound c.  `average_search` finds them in floats; what it finds is
+proved once the checker, which shares no code with this, has confirmed it.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from limitsets.base import AnswerError, Column, Table, shown
+from limitsets.base.arrays import Array, Arrays, Ints, Mask
+from limitsets.proofs.prover.average_search import Branch, Values, search_component
+from limitsets.proofs.prover.certificate import DeniedError, Saved
+from limitsets.proofs.prover.certificate_of_map import hexed
+from limitsets.proofs.prover.programs import evaluate
+from limitsets.proofs.prover.recording import names_of, recorded
+from limitsets.systems.cells import Grid
+
+# By how much s and D are larger than floats give, and what remains between the bounds: the checker's are wider by less,
+# if not at the first time.
+WIDER = ((1.02, 0.02), (1.2, 0.2), (2.0, 2.0))
+JOG, FLIP = 0, 1
+
+
+# ---------------------------------------------------------------- what is averaged
+
+
+class Observable(NamedTuple):
+    """A function that is averaged: a name, how a certificate names it, its values, where it jumps, by side."""
+
+    name: str
+    section: dict[str, Any]
+    values: Values
+    jumps: Sequence[tuple[int, float]] = ()
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The functions that are averaged, and quotients of two of them: a name, and their numbers."""
+
+    functions: tuple[Observable, ...]
+    quotients: tuple[tuple[str, int, int], ...] = ()
+
+    @property
+    def jumps(self) -> list[tuple[int, float]]:
+        """Where functions jump, by side."""
+        return [jump for each in self.functions for jump in each.jumps]
+
+
+@np.errstate(divide="ignore")  # a slope of 0, where nothing is proved
+def _logarithm(_: Array, slope: Array, __: int, ___: int) -> Array:
+    return np.asarray(np.log(np.abs(slope)))
+
+
+def _steps(name: str, steps: Sequence[tuple[int, int]]) -> Observable:
+    """Count steps from some sides on some branches."""
+    listed = {"steps": [list(pair) for pair in steps]}
+    return Observable(name, listed, lambda x, _, *key: np.full(x.size, 1.0 if key in steps else 0.0))
+
+
+def _formula(of: Callable[[Any], Any], params: Any) -> Observable:
+    program = recorded(lambda _, x, __: of(x), params, 1, 0)
+    numbers = dict(names_of(params))
+    formula = {key: program[key] for key in ("ops", "out")}
+    name = getattr(of, "__name__", "function")
+    return Observable(
+        "function" if name == "<lambda>" else name,
+        {"formula": formula},
+        lambda x, *_: np.asarray(evaluate(program, x[:, None], numbers)[:, 0]),
+    )
+
+
+def _share(of: Any) -> Observable | None:
+    """Read boxes whose share of time is asked for; None if these are none."""
+    try:
+        boxes = {0: of} if not isinstance(of, Mapping) else of
+        spans = [(int(side), float(lo), float(hi)) for side, listed in boxes.items() for lo, hi in listed]
+    except (TypeError, ValueError):
+        return None
+    if not spans or not all(lo < hi for _, lo, hi in spans):
+        return None
+    listed = [{"side": side, "box": hexed(np.array([[lo, hi]]))} for side, lo, hi in spans]
+
+    def share(x: Array, _: Array, side: int, __: int) -> Array:
+        inside = [(lo <= x) & (x <= hi) for s, lo, hi in spans if s == side]
+        return np.asarray(np.any([np.zeros(x.size, dtype=bool), *inside], axis=0), dtype=np.float64)
+
+    ends = [(side, end) for side, *ends in spans for end in ends]
+    return Observable("share", {"share": listed}, share, ends)
+
+
+OF_THROWS = ("flips_per_throw", "side_shares", "jogs_per_visit")
+
+
+def asked_for(of: Any, params: Any, sides: Sequence[int] = ()) -> Asked:
+    """Read what is averaged, one function or a list of some; `sides` are those where parts of a scene come to rest.
+
+    Raises
+    ------
+    AnswerError
+        What is none of the functions.
+    """
+    several = isinstance(of, list | tuple) and any(isinstance(one, str) or callable(one) for one in of)
+    functions, quotients = list[Observable](), list[tuple[str, int, int]]()
+    for one in of if several else [of]:
+        share = None if isinstance(one, str) or callable(one) else _share(one)
+        if one == "lyapunov":
+            functions.append(Observable("lyapunov", {"lyapunov": True}, _logarithm))
+        elif sides and one == "flips_per_throw":
+            functions.append(_steps(one, [(side, FLIP) for side in sides]))
+        elif sides and one == "side_shares":
+            functions += [_steps(f"share_of_side_{k}", [(k, JOG), (k, FLIP)]) for k in sides]
+        elif sides and one == "jogs_per_visit":
+            for k in sides:
+                quotients.append((f"jogs_per_visit_of_side_{k}", len(functions), len(functions) + 1))
+                functions += [
+                    _steps(f"{word}s_on_side_{k}", [(k, b)]) for b, word in ((JOG, "jog"), (FLIP, "flip"))
+                ]
+        elif callable(one):
+            functions.append(_formula(one, params))
+        elif share is not None:
+            functions.append(share)
+        else:
+            words = ", ".join(f'"{word}"' for word in ("lyapunov", *(OF_THROWS if sides else ())))
+            allowed = f"{words}, a function of x, or ranges [(lo, hi)] whose share of time is asked for"
+            raise AnswerError("the function to average", shown(one), allowed, 'pass "lyapunov"')
+    return Asked(tuple(functions), tuple(quotients))
+
+
+# ---------------------------------------------------------------- the answer
+
+
+@dataclass(frozen=True, eq=False)
+class Average:
+    """Averages of functions along orbits, each between two numbers on each attracting component.
+
+    Attributes
+    ----------
+    asked : Asked
+        The functions.
+    section : dict
+        The claim as a certificate has it: `components`, `functions` (each `of`, `lower`, `upper`), `quotients`.
+    arrays : dict of str to ndarray
+        ``average.upper``, ``average.lower`` (u of both ends), ``average.weight`` (w), ``average.runs``.
+    """
+
+    asked: Asked
+    section: dict[str, Any]
+    arrays: Arrays
+
+    @property
+    def numbers(self) -> dict[str, dict[int, tuple[float, float]]]:
+        """By name and component the least and the largest number that the average of almost every start can tend to."""
+        components = self.section["components"]
+        named = {}
+        for each, one in zip(self.asked.functions, self.section["functions"], strict=True):
+            ends = (map(float.fromhex, one[key]) for key in ("lower", "upper"))
+            named[each.name] = dict(zip(components, zip(*ends, strict=True), strict=True))
+        of = list(named.values())
+        quotients = {
+            name: {k: _quotient(of[i][k], of[j][k]) for k in components} for name, i, j in self._quotients()
+        }
+        return named | quotients
+
+    def _quotients(self) -> list[tuple[str, int, int]]:
+        """Give the quotients whose divisor is proved to be above 0."""
+        kept = {tuple(pair) for pair in self.section["quotients"]}
+        return [(name, i, j) for name, i, j in self.asked.quotients if (i, j) in kept]
+
+    @property
+    def bounds(self) -> dict[int, tuple[float, float]]:
+        """Those of the first function, by component."""
+        return next(iter(self.numbers.values()))
+
+    @property
+    def lo(self) -> float:
+        """The least number that the average of the first function can tend to, on whichever component."""
+        return min(lo for lo, _ in self.bounds.values())
+
+    @property
+    def hi(self) -> float:
+        """The largest."""
+        return max(hi for _, hi in self.bounds.values())
+
+    def table(self) -> Table:
+        """Show all numbers."""
+        rows = [
+            (name.replace("_", " "), component, *ends, ends[1] - ends[0])
+            for name, by_component in self.numbers.items()
+            for component, ends in by_component.items()
+        ]
+        ends = (Column("lo", show=".12g"), Column("hi", show=".12g"), Column("width", show=".2g"))
+        said = "proved: of almost every start in the component, and of every invariant density"
+        return Table(("average", "component", *ends), rows, "Averages along orbits", said)
+
+
+def _quotient(above: tuple[float, float], below: tuple[float, float]) -> tuple[float, float]:
+    """Bound a quotient of two numbers between bounds, of which the second is above 0."""
+    ends = [one / other for one in above for other in below]
+    return math.nextafter(min(ends), -math.inf), math.nextafter(max(ends), math.inf)
+
+
+# ---------------------------------------------------------------- how it is found
+
+
+BranchesOf = Callable[[Mask, Mask, float], Iterable[Branch]]
+"""Gives the branches of a component from its cells, those where the branch is open, and the factor on D."""
+
+UNSOLVED = (
+    "{reason}: an average is proved where steps stretch: no cycle that attracts or is neutral, no slope 0, no change of"
+    " branch that comes back to its own side too soon; finer cells may help"
+)
+
+
+def _found(
+    grid: Grid,
+    component: Ints,
+    undecided: Mask,
+    branches_of: BranchesOf,
+    asked: Asked,
+    room: tuple[float, float],
+) -> Average | str:
+    """Find the numbers of all components, with bounds that are wider by a share; or say what is missing."""
+    (wider, share), count = room, len(asked.functions)
+    arrays = np.zeros((3, grid.n_cells, count))
+    runs = list[tuple[int, int]]()
+    ends: list[tuple[list[str], list[str]]] = [([], []) for _ in asked.functions]
+    positive = np.ones(count, dtype=bool)
+    numbers = range(int(component.max()) + 1)
+    for number in numbers:
+        own, open_cells = component == number, undecided.copy()
+        beside, found = search_component(
+            grid, own, open_cells, list(branches_of(own, open_cells, wider)), wider
+        )
+        if isinstance(found, str):
+            return found
+        runs += list(zip(beside[::2], beside[1::2], strict=True))
+        for k, (upper, lower, weight, low, high) in enumerate(found):
+            arrays[0, own, k], arrays[1, own, k], arrays[2, own, k] = upper, lower, weight
+            size = max(abs(low), abs(high), 1.0) + float(np.abs([upper, lower]).max())
+            wide = share * (high - low) + 2.0**-42 * size
+            ends[k][0].append((low - wide).hex())
+            ends[k][1].append((high + wide).hex())
+            positive[k] &= low - wide > 0.0
+    listed = [
+        {"of": each.section, "lower": lower, "upper": upper}
+        for each, (lower, upper) in zip(asked.functions, ends, strict=True)
+    ]
+    quotients = [[i, j] for _, i, j in asked.quotients if positive[j]]
+    section = {"components": [*numbers], "functions": listed, "quotients": quotients}
+    columns = {
+        f"average.{word}": np.ascontiguousarray(array if count > 1 else array[:, 0])
+        for word, array in zip(("upper", "lower", "weight"), arrays, strict=True)
+    }
+    return Average(asked, section, columns | {"average.runs": np.array(runs, np.int32).reshape(len(runs), 2)})
+
+
+def confirmed(
+    grid: Grid,
+    component: Ints,
+    undecided: Mask,
+    branches_of: BranchesOf,
+    asked: Asked,
+    answer: Callable[[Average], Saved],
+) -> Average | str:
+    """Find averages that the checker confirms of an answer that holds them; or say what is missing."""
+    reason = ""
+    for room in WIDER:
+        average = _found(grid, component, undecided, branches_of, asked, room)
+        if isinstance(average, str):
+            return UNSOLVED.format(reason=average)
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                answer(average).save(Path(folder) / "average.proof.zip")
+            except DeniedError as error:
+                reason = error.claims.get("average", "")
+            else:
+                return average
+    return f"the checker does not confirm it: {reason}"

@@ -1,0 +1,154 @@
+"""Averages along almost every orbit of the throw: cells, and what the search needs of them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from limitsets.base import Progress, silent
+from limitsets.base.arrays import Array, Mask
+from limitsets.feeder.scene import Scene
+from limitsets.numbers.jit import kernel
+from limitsets.proofs.prover.attraction import Attraction, attraction, no_cells
+from limitsets.proofs.prover.average_search import Branch, bends_of, values_of
+from limitsets.proofs.prover.averages import OF_THROWS, Asked, Average, asked_for, confirmed
+from limitsets.proofs.prover.averages_of_map import cut_at_changes, ways_of
+from limitsets.proofs.prover.cover import cover, cover_on, targets
+from limitsets.proofs.prover.parameters import ParameterBox, parameter_box, scattered
+from limitsets.proofs.prover.proof import Claim, Proof, undecided
+from limitsets.systems.cells import Grid
+from limitsets.systems.maps.kernels import image_on
+
+# Cells per side on which the attracting cells are found, in turn; and cells of these for the averages.
+FIRST = (2048, 8192, 32768)
+CELLS = 8192
+# What the checker knows of ends of images, as a share of their size.
+KNOWN = 2.0**-48
+# A cell that holds a change is smaller than this share of its side; how much larger each cell beside it is.
+SMALL, GRADE = 2.0**-30, 4.0
+
+NOTHING = NamedTuple("scene", [])()  # the parameters of a function that is averaged
+
+
+@kernel(entry=True)
+def _throw_all(params: Any, side: int, branch: int, xs: Any, after: Any, slopes: Any) -> None:
+    """Throw from one side on one branch, with slopes."""
+    for k in range(xs.size):
+        after[k], _, slopes[k] = image_on(params, xs[k], side, branch)
+
+
+def _thrown(params: Any, side: int, branch: int, x: Array) -> tuple[Array, Array]:
+    after, slopes = np.empty((2, x.size))
+    _throw_all(params, side, branch, np.ascontiguousarray(x), after, slopes)
+    return after, slopes
+
+
+def fine_cells(attractors: Attraction, cells: int, asked: Asked) -> Grid:
+    """Cut the attracting cells evenly, into so many; around them the cells stay as they are.
+
+    Towards a change of branch cells become smaller: over a cell the decision is known to a share of its width.
+    """
+    grid, kept = attractors.cover.grid, attractors.cells.extents()
+    whole = sum(hi - lo for bands in kept.values() for lo, hi in bands)
+    sides = []
+    for side, (edges,) in enumerate(grid.edges):
+        for lo, hi in kept.get(side, []):
+            evenly = np.linspace(lo, hi, 1 + max(1, round(cells * (hi - lo) / whole)))
+            edges = np.union1d(edges[(edges <= lo) | (hi <= edges)], evenly)
+        sides.append((edges,))
+    box = attractors.cover.box
+    cut = cut_at_changes(*box.bare, Grid(grid.domain, tuple(sides)), asked.jumps)
+    return Grid(grid.domain, tuple((_graded(edges),) for (edges,) in cut.edges))
+
+
+def _graded(edges: Array) -> Array:
+    """Cut the neighbours of very small cells, each time GRADE times larger."""
+    widths, more = np.diff(edges), []
+    for k in np.flatnonzero(widths < SMALL * (edges[-1] - edges[0])).tolist():
+        steps = widths[k] * GRADE ** np.arange(math.log(1.0 / widths[k], GRADE) + 1.0)
+        below, above = edges[k] - steps, edges[k + 1] + steps
+        more += [below[below > edges[max(k - 1, 0)]], above[above < edges[min(k + 2, edges.size - 1)]]]
+    return np.unique(np.concatenate([edges, *more]))
+
+
+def branches_of(
+    attractors: Attraction, asked: Asked, own: Mask, open_cells: Mask, wider: float
+) -> Iterator[Branch]:
+    """Give what the search needs of a component."""
+    covered = attractors.cover
+    grid, params = covered.grid, covered.box.lo
+    for side in range(grid.sides):
+        for branch in (0, 1):
+            to, cells = targets(covered, branch), grid.of_side(side)
+            mine = cells.start + np.flatnonzero(own[cells] & (to[cells, 0] >= 0))
+            if not mine.size:
+                continue
+            lo, hi = (ends[:, 0] for ends in grid.boxes(mine, side))
+            places = (lo, 0.5 * (lo + hi), hi)
+            after, slopes = (
+                np.array(column)
+                for column in zip(*(_thrown(params, side, branch, x) for x in places), strict=True)
+            )
+            least = np.abs(slopes).min(axis=0)
+            least = np.where((slopes > 0.0).all(axis=0) | (slopes < 0.0).all(axis=0), least, 0.0)
+            bend = bends_of(hi - lo, least, slopes, wider)
+            after_side = (side + branch) % grid.sides
+            way = np.zeros(mine.size, np.int64)
+            both = open_cells[mine]
+            if both.any():
+                way[both] = ways_of(params, grid, mine[both], side, branch)
+            yield Branch(
+                mine, way, least * (1.0 - 0.6 * (hi - lo) * bend * least), bend, off=KNOWN * np.abs(after).max(axis=0),
+                values=values_of([each.values for each in asked.functions], places, slopes, (side, branch)),
+                ends=np.sort(after[::2], axis=0), covered=to[mine].T.astype(np.int64) - int(grid.offset[after_side]),
+                first=int(grid.offset[after_side]), edges=grid.edges[after_side][0],
+            )  # fmt: skip
+
+
+def _attracting(box: ParameterBox, tell: Progress) -> Attraction:
+    """Find cells that attract, on finer cells where there are none."""
+    for step, cells in enumerate(FIRST):
+        tell(f"{cells} cells a side", step, len(FIRST) + 1)
+        attractors = attraction(cover(box, cells))
+        if not no_cells(attractors.component):
+            break
+    return attractors
+
+
+def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progress | None) -> Proof:
+    """Prove between which numbers averages of a scene lie, as the checker confirms them; the claim `average`."""
+    begin, tell = time.perf_counter(), progress or silent
+    box = parameter_box(scene)
+    attractors = _attracting(box, tell)
+
+    def left(reason: str) -> Proof:
+        claims = (undecided("average", reason, final=True),)
+        return Proof(scene, {}, {}, (attractors,), claims, time.perf_counter() - begin)
+
+    sides = sorted(side for side, bands in attractors.cells.extents().items() if bands)
+    words = ["lyapunov", *OF_THROWS] if of is None else of
+    asked = asked_for(words, NOTHING, sides or range(box.lo.a.size))
+    if box.effects or scattered(scene):
+        beyond = "effects beyond the minimal model" if box.effects else "a spread"
+        return left(
+            f"averages with {beyond} cannot be proved in this version; limitsets.noise_statistics finds such numbers"
+        )
+    if no_cells(attractors.component):
+        return left(no_cells(attractors.component))
+    tell("averages", len(FIRST), len(FIRST) + 1)
+    attractors = attraction(cover_on(box, fine_cells(attractors, cells or CELLS, asked)))
+    open_cells = (targets(attractors.cover, 0)[:, 0] >= 0) & (targets(attractors.cover, 1)[:, 0] >= 0)
+
+    def answer(average: Average) -> Proof:
+        claims = Claim("invariant", "proved", "", {}), Claim("average", "proved", "", average.section)
+        return Proof(scene, {}, {}, (attractors,), claims, time.perf_counter() - begin, average)
+
+    average = confirmed(
+        attractors.cover.grid, attractors.component, open_cells,
+        lambda *component: branches_of(attractors, asked, *component), asked, answer,
+    )  # fmt: skip
+    return answer(average) if isinstance(average, Average) else left(average)

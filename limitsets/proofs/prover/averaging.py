@@ -1,0 +1,102 @@
+"""Prove averages along almost every orbit: of a map of a line, or of a scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from limitsets.base import AnswerError, Progress, arguments_checked, shown, shown_in_notebooks
+from limitsets.feeder.scene import Scene, load
+from limitsets.proofs.prover.averages import asked_for
+from limitsets.proofs.prover.averages_of_map import averaged, cut_at_changes
+from limitsets.proofs.prover.averages_of_scene import averages_of_scene
+from limitsets.proofs.prover.certifying import require_none
+from limitsets.proofs.prover.of_map import certify_map
+from limitsets.proofs.prover.proof import Proof
+from limitsets.proofs.prover.proof_of_map import ProofOfMap
+from limitsets.systems.cells import Grid
+from limitsets.systems.maps import coerce
+
+
+@shown_in_notebooks
+@arguments_checked
+def average(
+    map: Any,  # noqa: A002  # the field's word
+    grid: Grid | None = None,
+    of: Any = None,
+    *,
+    upper: Any = None,
+    cells: int | None = None,
+    progress: Progress | None = None,
+) -> Proof | ProofOfMap:
+    """Prove between which numbers averages along almost every orbit lie.
+
+    For a scene, or a map of a line, whose steps stretch distances, on average.  For almost every start in an attracting
+    component the average of a function over n steps converges, to a number between the two; so does its mean over every
+    invariant density.  Single starts, such as those on a periodic orbit, may have other averages.
+
+    Parameters
+    ----------
+    map : Scene, str, Path or NamedTuple
+        A scene, what `limitsets.load` takes; or a map of one coordinate, or the lower corner of a box of its
+        parameters.  Kinks and jumps of its formulas have to be changes between its two branches,
+        ``limitsets.map(pieces=(f, g), margin=m)``, or where the image passes the seam of an axis that closes: ``b * x``
+        on ``limitsets.grid([(0, 1)], cells=1000, periodic=True)`` is b x modulo 1.
+    grid : Grid
+        Of a map alone: the cells; the bounds come nearer as 1/cells.
+    of : str, callable, sequence of (float, float), or a list of some of these
+        What is averaged: "lyapunov" for ln |dx'/dx|, a function of x, or ranges of x for the share of steps that are
+        in them (a dict gives ranges by side).  Of a scene also "flips_per_throw", "side_shares" and "jogs_per_visit".
+        Default: "lyapunov", and of a scene all words.
+    upper : NamedTuple, optional
+        Of a map alone: the upper corner of the parameters; the bounds hold for every fixed value between.
+    cells : int, optional
+        Of a scene alone: into how many cells the attracting cells are cut, by default 8192; the bounds come nearer as
+        1/cells.
+    progress : callable, optional
+        Called with the step, how much of it is done, and of how much.
+
+    Returns
+    -------
+    Proof or ProofOfMap
+        With the claim `average`.  Where it is proved `average.numbers` has by name and component the two numbers, and
+        `average.lo`, `average.hi` those of the first function on all components.
+
+    Raises
+    ------
+    AnswerError
+        For a map of more coordinates, arguments of the other kind, or what is none of these functions.
+
+    Examples
+    --------
+    >>> import math
+    >>> import limitsets as ls
+    >>> def stretched(x, b): return b * x  # modulo 1
+    >>> circle = ls.grid([(0.0, 1.0)], cells=200, periodic=True)
+    >>> proof = ls.average(ls.map(stretched, b=2.6), circle)
+    >>> lo, hi = proof.average.bounds[0]
+    >>> lo < math.log(2.6) < hi, hi - lo < 1e-9
+    (True, True)
+    >>> flips = ls.average("paper-designed", of="flips_per_throw", cells=1000).average
+    >>> round(flips.lo, 3), round(flips.hi, 3)
+    (0.319, 0.319)
+    """
+    if isinstance(map, Scene | str | Path):
+        require_none({"upper": upper, "grid": grid}, "average", "beside a scene")
+        if cells is not None and cells < 1:
+            raise AnswerError("the cells of an average", cells, "1 or more", "leave it out")
+        return averages_of_scene(load(map), of, cells, progress)
+    require_none({"cells": cells}, "average", "beside a map")
+    if not isinstance(map, tuple):
+        raise AnswerError(
+            "the map of an average", shown(map), "a scene, or a map of a line", "make one with limitsets.map"
+        )
+    if grid is None:
+        way = "limitsets.average(map, limitsets.grid([(lo, hi)], cells=1000))"
+        raise AnswerError("the grid of an average", None, "the cells to prove it on", f"pass {way}")
+    if grid.dimension != 1:
+        raise AnswerError("the grid of an average", f"{grid.dimension} axes", "one", "averages are of a line")
+    of = "lyapunov" if of is None else of
+    corners = coerce(map), coerce(map if upper is None else upper)
+    fine = cut_at_changes(*corners, grid, asked_for(of, corners[0]).jumps)
+    return averaged(certify_map(map, fine, ["invariant"], upper=upper, progress=progress), of)
