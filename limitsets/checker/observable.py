@@ -213,6 +213,12 @@ def function_in_words(one: Averaged, branches: list[str]) -> str:
     return f"the share of steps that {', '.join(f'{branches[b]} on side {side}' for side, b in one.what)}"
 
 
+def known_bounds(one: Averaged, component: int) -> Pair:
+    """Return the bounds of an average; a share lies between 0 and 1 by itself."""
+    lo, hi = one.bounds[component]
+    return (max(lo, 0.0), min(hi, 1.0)) if one.word in ("share", "steps") else (lo, hi)
+
+
 def quotient_of(above: Pair, below: Pair) -> Pair:
     """Bound a quotient of two numbers between bounds, of which the second is above 0."""
     ends = [Fraction(one) / Fraction(other) for one in above for other in below]
@@ -229,7 +235,7 @@ def lines_of_average(average: Average, components: dict[int, str], branches: lis
     names = [function_in_words(one, branches) for one in average.functions]
     for k, name in components.items():
         yield f"of almost every start in {name} these averages over n steps converge, each to a number between the two"
-        bounds = [one.bounds[k] for one in average.functions]
+        bounds = [known_bounds(one, k) for one in average.functions]
         yield from (f"    {lo!r} to {hi!r}: {what}" for what, (lo, hi) in zip(names, bounds, strict=True))
         for i, j in average.quotients:
             lo, hi = quotient_of(bounds[i], bounds[j])

@@ -16,13 +16,24 @@ import numpy as np
 from flint import arb
 
 from .balls import ONE, ZERO, Arb, Array, Rising, UnprovedError, prove, sine_cosine
-from .end_points import beside_root
 from .file import Cells
-from .model import at_angle, barrier, excess, landing_bend, landing_slope, ratios, rise_of_jog
+from .model import (
+    at_angle,
+    barrier,
+    excess,
+    flight,
+    guess_root,
+    landing_bend,
+    landing_slope,
+    ratios,
+    rise_of_jog,
+)
 from .observable import Average, Observed, OnCell, observed
 from .orbit_average import Enclosed, Step, check_line, enclosed, step_of
 from .program import Program
 from .scene import Scene, Side
+
+AROUND = arb(2) ** -40  # the relative width of balls in which an angle is looked for
 
 
 def check_throw_average(scene: Scene, c: Cells, average: Average) -> None:
@@ -59,14 +70,26 @@ class ThrowsOfSide:
 
     def __init__(self, scene: Scene, side: int):
         self.s, self.side, self.kappa = scene.sides[side], side, scene.k_lo.union(scene.k_hi)
-        self.k_lo, self.k_hi = scene.k_lo, scene.k_hi
+        self.near = 1.0  # an angle to begin with, that of the last throw
         prove(self.s.concave, f"side {side}: kappa > ell is not proved, so that there may be several impacts")
         self.at_border = functools.lru_cache(maxsize=4)(lambda x: self.angle(arb(x)))
 
     def angle(self, x: Arb) -> Arb:
-        """Enclose the angle of the impact of a start."""
-        s = self.s
-        return beside_root(s, x, self.k_hi, True).p.union(beside_root(s, x, self.k_lo, False).p)
+        """Enclose the angle of the impact of a start, by a step of Newton's method in balls.
+
+        f is 0 at 0, positive beyond since x > a, and concave: it has one positive root.
+        """
+        s, kappa = self.s, self.kappa
+        if not s.exact:
+            return 2 * (x - s.a) / (kappa - s.small_d)
+        self.near = guess_root(s.floats, s.exact, float(x), float(kappa.mid()), self.near)
+        p = arb(self.near)
+        around = p + arb(0, 1) * p * AROUND
+        sin, cos = around.sin_cos()
+        root = p - flight(x, kappa, at_angle(s, p)) / (x - s.a * cos + s.d * sin - kappa * around)
+        inside = root > around.lower() and root < around.upper() and root > 0
+        prove(bool(x > s.a and inside), f"the impact is not bracketed at x = {float(x)!r}")
+        return root
 
     def angles(self, ends: tuple[float, float]) -> Arb:
         """Enclose the angles over a cell."""

@@ -174,7 +174,7 @@ def test_the_checker_asks_for_each_term(file, seed, end, tmp_path):
     runs = forged.arrays["0.average.runs"]
     runs[:] = random.integers(1, runs + 1)
     claims = forged.header["boxes"][0]["claims"]
-    section = next(claim["section"] for claim in claims if claim["claim"] == "average")
+    section = next(c["section"]["functions"][0] for c in claims if c["claim"] == "average")
 
     def accepted(c, w):
         forged.arrays["0.average.weight"] = w

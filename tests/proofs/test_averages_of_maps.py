@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from flint import arb
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from limitsets.checker.map_average import LEAST_WEIGHT, indicator_of
+from limitsets.checker.observable import LEAST_WEIGHT, OnCell, bounds_of_share
 from tests.proofs.forge import opened
 
 GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
@@ -80,8 +81,7 @@ def test_averages_that_are_known(name, tmp_path):
     proof.save(tmp_path / "own.proof.zip")
     report = ls.recheck(tmp_path / "own.proof.zip")
     assert report.verdict == "proved"
-    said = f"converges to a number from {lo!r} to {hi!r}; means over invariant densities lie there too"
-    assert report.statement[-1].endswith(said)
+    assert f"\n    {lo!r} to {hi!r}: " in report.statement[-1]
     assert f"{lo:.12g}" in str(proof)
 
 
@@ -138,15 +138,21 @@ def test_a_range_of_a_map_whose_change_moves():
 
 
 def test_places_that_cut_a_cell():
-    places = [(0, [(0.2, 0.4)]), (0, [(0.6, 0.7)])]
+    places = [(0, 0.2, 0.4), (0, 0.6, 0.7)]
+
+    def indicator(side, ends):
+        ball = arb(ends[0]).union(arb(ends[1]))
+        cell = OnCell(side, 0, tuple(ends), ball, middle=ball.mid(), slope=lambda: arb(1), bend=arb(0))
+        return bounds_of_share(places, cell)
+
     for ends, least, most in (
         ([0.3, 0.5], 0, 1),
         ([0.4, 0.6], 0, 0),
         ([0.25, 0.4], 1, 1),
         ([0.39, 0.61], 0, 1),
     ):
-        assert indicator_of(places, 0, ends) == (least, most, least, most, most - least)
-    assert indicator_of(places, 1, [0.3, 0.35])[3] == 0
+        assert indicator(0, ends) == (least, most, least, most, most - least)
+    assert indicator(1, [0.3, 0.35])[3] == 0
 
 
 def sampled(step, of, seeds, throws=4000):
@@ -290,7 +296,7 @@ def test_what_cannot_be_averaged_is_refused():
     plane = ls.grid([(0.0, 1.0), (0.0, 1.0)], cells=8)
     with pytest.raises(AnswerError, match="one"):
         ls.average(tent(1.7), plane)
-    with pytest.raises(AnswerError, match="no scene"):
+    with pytest.raises(AnswerError, match="beside a scene"):
         ls.average(ls.load("paper-designed"), line(64))
     with pytest.raises(AnswerError, match="the grid of an average"):
         ls.average(tent(1.7))
@@ -313,14 +319,18 @@ def section(forged):
     return next(c["section"] for c in forged.header["boxes"][0]["claims"] if c["claim"] == "average")
 
 
+def averaged(forged):
+    return section(forged)["functions"][0]
+
+
 def narrower(forged):
-    lo, hi = (float.fromhex(section(forged)[key][0]) for key in ("lower", "upper"))
-    section(forged)["upper"] = [(hi - 0.3 * (hi - lo)).hex()]
+    lo, hi = (float.fromhex(averaged(forged)[key][0]) for key in ("lower", "upper"))
+    averaged(forged)["upper"] = [(hi - 0.3 * (hi - lo)).hex()]
 
 
 def other_lower(forged):
-    lo, hi = (float.fromhex(section(forged)[key][0]) for key in ("lower", "upper"))
-    section(forged)["lower"] = [(lo + 0.3 * (hi - lo)).hex()]
+    lo, hi = (float.fromhex(averaged(forged)[key][0]) for key in ("lower", "upper"))
+    averaged(forged)["lower"] = [(lo + 0.3 * (hi - lo)).hex()]
 
 
 def array(word, change):
@@ -407,7 +417,7 @@ def test_a_change_on_the_border_of_two_cells_is_not_overlooked(name, tmp_path):
         "0.average.weight": np.full(n, 100.0),
         "0.average.runs": np.zeros((0, 2), np.int32),
     }
-    section(forged).update(lower=[(wrong - 1e-9).hex()], upper=[(wrong + 1e-9).hex()])
+    averaged(forged).update(lower=[(wrong - 1e-9).hex()], upper=[(wrong + 1e-9).hex()])
     report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
     assert report.verdict == "failed"
     whys = ("an undecided cell has no runs beside it", "its image is as long as the axis")
@@ -416,9 +426,9 @@ def test_a_change_on_the_border_of_two_cells_is_not_overlooked(name, tmp_path):
 
 BAD = {
     "a number that is not finite": array("upper", lambda u: u + np.inf),
-    "too few numbers": lambda f: section(f).update(lower=[]),
-    "two functions": lambda f: section(f).update(of={"lyapunov": True, "share": []}),
-    "no function": lambda f: section(f).update(of={}),
+    "too few numbers": lambda f: averaged(f).update(lower=[]),
+    "two functions": lambda f: averaged(f).update(of={"lyapunov": True, "share": []}),
+    "no function": lambda f: averaged(f).update(of={}),
     "one more run": array("runs", lambda r: np.concatenate([r, r])),
 }
 
@@ -437,6 +447,6 @@ def test_numbers_that_are_found_otherwise_are_as_good(tent_file, tmp_path):
     forged = opened(tent_file)
     forged.arrays["0.average.upper"] += 3.0
     forged.arrays["0.average.weight"] *= 1.5
-    lo, hi = (float.fromhex(section(forged)[key][0]) for key in ("lower", "upper"))
-    section(forged).update(lower=[(lo - (hi - lo)).hex()], upper=[(hi + (hi - lo)).hex()])
+    lo, hi = (float.fromhex(averaged(forged)[key][0]) for key in ("lower", "upper"))
+    averaged(forged).update(lower=[(lo - 9 * (hi - lo)).hex()], upper=[(hi + 9 * (hi - lo)).hex()])
     assert ls.recheck(forged.seal().write(tmp_path / "other.zip")).verdict == "proved"

@@ -22,8 +22,8 @@ from limitsets.systems.cells import Grid
 # smaller each time, and after how many times without a nearer bound there are no more.
 STEPS, SWEEPS, LESS_SPAN, NEARER, WORSE = 2_000, 8, 0.5, 0.999, 3
 # Runs beside a change of branch are this share of the cells of a component, and each time this share of that, as long
-# as there is no w or the bounds come nearer.
-RUN, LESS_RUN = 0.125, 0.25
+# as there is no w or the bounds come nearer; the search with shorter runs begins with so much of what was left.
+RUN, LESS_RUN, WORTH, FIRST_SPAN = 0.125, 0.25, 0.99, 4.0
 LEAST_S = 2.0**-60
 # What weights leave to the checker, as a share of s; by which share of them they may still fall.
 ROOM, LARGER = 0.05, 3e-4
@@ -367,35 +367,36 @@ class Bounds(NamedTuple):
     high: float
 
 
-def _bounds_of(search: Search) -> Bounds | str:
-    """Find u of both ends, w, and the two bounds; or say what is missing.
+def _bounds_of(search: Search, first: Bounds | None) -> Bounds | str:
+    """Find u of both ends, w, and the two bounds, from those of other runs if there are any; or say what is missing.
 
     More steps of the iteration leave less of g, and make u rougher, which asks for larger w: the best is between.
     """
-    count, best, steps = search.width.size, None, search.steps
+    count, steps, signs = search.width.size, search.steps, (1.0, -1.0)
     u, more, change = np.zeros((2, count)), np.zeros((2, count)), np.empty(count)
-    span, worse = float(steps.high.max() - steps.low.min()) + 1e-12, 0
-    near = np.full(count, 1.0 / count)
+    span, near = float(steps.high.max() - steps.low.min()) + 1e-12, np.full(count, 1.0 / count)
+    if first is not None:
+        u, span = np.array([first.upper, first.lower]), FIRST_SPAN * (first.high - first.low)
+        slack = [search.slack(each) for each in u]
+        near = first.weight / np.maximum(slack[0][0], slack[1][0]).sum()
+        more = search.of_means(first.weight) + np.array([off for _, off in slack])
+    best, worse = None, 0
     while worse < WORSE and span > 1e-15:
-        apart = [
-            _iterate(steps, sign, off, span, each, change)
-            for each, sign, off in zip(u, (1.0, -1.0), more, strict=True)
-        ]
-        if not max(apart) <= span:  # rounding, and maxima over images, leave more
+        three = list(zip(signs, more, u, strict=True))
+        # rounding, and maxima over images, may leave more
+        if not max(_iterate(steps, sign, off, span, each, change) for sign, off, each in three) <= span:
             break
         slack = [search.slack(each) for each in u]
         s = np.maximum(slack[0][0], slack[1][0])
-        w = search.weights(s, near * s.sum())
+        w, worse = search.weights(s, near * s.sum()), worse + 1
         if w is not None:
             near = w / s.sum()
-            of_b = search.of_means(w)
-            more = np.array([off + of_b for _, off in slack])
+            more = search.of_means(w) + np.array([off for _, off in slack])
             high, low = (
-                _highest(steps, sign, off, each) for each, sign, off in zip(u, (1.0, -1.0), more, strict=True)
+                _highest(steps, sign, off, each) for sign, off, each in zip(signs, more, u, strict=True)
             )
-            now = Bounds(u[0].copy(), u[1].copy(), w, -low, high)
-            worse = 0 if best is None or high + low < NEARER * (best.high - best.low) else worse + 1
-            best = now if worse == 0 else best
+            if best is None or high + low < NEARER * (best.high - best.low):
+                best, worse = Bounds(u[0].copy(), u[1].copy(), w, -low, high), 0
         elif best is None:  # u becomes rougher from here on
             return "the inequality of variations has no solution"
         span *= LESS_SPAN
@@ -420,32 +421,40 @@ def search_component(
     changes = _changes(grid, own, steps)
     if isinstance(changes, str):
         return [], changes
-    longest, best, width = int(own.sum()) * RUN, list[Bounds](), grid.measure[own]
+    width = grid.measure[own]
 
-    def bounds(number: int, counts: list[int]) -> Bounds | str:
+    def bounds(number: int, counts: Sequence[int], first: Bounds | None) -> Bounds | str:
         mean, low, high = values[number]
         of_one = steps._replace(mean=mean, low=low, high=high)
-        return _bounds_of(Search(of_one, width, _runs(changes, counts, width), wider))
+        return _bounds_of(Search(of_one, width, _runs(changes, counts, width), wider), first)
 
-    counts = list[int]()
-    while True:
-        shorter = [max(1, min(change.beside.size, int(longest))) for change in changes]
-        answer = bounds(0, shorter)
-        if isinstance(answer, str):
-            if best or longest < 1.0:
-                break
-        elif best and answer.high - answer.low > 0.995 * (best[0].high - best[0].low):
-            break
-        else:
-            best, counts = [answer], shorter
-        if shorter == counts and max(counts, default=1) == 1:
-            break
-        longest *= LESS_RUN
-    if not best:
-        return [], answer
+    runs, best = _best_runs([change.beside.size for change in changes], own, bounds)
+    if isinstance(best, str):
+        return runs, best
+    found = [best]
     for number in range(1, len(values)):
-        answer = bounds(number, counts)
+        answer = bounds(number, runs, None)
         if isinstance(answer, str):
-            return counts, answer
-        best.append(answer)
-    return counts, best
+            return runs, answer
+        found.append(answer)
+    return runs, found
+
+
+def _best_runs(
+    most: Sequence[int], own: Mask, bounds: Callable[[int, Sequence[int], Bounds | None], Bounds | str]
+) -> tuple[list[int], Bounds | str]:
+    """Find lengths of runs for which the bounds of the first function are nearest; `most` by change."""
+    longest, runs, best = int(own.sum()) * RUN, list[int](), None
+    while True:
+        shorter = [max(1, min(each, int(longest))) for each in most]
+        answer = bounds(0, shorter, best)
+        if isinstance(answer, str):
+            if best is not None or longest < 1.0:
+                return runs, answer if best is None else best
+        elif best is not None and answer.high - answer.low > WORTH * (best.high - best.low):
+            return runs, best
+        else:
+            runs, best = shorter, answer
+            if longest < 1.0 or not most:
+                return runs, best
+        longest *= LESS_RUN

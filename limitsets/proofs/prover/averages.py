@@ -163,8 +163,10 @@ class Average:
         components = self.section["components"]
         named = {}
         for each, one in zip(self.asked.functions, self.section["functions"], strict=True):
-            ends = (map(float.fromhex, one[key]) for key in ("lower", "upper"))
-            named[each.name] = dict(zip(components, zip(*ends, strict=True), strict=True))
+            ends = np.array([[*map(float.fromhex, one[key])] for key in ("lower", "upper")])
+            if {"share", "steps"} & set(each.section):  # these lie between 0 and 1 by themselves
+                ends = np.clip(ends, 0.0, 1.0)
+            named[each.name] = dict(zip(components, zip(*ends.tolist(), strict=True), strict=True))
         of = list(named.values())
         quotients = {
             name: {k: _quotient(of[i][k], of[j][k]) for k in components} for name, i, j in self._quotients()
@@ -206,7 +208,7 @@ class Average:
 def _quotient(above: tuple[float, float], below: tuple[float, float]) -> tuple[float, float]:
     """Bound a quotient of two numbers between bounds, of which the second is above 0."""
     ends = [one / other for one in above for other in below]
-    return math.nextafter(min(ends), -math.inf), math.nextafter(max(ends), math.inf)
+    return max(math.nextafter(min(ends), -math.inf), 0.0), math.nextafter(max(ends), math.inf)
 
 
 # ---------------------------------------------------------------- how it is found
