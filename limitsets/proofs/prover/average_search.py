@@ -30,6 +30,8 @@ ROOM, LARGER = 0.05, 3e-4
 # What balls differ by from our boxes, as a share: their radii have 30 bits.
 ROUNDED = 1e-8
 
+NO_WEIGHTS = "the inequality of variations has no solution"
+
 Values = Callable[[Array, Array, int, int], Array]
 """The function that is averaged, at places, from the slopes there, the side and the branch."""
 
@@ -398,7 +400,7 @@ def _bounds_of(search: Search, first: Bounds | None) -> Bounds | str:
             if best is None or high + low < NEARER * (best.high - best.low):
                 best, worse = Bounds(u[0].copy(), u[1].copy(), w, -low, high), 0
         elif best is None:  # u becomes rougher from here on
-            return "the inequality of variations has no solution"
+            return NO_WEIGHTS
         span *= LESS_SPAN
     return "the iteration of averages does not settle" if best is None else best
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -165,7 +166,7 @@ def averaged(proof: ProofOfMap, of: Any) -> ProofOfMap:
     open_cells = np.sum([each[:, 0] != IMPOSSIBLE for each in _targets(proof)], axis=0) > 1
     average = confirmed(
         proof.graph.grid, proof.arrays["component"], open_cells,
-        lambda *component: branches_of(proof, asked, *component), asked, answer,
+        functools.partial(branches_of, proof, asked), asked, answer,
     )  # fmt: skip
     return (
         answer(average)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.scene import Scene
 from limitsets.numbers.jit import kernel
 from limitsets.proofs.prover.attraction import Attraction, attraction, no_cells
-from limitsets.proofs.prover.average_search import Branch, bends_of, values_of
+from limitsets.proofs.prover.average_search import NO_WEIGHTS, Branch, bends_of, values_of
 from limitsets.proofs.prover.averages import OF_THROWS, Asked, Average, asked_for, confirmed
 from limitsets.proofs.prover.averages_of_map import cut_at_changes, ways_of
 from limitsets.proofs.prover.cover import cover, cover_on, targets
@@ -23,9 +24,9 @@ from limitsets.proofs.prover.proof import Claim, Proof, undecided
 from limitsets.systems.cells import Grid
 from limitsets.systems.maps.kernels import image_on
 
-# Cells per side on which the attracting cells are found, in turn; and cells of these for the averages.
+# Cells per side on which the attracting cells are found, in turn; and cells of these, until there are weights.
 FIRST = (2048, 8192, 32768)
-CELLS = 8192
+CELLS = (8192, 32768, 131072)
 # What the checker knows of ends of images, as a share of their size.
 KNOWN = 2.0**-48
 # A cell that holds a change is smaller than this share of its side; how much larger each cell beside it is.
@@ -112,7 +113,7 @@ def branches_of(
 def _attracting(box: ParameterBox, tell: Progress) -> Attraction:
     """Find cells that attract, on finer cells where there are none."""
     for step, cells in enumerate(FIRST):
-        tell(f"{cells} cells a side", step, len(FIRST) + 1)
+        tell(f"attracting cells, {cells} a side", step, len(FIRST))
         attractors = attraction(cover(box, cells))
         if not no_cells(attractors.component):
             break
@@ -139,16 +140,22 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
         )
     if no_cells(attractors.component):
         return left(no_cells(attractors.component))
-    tell("averages", len(FIRST), len(FIRST) + 1)
-    attractors = attraction(cover_on(box, fine_cells(attractors, cells or CELLS, asked)))
-    open_cells = (targets(attractors.cover, 0)[:, 0] >= 0) & (targets(attractors.cover, 1)[:, 0] >= 0)
+    wide, ladder = attractors, (cells,) if cells else CELLS
+    for step, count in enumerate(ladder):
+        tell(f"{count} cells", step, len(ladder))
+        attractors = attraction(cover_on(box, fine_cells(wide, count, asked)))
+        open_cells = (targets(attractors.cover, 0)[:, 0] >= 0) & (targets(attractors.cover, 1)[:, 0] >= 0)
 
-    def answer(average: Average) -> Proof:
-        claims = Claim("invariant", "proved", "", {}), Claim("average", "proved", "", average.section)
-        return Proof(scene, {}, {}, (attractors,), claims, time.perf_counter() - begin, average)
+        def answer(average: Average, attractors: Attraction = attractors) -> Proof:
+            claims = Claim("invariant", "proved", "", {}), Claim("average", "proved", "", average.section)
+            return Proof(scene, {}, {}, (attractors,), claims, time.perf_counter() - begin, average)
 
-    average = confirmed(
-        attractors.cover.grid, attractors.component, open_cells,
-        lambda *component: branches_of(attractors, asked, *component), asked, answer,
-    )  # fmt: skip
-    return answer(average) if isinstance(average, Average) else left(average)
+        average = confirmed(
+            attractors.cover.grid, attractors.component, open_cells,
+            functools.partial(branches_of, attractors, asked), asked, answer,
+        )  # fmt: skip
+        if isinstance(average, Average):
+            return answer(average)
+        if NO_WEIGHTS not in average:
+            break
+    return left(average)

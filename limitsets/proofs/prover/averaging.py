@@ -51,8 +51,8 @@ def average(
     upper : NamedTuple, optional
         Of a map alone: the upper corner of the parameters; the bounds hold for every fixed value between.
     cells : int, optional
-        Of a scene alone: into how many cells the attracting cells are cut, by default 8192; the bounds come nearer as
-        1/cells.
+        Of a scene alone: into how many cells the attracting cells are cut, by default 8192, more where these do not
+        suffice; the bounds come nearer as 1/cells.
     progress : callable, optional
         Called with the step, how much of it is done, and of how much.
 
