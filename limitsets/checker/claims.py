@@ -10,7 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .balls import UnprovedError, reason_of
-from .cells import Crew, UnprovedSlopeError, check_components, check_ranks, check_structure, tasks_of
+from .cells import (
+    Crew,
+    UnprovedSlopeError,
+    check_components,
+    check_ranks,
+    check_structure,
+    extents,
+    tasks_of,
+)
 from .end_points import check_ends, ends_statement, read_ends
 from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
 from .file import Cells, hex_float, plain, read_sections, require, rounded, table
@@ -153,14 +161,14 @@ def expanding_statement(section: dict[str, Any], noisy: bool) -> str:
 
 
 def average_statement(section: dict[str, Any], _: bool) -> str:
-    """Put averages in words."""
+    """Put averages in words; where some of the attracting cells are left out the others are named by their places."""
     average: Average = section["read"]
+    c: Cells = section["cells"]
     numbers = average.components()
-    names = (
-        {k: f"component {k} of the attracting cells" for k in numbers}
-        if len(numbers) > 1
-        else dict.fromkeys(numbers, "the attracting cells")
-    )
+    if numbers == np.unique(c.component[c.component >= 0]).tolist() and len(numbers) == 1:
+        names = dict.fromkeys(numbers, "the attracting cells")
+    else:
+        names = {k: f"component {k} ({extents(c, c.component == k)})" for k in numbers}
     return f"average: {average_in_words(average, names, ['jog', 'flip'])}"
 
 

@@ -85,7 +85,7 @@ def read_average(
         if is_whole(i, 0, count - 1) and is_whole(j, 0, count - 1)
     ]
     require(len(quotients) == len(section["quotients"]), f"{where}: a quotient is not of two functions")
-    positive = all(lo > 0 for _, j in quotients for lo, _ in functions[j].bounds.values())
+    positive = all(lo >= LEAST_WEIGHT for _, j in quotients for lo, _ in functions[j].bounds.values())
     require(positive, f"{where}: that a divisor is above 0 is not claimed")
     return Average(functions, quotients, arrays.read(f"{prefix}average.runs", "<i4", 2))
 
@@ -123,6 +123,8 @@ def read_function(
     for key in ("lower", "upper"):
         texts = rows(known[key], f"{where}: {key}", len(components), len(components))
         ends.append([hex_float(text, f"{where}: {key}") for text in texts])
+    ordered = all(-MOST_WEIGHT <= lo <= hi <= MOST_WEIGHT for lo, hi in zip(*ends, strict=True))
+    require(ordered, f"{where}: the two ends do not ascend, or are not between -2^100 and 2^100")
     return Averaged(word, what, dict(zip(components, zip(*ends, strict=True), strict=True)), *columns)
 
 
@@ -216,7 +218,7 @@ def function_in_words(one: Averaged, branches: list[str]) -> str:
 def known_bounds(one: Averaged, component: int) -> Pair:
     """Return the bounds of an average; a share lies between 0 and 1 by itself."""
     lo, hi = one.bounds[component]
-    return (max(lo, 0.0), min(hi, 1.0)) if one.word in ("share", "steps") else (lo, hi)
+    return (min(max(lo, 0.0), 1.0), max(min(hi, 1.0), 0.0)) if one.word in ("share", "steps") else (lo, hi)
 
 
 def quotient_of(above: Pair, below: Pair) -> Pair:

@@ -47,13 +47,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .balls import Arb, Array, about, floats_around, prove
-from .file import require
 from .labels import Labelled
 from .observable import LEAST_WEIGHT, MOST_WEIGHT, Average, Averaged, Observed, OnCell
 
-MOST_CHANGES = 2_048
+MOST_CHANGES, MOST_MET = 2_048, 4_096
 LEAST_S = 2.0**-200
-# Of the largest part of a sum: what rounding of 4096 operations comes to is less, and of a few dozen.
+# Of the largest part of a sum: what rounding of MOST_MET operations comes to is less, and of a few dozen.
 ROUNDED, FEW = 2.0**-40, 2.0**-46
 
 # ----------------------------------------------------------------
@@ -251,6 +250,8 @@ def check_line(
         for function in average.functions:
             fits = (function.weight >= LEAST_WEIGHT) & (function.weight <= MOST_WEIGHT)
             c.prove_all(~own | fits, "its weight is not between 2^-100 and 2^100")
+            fits = np.maximum(np.abs(function.upper), np.abs(function.lower)) <= MOST_WEIGHT
+            c.prove_all(fits, "its numbers u are not between -2^100 and 2^100")
         steps = list(steps_of(own))
         changes = np.unique(np.concatenate([step.cells[step.undecided] for step in steps])).tolist()
         prove(len(changes) <= MOST_CHANGES, f"more than {MOST_CHANGES} cells of a component are undecided")
@@ -258,10 +259,12 @@ def check_line(
         row += len(runs)
         prove(len(runs) == len(changes), "an undecided cell has no runs beside it")
         by_cell, met = dict(zip(changes, runs, strict=True)), [met_cells(line, step, own) for step in steps]
+        most = max(cells.most() for cells in met)
+        prove(most <= MOST_MET, f"an image meets more than {MOST_MET} cells")
         for k, function in enumerate(average.functions):
             with about(f"function {k}") if len(average.functions) > 1 else nullcontext():
                 check_function(line, function, k, component, steps, met, by_cell)
-    require(row == len(average.runs), "there are runs beside no undecided cell")
+    prove(row == len(average.runs), "there are runs beside no undecided cell")
 
 
 def check_function(

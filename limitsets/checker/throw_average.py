@@ -10,7 +10,9 @@ the excess of energy, which decides, is proved to rise or fall with p.
 """
 
 import functools
+import math
 from collections.abc import Iterator
+from fractions import Fraction
 
 import numpy as np
 from flint import arb
@@ -39,6 +41,12 @@ AROUND = arb(2) ** -40  # the relative width of balls in which an angle is looke
 def check_throw_average(scene: Scene, c: Cells, average: Average) -> None:
     """Check the bounds of all components that have them, for one scene without noise."""
     functions = observed(average, functools.partial(Program, dimension=1, values={}, wide=[]), [])
+    for i, edges in enumerate(c.edges):
+        own = np.flatnonzero(np.isin(c.component[c.start[i] : c.start[i + 1]], average.components()))
+        on_arm = scene.end is None or not len(own) or Fraction(float(edges[own[-1] + 1])) <= scene.end
+        prove(
+            on_arm, f"side {i}: the cells reach beyond the end of the arm, where parts fall into the cavity"
+        )
     check_line(c, c.edges, average, lambda own: enclosed_throws(scene, c, functions, own))
 
 
@@ -82,13 +90,20 @@ class ThrowsOfSide:
         s, kappa = self.s, self.kappa
         if not s.exact:
             return 2 * (x - s.a) / (kappa - s.small_d)
-        self.near = guess_root(s.floats, s.exact, float(x), float(kappa.mid()), self.near)
+        x0, k = float(x), float(kappa.mid())
+        self.near = guess_root(s.floats, s.exact, x0, k, self.near)
+        if math.isnan(self.near):  # begin where f is below 0
+            a, d, _, _ = s.floats
+            right = (x0 + math.sqrt(max(0.0, x0 * x0 + 2.0 * k * (d + math.hypot(a, d))))) / k
+            self.near = guess_root(s.floats, s.exact, x0, k, right)
         p = arb(self.near)
         around = p + arb(0, 1) * p * AROUND
         sin, cos = around.sin_cos()
         root = p - flight(x, kappa, at_angle(s, p)) / (x - s.a * cos + s.d * sin - kappa * around)
-        inside = root > around.lower() and root < around.upper() and root > 0
-        prove(bool(x > s.a and inside), f"the impact is not bracketed at x = {float(x)!r}")
+        prove(
+            bool(x > s.a and root > 0 and around.contains_interior(root)),
+            f"the impact is not bracketed at x = {x0!r}",
+        )
         return root
 
     def angles(self, ends: tuple[float, float]) -> Arb:
@@ -100,7 +115,7 @@ class ThrowsOfSide:
         s = self.s
         if not s.exact:
             return ONE - 2 * s.h / (self.kappa - s.small_d), ZERO
-        prove(bool(phi > 0 and phi < 3), "that the part lands within 3 radians is not proved")
+        prove_early(phi)
         (sin, cos), r = sine_cosine(phi), ratios(phi)
         steep = landing_slope(s, r, self.kappa)
         prove(bool(steep > 0), "that the angle rises with the start is not proved")
@@ -131,6 +146,11 @@ class ThrowsOfSide:
         return branch if slope > 0 else 1 - branch
 
 
+def prove_early(phi: Arb) -> None:
+    """Prove that angles are such as `ratios` takes."""
+    prove(bool(phi > 0 and phi < 3), "that the part lands within 3 radians is not proved")
+
+
 def excess_slope(s: Side, x: Arb, phi: Arb, kappa: Arb) -> Arb:
     """Enclose the derivative of the excess of energy: by the angle in the exact model, else by the start.
 
@@ -139,10 +159,13 @@ def excess_slope(s: Side, x: Arb, phi: Arb, kappa: Arb) -> Arb:
     if not s.exact:
         spin = Rising(s.rho2 - s.a * x + 2 * s.a * s.a + s.d * s.d + s.d * s.h, [-s.a])
         return excess(s, spin, Rising(ZERO, [-2 * s.a])).by[0]
+    prove_early(phi)
     p = Rising(phi, [ONE])
     sin, cos = p.sin_cos()
     H, X = sin * s.a + cos * s.d, cos * s.a - sin * s.d
     prove(s.signed or bool(X.x > 0), "that the centre of mass is left of the vertex is not proved")
     start = Rising(x, [landing_slope(s, ratios(phi), kappa)])  # R(p)
     spin = X * (start - p * kappa) + H * s.hd + s.rho2
-    return excess(s, spin, barrier(s.ell, X, H, s.signed) * kappa).by[0]
+    rising = excess(s, spin, barrier(s.ell, X, H, s.signed) * kappa)
+    prove(rising.x.is_finite(), "that the excess of energy is bounded is not proved")
+    return rising.by[0]

@@ -82,7 +82,7 @@ def test_averages_that_are_known(name, tmp_path):
     report = ls.recheck(tmp_path / "own.proof.zip")
     assert report.verdict == "proved"
     assert f"\n    {lo!r} to {hi!r}: " in report.statement[-1]
-    assert f"{lo:.12g}" in str(proof)
+    assert str(lo)[:10] in str(proof)
 
 
 def test_bounds_come_nearer_with_the_cells():
@@ -361,6 +361,7 @@ FORGED = {
     ),
     "an empty run": (array("runs", lambda r: 0 * r), "a run beside it"),
     "a run on the wrong side": (array("runs", lambda r: -r), "a run beside it"),
+    "one more run": (array("runs", lambda r: np.concatenate([r, r])), "runs beside no undecided cell"),
     "no runs": (array("runs", lambda r: r[:0]), "no runs beside it"),
     "a component without cells": (lambda f: section(f).update(components=[3]), "component 3 has no cells"),
 }
@@ -429,7 +430,6 @@ BAD = {
     "too few numbers": lambda f: averaged(f).update(lower=[]),
     "two functions": lambda f: averaged(f).update(of={"lyapunov": True, "share": []}),
     "no function": lambda f: averaged(f).update(of={}),
-    "one more run": array("runs", lambda r: np.concatenate([r, r])),
 }
 
 

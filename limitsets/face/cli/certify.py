@@ -145,7 +145,7 @@ def _of_scene(
             yield f"next: {report.pages.after_unproved(proof)}"
 
     code, about = 0 if proof.proved else 1, run.about(proof.model, chosen)
-    return Answer(_records(proof, written), words, proof.table, code=code, about=about)
+    return Answer(records_of(proof, written), words, proof.table, code=code, about=about)
 
 
 def _of_map(
@@ -168,10 +168,10 @@ def _of_map(
             yield table
         yield from said_of(written, missing, partly=not proof.proved)
 
-    return Answer(_records(proof, written), words, proof.table, code=0 if proof.proved else 1)
+    return Answer(records_of(proof, written), words, proof.table, code=0 if proof.proved else 1)
 
 
-def _records(proof: Any, written: dict[str, Any] | None) -> list[dict[str, Any]]:
+def records_of(proof: Any, written: dict[str, Any] | None) -> list[dict[str, Any]]:
     """Give the claims as JSON, each with the time that the recheck took."""
     again = {"recheck": written and written["recheck"]}
     return [each | {"timings": each["timings"] | again} for each in proof.to_json()]

@@ -21,7 +21,7 @@ from limitsets.systems.cells import Grid
 # Steps of an iteration, and after how many it is looked whether they settle; by how much the span of its changes is
 # smaller each time, and after how many times without a nearer bound there are no more.
 STEPS, SWEEPS, LESS_SPAN, NEARER, WORSE = 2_000, 8, 0.5, 0.999, 3
-# Runs beside a change of branch are this share of the cells of a component, and each time this share of that, as long
+# Runs beside a change of branch are this share of the length of a component, and each time this share of that, as long
 # as there is no w or the bounds come nearer; the search with shorter runs begins with so much of what was left.
 RUN, LESS_RUN, WORTH, FIRST_SPAN = 0.125, 0.25, 0.99, 4.0
 LEAST_S = 2.0**-60
@@ -30,7 +30,7 @@ ROOM, LARGER = 0.05, 3e-4
 # What balls differ by from our boxes, as a share: their radii have 30 bits.
 ROUNDED = 1e-8
 
-NO_WEIGHTS = "the inequality of variations has no solution"
+NO_WEIGHTS = "the inequality of variations has no solution of use"
 
 Values = Callable[[Array, Array, int, int], Array]
 """The function that is averaged, at places, from the slopes there, the side and the branch."""
@@ -367,20 +367,23 @@ class Bounds(NamedTuple):
     weight: Array
     low: float
     high: float
+    near: Array  # w by the sum of s
 
 
-def _bounds_of(search: Search, first: Bounds | None) -> Bounds | str:
+def _bounds_of(search: Search, first: Bounds | None, near: Array) -> Bounds | str:
     """Find u of both ends, w, and the two bounds, from those of other runs if there are any; or say what is missing.
+
+    w is looked for near some numbers by cell.
 
     More steps of the iteration leave less of g, and make u rougher, which asks for larger w: the best is between.
     """
     count, steps, signs = search.width.size, search.steps, (1.0, -1.0)
     u, more, change = np.zeros((2, count)), np.zeros((2, count)), np.empty(count)
-    span, near = float(steps.high.max() - steps.low.min()) + 1e-12, np.full(count, 1.0 / count)
+    apart = float(steps.high.max() - steps.low.min())
+    span = apart + 1e-12
     if first is not None:
         u, span = np.array([first.upper, first.lower]), FIRST_SPAN * (first.high - first.low)
         slack = [search.slack(each) for each in u]
-        near = first.weight / np.maximum(slack[0][0], slack[1][0]).sum()
         more = search.of_means(first.weight) + np.array([off for _, off in slack])
     best, worse = None, 0
     while worse < WORSE and span > 1e-15:
@@ -397,12 +400,15 @@ def _bounds_of(search: Search, first: Bounds | None) -> Bounds | str:
             high, low = (
                 _highest(steps, sign, off, each) for sign, off, each in zip(signs, more, u, strict=True)
             )
-            if best is None or high + low < NEARER * (best.high - best.low):
-                best, worse = Bounds(u[0].copy(), u[1].copy(), w, -low, high), 0
+            known = (
+                apart + 1e-9 if best is None else NEARER * (best.high - best.low)
+            )  # without any proof, or till now
+            if high + low < known:
+                best, worse = Bounds(u[0].copy(), u[1].copy(), w, -low, high, near=near), 0
         elif best is None:  # u becomes rougher from here on
             return NO_WEIGHTS
         span *= LESS_SPAN
-    return "the iteration of averages does not settle" if best is None else best
+    return NO_WEIGHTS if best is None else best
 
 
 def search_component(
@@ -428,14 +434,16 @@ def search_component(
     def bounds(number: int, counts: Sequence[int], first: Bounds | None) -> Bounds | str:
         mean, low, high = values[number]
         of_one = steps._replace(mean=mean, low=low, high=high)
-        return _bounds_of(Search(of_one, width, _runs(changes, counts, width), wider), first)
+        near = np.full(width.size, 1.0 / width.size) if first is None else first.near
+        search = Search(of_one, width, _runs(changes, counts, width), wider)
+        return _bounds_of(search, first if number == 0 else None, near)
 
-    runs, best = _best_runs([change.beside.size for change in changes], own, bounds)
+    runs, best = _best_runs([np.cumsum(width[change.beside]) for change in changes], width, bounds)
     if isinstance(best, str):
         return runs, best
     found = [best]
     for number in range(1, len(values)):
-        answer = bounds(number, runs, None)
+        answer = bounds(number, runs, best)
         if isinstance(answer, str):
             return runs, answer
         found.append(answer)
@@ -443,20 +451,22 @@ def search_component(
 
 
 def _best_runs(
-    most: Sequence[int], own: Mask, bounds: Callable[[int, Sequence[int], Bounds | None], Bounds | str]
+    beside: Sequence[Array],
+    width: Array,
+    bounds: Callable[[int, Sequence[int], Bounds | None], Bounds | str],
 ) -> tuple[list[int], Bounds | str]:
-    """Find lengths of runs for which the bounds of the first function are nearest; `most` by change."""
-    longest, runs, best = int(own.sum()) * RUN, list[int](), None
+    """Find lengths of runs for which the bounds of the first function are nearest; `beside` has by change all ends."""
+    longest, shortest, runs, best = width.sum() * RUN, np.median(width), list[int](), None
     while True:
-        shorter = [max(1, min(each, int(longest))) for each in most]
+        shorter = [max(1, int(np.searchsorted(ends, longest))) for ends in beside]
         answer = bounds(0, shorter, best)
         if isinstance(answer, str):
-            if best is not None or longest < 1.0:
+            if best is not None or longest < shortest:
                 return runs, answer if best is None else best
         elif best is not None and answer.high - answer.low > WORTH * (best.high - best.low):
             return runs, best
         else:
             runs, best = shorter, answer
-            if longest < 1.0 or not most:
+            if longest < shortest or not beside:
                 return runs, best
         longest *= LESS_RUN

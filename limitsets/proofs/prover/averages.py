@@ -11,6 +11,7 @@ import math
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,6 +30,7 @@ from limitsets.systems.cells import Grid
 # if not at the first time.
 WIDER = ((1.02, 0.02), (1.2, 0.2), (2.0, 2.0))
 JOG, FLIP = 0, 1
+OUTWARD = (("lo", ROUND_FLOOR), ("hi", ROUND_CEILING))  # how numbers are rounded that are shown
 
 
 # ---------------------------------------------------------------- what is averaged
@@ -196,13 +198,28 @@ class Average:
     def table(self) -> Table:
         """Show all numbers."""
         rows = [
-            (name.replace("_", " "), component, *ends, ends[1] - ends[0])
-            for name, by_component in self.numbers.items()
-            for component, ends in by_component.items()
+            (
+                row["name"].replace("_", " "),
+                row["component"],
+                *(float(Context(12, way).create_decimal(row[end])) for end, way in OUTWARD),
+                row["hi"] - row["lo"],
+            )
+            for row in rows_of(self) or ()
         ]
         ends = (Column("lo", show=".12g"), Column("hi", show=".12g"), Column("width", show=".2g"))
         said = "proved: of almost every start in the component, and of every invariant density"
         return Table(("average", "component", *ends), rows, "Averages along orbits", said)
+
+
+def rows_of(average: Average | None) -> list[dict[str, Any]] | None:
+    """Give all numbers as plain rows: name, component, lo, hi; None where nothing is proved."""
+    if average is None:
+        return None
+    return [
+        {"name": name, "component": component, "lo": lo, "hi": hi}
+        for name, by_component in average.numbers.items()
+        for component, (lo, hi) in by_component.items()
+    ]
 
 
 def _quotient(above: tuple[float, float], below: tuple[float, float]) -> tuple[float, float]:
@@ -244,9 +261,9 @@ def _found(
             grid, own, open_cells, list(branches_of(own, open_cells, wider)), wider
         )
         if isinstance(found, str):
-            return found
+            return found if len(numbers) == 1 else f"component {number}: {found}"
         runs += list(zip(beside[::2], beside[1::2], strict=True))
-        for k, (upper, lower, weight, low, high) in enumerate(found):
+        for k, (upper, lower, weight, low, high, _) in enumerate(found):
             arrays[0, own, k], arrays[1, own, k], arrays[2, own, k] = upper, lower, weight
             size = max(abs(low), abs(high), 1.0) + float(np.abs([upper, lower]).max())
             wide = share * (high - low) + 2.0**-42 * size

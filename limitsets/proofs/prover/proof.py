@@ -16,7 +16,7 @@ from limitsets.feeder.scene import Model, Scene
 from limitsets.feeder.scene.quantities import text_at, texts
 from limitsets.feeder.scene.units import convert, parse
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.averages import Average
+from limitsets.proofs.prover.averages import Average, rows_of
 from limitsets.proofs.prover.certificate import Saved, require_proved, write
 from limitsets.proofs.prover.end_points import union_of
 from limitsets.proofs.prover.goals import State, hexed, rechecked
@@ -345,6 +345,7 @@ class Proof(Saved):
             least_slope=slope,
             entropy=math.log(slope) if slope is not None and not self.noise else None,
             section=claim.section or None,
+            averages=rows_of(self.average) if claim.claim == "average" else None,
             model=self.model,
             cells=sum(each.cover.grid.n_cells for each in attractions),
             undecided=sum(_undecided(each) for each in attractions),

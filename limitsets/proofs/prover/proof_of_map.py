@@ -20,7 +20,7 @@ from limitsets.base import (
     picked,
 )
 from limitsets.base.arrays import Array, Arrays
-from limitsets.proofs.prover.averages import Average
+from limitsets.proofs.prover.averages import Average, rows_of
 from limitsets.proofs.prover.certificate import Saved, require_proved
 from limitsets.proofs.prover.certificate_of_map import (
     Numbers,
@@ -189,6 +189,7 @@ class ProofOfMap(Saved):
                 cells=self.graph.n_cells,
                 attracting=len(self.cells),
                 section=claim.section or None,
+                averages=rows_of(self.average) if claim.claim == "average" else None,
                 cycles=self.cycles if claim.claim in ("all-cycles", "cycles", "converges") else None,
                 timings={"certify": self.seconds},
             )

@@ -1,0 +1,93 @@
+"""`limitsets average`: between which numbers averages along almost every orbit lie, proved, with a certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import limitsets as ls
+from limitsets.base import Table
+from limitsets.face.cli.arguments import certified_claims, own_file, said_of, with_ending
+from limitsets.face.cli.certify import records_of
+from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
+from limitsets.face.cli.output import saved
+from limitsets.face.cli.subjects import MapOfFile, domain_of, of_scene_alone, spans, subject
+
+# Cells of a map's domain.
+CELLS = 10_000
+
+
+@command(out="--save")
+def average(
+    run: Run,
+    scene: Scene,
+    *,
+    of: Words = None,
+    set_: Words = None,
+    domain: str | None = None,
+    periodic: bool = False,
+    cells: Annotated[int | None, limits(min=1)] = None,
+    no_recheck: bool = False,
+) -> Answer:
+    """Prove between which numbers averages along almost every orbit lie, and write a certificate.
+
+    Exit 1 where they are not proved.
+
+    Parameters
+    ----------
+    scene : SCENE
+        A built-in name, a TOML file, or a map of a line FILE.py:NAME; the Python file is run.
+    of : WORD,WORD
+        What is averaged: lyapunov, or LO:HI for the share of steps there; of a scene also flips_per_throw, side_shares,
+        jogs_per_visit, and SIDE=LO:HI; repeatable; by default all words.
+    set_ : NAME=NUMBER
+        Of a map: the value of a parameter, like a=1.4, or its range, like a=1.4:1.41; repeatable.
+    domain : LO:HI
+        Of a map: a range.
+    periodic
+        Of a map: it is taken modulo the width of the domain.
+    cells : N
+        Cells: the bounds come nearer as 1/N.
+    out : FILE
+        The certificate, NAME.proof.zip; ./ and the name of the scene or map by default.
+    """
+    functions = [_function(word.strip()) for each in of or [] for word in each.split(",")] or None
+    chosen = subject(scene, set_)
+    if isinstance(chosen, MapOfFile):
+        line = ls.grid(domain_of(chosen, domain), cells=cells or CELLS, periodic=periodic)
+        how: dict[str, Any] = {"grid": line, "upper": chosen.upper}
+        thing, file, name = (
+            chosen.lower,
+            with_ending(run.out or Path(f"{chosen.name}.proof.zip")),
+            chosen.name,
+        )
+    else:
+        of_scene_alone(chosen, {"--domain": domain, "--periodic": periodic or None})
+        how, thing, name = {"cells": cells}, chosen, chosen.name
+        file = own_file(chosen) if run.out is None else with_ending(run.out)
+    with saved(file):  # refuses a place that cannot be written before anything is proved
+        proof = ls.average(thing, of=functions, progress=run.tell, **how)
+    run.tell("recheck", 0, 1)
+    proof, written, missing = certified_claims(proof, file, recheck=not no_recheck)
+
+    def words() -> Iterator[str | Table]:
+        if proof.average is None:
+            yield f"{name}: nothing is proved: {proof.claims[-1].reason}"
+        else:
+            table = proof.average.table()
+            yield f"{name}: {table.how}"
+            yield table
+        yield from said_of(written, missing)
+
+    about = None if isinstance(chosen, MapOfFile) else run.about(proof.model, chosen)
+    shown = proof.table if proof.average is None else proof.average.table
+    return Answer(records_of(proof, written), words, shown, code=0 if proof.average else 1, about=about)
+
+
+def _function(word: str) -> Any:
+    """Read a word, or a range with a side before it."""
+    if ":" not in word:
+        return word
+    side, _, box = word.rpartition("=")
+    return {int(side) if side.isdigit() else 0: spans(box, "--of")}

@@ -1,0 +1,402 @@
+"""Averages of throws: known numbers, orbits, what the checker encloses of a throw, forged files, scenes without one."""
+
+import functools
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from flint import arb
+
+import limitsets as ls
+from limitsets.base import AnswerError
+from limitsets.checker.balls import UnprovedError
+from limitsets.checker.claims import average_statement
+from limitsets.checker.file import open_certificate
+from limitsets.checker.report import read_certificate
+from limitsets.checker.scene import read_scene
+from limitsets.checker.throw_average import ThrowsOfSide, excess_slope
+from limitsets.systems.maps import advance
+from tests.proofs.forge import MODELS, Plain, opened, scene
+from tests.proofs.test_certify import random_scene
+
+
+@pytest.fixture(scope="module")
+def designed():
+    return ls.average("paper-designed")
+
+
+@pytest.fixture(scope="module")
+def designed_file(designed, tmp_path_factory):
+    return designed.save(tmp_path_factory.mktemp("average") / "designed.proof.zip")
+
+
+def between(proof, name):
+    assert proof.average is not None, proof.claims[-1].reason
+    ((lo, hi),) = proof.average.numbers[name].values()
+    return lo, hi
+
+
+# ---------------------------------------------------------------- numbers
+
+# 6e7 throws in floats, and brackets of an independent search on 32 000 and 128 000 cells, kept to their digits.
+KNOWN = {
+    "lyapunov": (0.205679, 6e-5),
+    "flips_per_throw": (0.319163, 6e-4),
+    "share_of_side_0": (0.106391, 2e-4),
+    "share_of_side_1": (0.106391, 2e-4),
+    "share_of_side_2": (0.787218, 4e-4),
+    "jogs_per_visit_of_side_2": (6.399, 0.02),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_numbers_of_the_designed_feeder(name, designed):
+    known, width = KNOWN[name]
+    lo, hi = between(designed, name)
+    assert lo < known < hi
+    assert hi - lo < width
+
+
+def test_the_checker_states_what_is_claimed(designed, designed_file):
+    report = ls.recheck(designed_file)
+    assert report.verdict == "proved"
+    lo, hi = between(designed, "lyapunov")
+    text = "\n".join(report.statement)
+    assert f"{lo!r} to {hi!r}: ln |dx'/dx|, whose average is the Lyapunov exponent" in text
+    assert "of almost every start in the attracting cells these averages over n steps converge" in text
+    lo, hi = between(designed, "jogs_per_visit_of_side_2")
+    # a quotient is rounded by either side on its own
+    assert any(
+        math.isclose(float(line.split()[0]), lo, rel_tol=1e-15)
+        for line in text.splitlines()
+        if "quotient of function 9" in line
+    )
+    assert designed.average.lo == designed.average.bounds[0][0]
+
+
+def test_bounds_of_one_proof_agree(designed):
+    """Shares add up to 1, and are made of jogs and flips: so each pair of intervals has to meet."""
+    sums = np.sum([between(designed, f"share_of_side_{k}") for k in range(3)], axis=0)
+    assert sums[0] < 1.0 < sums[1]
+    for k in range(3):
+        made = np.sum([between(designed, f"{word}_on_side_{k}") for word in ("jogs", "flips")], axis=0)
+        lo, hi = between(designed, f"share_of_side_{k}")
+        assert max(lo, made[0]) <= min(hi, made[1])
+
+
+def test_a_constant_slope_is_its_exponent():
+    """In the small-angle flight dx'/dx = 1 - 2 h/kappa everywhere."""
+    given = ls.load("paper-designed-small-angle").text
+    h, kappa = (
+        mpmath.mpf(text.split()[0]) for text in (given["arm"]["surface_height"], given["throw"]["kappa"])
+    )
+    lo, hi = between(ls.average("paper-designed-small-angle", of="lyapunov"), "lyapunov")
+    assert lo < float(mpmath.log(1 - 2 * h / kappa)) < hi
+    assert hi - lo < 1e-12
+
+
+def orbits(throw, counts=(400, 5000), seed=3):
+    """Throws of many orbits from random places, after the first: places, sides and codes, by throw."""
+    random = np.random.default_rng(seed)
+    x = random.uniform(0.4, 0.7, counts[0]) * throw.arm_length
+    side = random.integers(0, 3, counts[0])
+    for k in range(counts[1] + 300):
+        after, turned, code, _ = advance(throw, x, side, 1)
+        assert (code >= 0).all()
+        if k >= 300:
+            yield x, side, code
+        x, side = after, turned
+
+
+def sampled(throw):
+    """Flips, throws from side 1, and mean x, by orbit; their means and standard errors."""
+    sums, count = np.zeros((3, 400)), 0
+    for x, side, code in orbits(throw):
+        sums, count = sums + np.array([code == 1, side == 1, x]), count + 1
+    means = sums / count
+    return means.mean(axis=1), means.std(axis=1) / math.sqrt(means.shape[1])
+
+
+def place(x):
+    return x
+
+
+def require_orbits_inside(seed):
+    """A feeder near one of the paper: what its orbits do on average lies in the bounds."""
+    random = np.random.default_rng(seed)
+    nominal = ls.load(["paper-designed", "paper-initial"][seed % 2])
+    kappa = float(nominal.text["throw"]["kappa"].split()[0]) * random.uniform(0.98, 1.02)
+    height = float(nominal.text["arm"]["surface_height"].split()[0]) * random.uniform(0.7, 1.5)
+    own = nominal.with_values({"throw.kappa": f"{kappa:.6f} in", "arm.surface_height": f"{height:.6f} in"})
+    proof = ls.average(own, of=["flips_per_throw", "side_shares", place])
+    means, errors = sampled(own.map)
+    for name, mean, error in zip(("flips_per_throw", "share_of_side_1", "place"), means, errors, strict=True):
+        lo, hi = between(proof, name)
+        assert lo - 6.0 * error < mean < hi + 6.0 * error, name
+        assert hi - lo < (0.02 if name != "place" else 0.2)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_orbits_lie_inside(seed):
+    require_orbits_inside(seed)
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("seed", range(2, 20))
+def test_orbits_of_many_feeders_lie_inside(seed):
+    require_orbits_inside(seed)
+
+
+def test_a_share_of_places_and_a_function(designed):
+    proof = ls.average(
+        "paper-designed", of=[{2: [(20.0, 40.0)]}, lambda x: 1.0 if False else x * x, "lyapunov"], cells=2000
+    )
+    throw, counted = ls.load("paper-designed").map, []
+    for x, side, _ in orbits(throw, (400, 2000)):
+        counted.append([((side == 2) & (x > 20.0)).mean(), (x * x).mean()])
+    means = np.mean(counted, axis=0)
+    for name, mean in zip(("share", "function"), means, strict=True):
+        lo, hi = between(proof, name)
+        assert lo - 2e-3 * mean < mean < hi + 2e-3 * mean
+    # beyond the critical point of side 2 the part flips, and nowhere else
+    lo, hi = between(proof, "share")
+    flips = between(designed, "flips_on_side_2")
+    assert lo < flips[1]
+    assert flips[0] < hi
+
+
+# ---------------------------------------------------------------- what is enclosed of a throw
+
+
+@functools.lru_cache
+def pair(model, flip=""):
+    """The checker's scene of a model, and the plain producer's, which shares no code with it."""
+    data = scene(model)
+    data["model"]["flip"] = flip or data["model"]["flip"]
+    return read_scene(data, None), Plain(data)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_slopes_and_images_of_a_throw(model):
+    checked, plain = pair(model)
+    for side in range(3):
+        throws = ThrowsOfSide(checked, side)
+        for at in np.linspace(plain.a[side] + 3.0, 0.9 * plain.arm, 9):
+            middle, half = float(at), 2.0**-7
+            around = np.array([middle + t * half for t in (-1.0, -0.5, 0.0, 0.5, 1.0)])
+            angles = throws.angles((middle - half, middle + half))
+            if not angles < 3:
+                with pytest.raises(UnprovedError, match="3 radians"):
+                    throws.slopes(angles) if plain.exact else throws.slopes(arb(4)) + pytest.fail("none")
+                continue
+            slope, second = throws.slopes(angles)
+            exact = plain.slope(side, around, plain.kappa)
+            assert all(slope.overlaps(arb(float(value), 1e-7)) for value in exact)
+            assert float(slope.rad()) < 0.05
+            step = 1e-3
+            by_place = (
+                plain.jog(side, around + step, plain.kappa)
+                - 2 * plain.jog(side, around, plain.kappa)
+                + plain.jog(side, around - step, plain.kappa)
+            ) / step**2
+            assert all(second.overlaps(arb(float(value), 1e-6)) for value in by_place)
+            one = throws.slopes(throws.angle(arb(middle)))[1]
+            assert float(one.rad()) < 1e-12
+            assert abs(float(one.mid()) - by_place[2]) < 1e-6
+            for branch, image in enumerate((plain.jog, plain.flip)):
+                at_start = image(side, np.array([middle]), plain.kappa)[0]
+                assert abs(float(throws.image(middle, branch).mid()) - at_start) < 1e-11
+
+
+@pytest.mark.parametrize("flip", ["signed", "energy"])
+@pytest.mark.parametrize("model", MODELS)
+def test_the_excess_of_energy_rises_or_falls_as_it_is_said(model, flip):
+    checked, plain = pair(model, flip)
+    seen = 0
+    for side in range(3):
+        throws = ThrowsOfSide(checked, side)
+        for x in np.linspace(plain.a[side] + 2.0, 0.9 * plain.arm, 24).tolist():
+            ends = (x, x + 2.0**-8)
+            try:
+                slope = excess_slope(
+                    throws.s, arb(ends[0]).union(arb(ends[1])), throws.angles(ends), throws.kappa
+                )
+            except UnprovedError:  # where the centre of mass may be right of the vertex all flip
+                assert flip == "energy"
+                continue
+            values = plain.decision(side, np.array(ends), plain.kappa)
+            if slope > 0 or slope < 0:
+                assert bool(slope > 0) is bool(values[1] > values[0])
+                seen += 1
+    assert seen > 20
+
+
+def test_an_undecided_cell_where_the_excess_may_turn_is_refused():
+    throws = ThrowsOfSide(pair("designed")[0], 2)
+    with pytest.raises(UnprovedError, match="one change of branch at most is not proved"):
+        throws.way(0, (9.0, 27.0))
+
+
+# ---------------------------------------------------------------- forged
+
+
+def section(forged):
+    return next(c["section"] for c in forged.header["claims"] if c["claim"] == "average")
+
+
+def moved(number, key, share):
+    def change(forged):
+        one = section(forged)["functions"][number]
+        lo, hi = (float.fromhex(one[end][0]) for end in ("lower", "upper"))
+        one[key] = [(float.fromhex(one[key][0]) + share * (hi - lo)).hex()]
+
+    return change
+
+
+def array(word, change):
+    def forged(file):
+        name = f"0.{word}"
+        file.arrays[name] = np.ascontiguousarray(change(file.arrays[name]))
+
+    return forged
+
+
+def scene_of(forged):
+    return forged.header["boxes"][0]["scene"]
+
+
+def as_interval(forged):
+    throw = scene_of(forged)["throw"]
+    throw["kappa"] = [throw["kappa"], throw["kappa"]]
+
+
+def exchanged(forged):
+    one, other = section(forged)["functions"][1:3]
+    one["of"], other["of"] = other["of"], one["of"]
+
+
+def everywhere_open(forged):
+    """Both branches are possible on all attracting cells, each with targets of its own component."""
+    branch, own = forged.arrays["0.branch"], forged.arrays["0.component"] == 0
+    start = np.concatenate([[0], np.cumsum([len(forged.arrays[f"0.edges.{k}"]) - 1 for k in range(3)])])
+    side = np.searchsorted(start, np.arange(own.size), side="right") - 1
+    branch[own] = 2
+    for word, turn in (("jog", 0), ("flip", 1)):
+        for k in range(3):
+            to = (k + turn) % 3
+            cells = np.flatnonzero(own[start[to] : start[to + 1]]) + start[to]
+            forged.arrays[f"0.{word}"][own & (side == k)] = cells[0], cells[-1]
+
+
+FORGED = {
+    "a narrower upper end": (moved(0, "upper", -0.3), "upper end of the average is not proved"),
+    "a narrower lower end of another function": (
+        moved(4, "lower", 0.3),
+        "lower end of the average is not proved",
+    ),
+    "functions exchanged": (exchanged, "function 1: "),
+    "no weights": (array("average.weight", lambda w: 0.0 * w), "weight is not between"),
+    "smaller weights": (array("average.weight", lambda w: 0.9 * w), "weight is smaller"),
+    "columns exchanged": (array("average.upper", lambda u: u[:, ::-1]), "function 0: "),
+    "runs that are too long": (array("average.runs", lambda r: r + 5000), "a run beside it"),
+    "no runs": (array("average.runs", lambda r: r[:0]), "no runs beside it"),
+    "all cells undecided": (everywhere_open, ""),
+    "noise": (lambda f: f.header.update(noise={"landing.x": "0.001 in"}), "it is about one scene"),
+    "one more run": (
+        array("average.runs", lambda r: np.concatenate([r, r])),
+        "runs beside no undecided cell",
+    ),
+    "numbers that overflow": (array("average.upper", lambda u: u + 1e300), "u are not between"),
+    "an interval of a quantity": (as_interval, "nor with a tolerance or an interval"),
+    "a cavity before the cells end": (
+        lambda f: scene_of(f).update(
+            cavity={"position": "22 in", "width": "9 in", "depth": "9 in", "angle": "20 deg"}
+        ),
+        "where parts fall into the cavity",
+    ),
+    "a component without cells": (lambda f: section(f).update(components=[3]), "component 3 has no cells"),
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_a_forged_average_is_denied(name, designed_file, tmp_path):
+    forged = opened(designed_file)
+    change, why = FORGED[name]
+    change(forged)
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    reasons = {name: said for name, _, said in report.claims}
+    assert (report.verdict, why in reasons["average"]) == ("failed", True), reasons
+
+
+BAD = {
+    "no function": lambda f: section(f).update(functions=[]),
+    "a quotient of a function that is none": lambda f: section(f).update(quotients=[[0, 99]]),
+    "a quotient by what may be 0": lambda f: section(f).update(quotients=[[0, 5]]),
+    "a step on a branch that is none": lambda f: section(f)["functions"][1].update(of={"steps": [[0, 2]]}),
+    "a step on a side that is none": lambda f: section(f)["functions"][1].update(of={"steps": [[3, 0]]}),
+    "a parameter in a formula": lambda f: section(f)["functions"][1].update(
+        of={"formula": {"ops": [["p", "b"]], "out": [0]}}
+    ),
+    "ends that do not ascend": lambda f: section(f)["functions"][10].update(upper=[(0.0).hex()]),
+    "an end that is too large": lambda f: section(f)["functions"][0].update(upper=[(2.0**1000).hex()]),
+    "too few columns": array("average.upper", lambda u: u[:, 1:]),
+    "an array too many": lambda f: f.arrays.update({"0.average.more": np.zeros(3)}),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_file_that_is_none_is_told(name, designed_file, tmp_path):
+    forged = opened(designed_file)
+    BAD[name](forged)
+    report = ls.recheck(forged.seal().write(tmp_path / "bad.zip"))
+    assert report.verdict == "bad file", (report.verdict, report.reason)
+
+
+def test_a_claim_of_one_component_of_two_says_where_that_lies(designed_file):
+    """A file may leave a component out, as that of a sink: its numbers are not those of all attracting cells."""
+    claimed = read_certificate(*open_certificate(designed_file)).claims["average"]
+    assert "every start in the attracting cells these averages" in average_statement(claimed, False)
+    claimed["cells"].component[0] = 1
+    assert "every start in component 0 (side 0: [15.2" in average_statement(claimed, False)
+
+
+# ---------------------------------------------------------------- no answer
+
+
+def reason(scene, **how):
+    proof = ls.average(scene, **how)
+    claim = proof.claims[-1]
+    assert (proof.average, claim.claim, claim.verdict) == (None, "average", "undecided")
+    return claim.reason
+
+
+def test_scenes_without_an_average_say_why():
+    assert "effects beyond the minimal model" in reason("paper-quadrilateral")
+    text = ls.load("paper-designed").as_dict()
+    spread = text | {
+        "world": {"scatter": {"speed": "0.1 %"}},
+        "effects": {"spread": "bounded"},
+    }
+    assert "a spread" in reason(ls.load(spread))
+    resting = random_scene(np.random.default_rng(4), "exact", "signed")
+    if "no attracting" not in reason(resting, cells=500):
+        assert "no solution" in reason(resting, cells=500)
+
+
+def test_what_is_no_average_of_a_scene_is_refused():
+    for of, allowed in (
+        ("mean", "side_shares"),
+        (["lyapunov", 3.0], "a function of x"),
+        ([(2.0, 1.0)], "ranges"),
+    ):
+        with pytest.raises(AnswerError, match=allowed):
+            ls.average("paper-designed", of=of)
+    with pytest.raises(AnswerError, match="the cells of an average"):
+        ls.average("paper-designed", cells=0)
+    with pytest.raises(AnswerError, match="upper of average"):
+        ls.average("paper-designed", upper=2.0)
+    with pytest.raises(AnswerError, match="cells of average"):
+        ls.average(ls.maps.Doubling(2.0), ls.grid([(0.0, 1.0)], cells=8), cells=8)
+    with pytest.raises(AnswerError, match="a scene, or a map of a line"):
+        ls.average(3.0)
