@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from limitsets.proofs.auditing import audit as audit
     from limitsets.proofs.policies import feedback as feedback
     from limitsets.proofs.prover import certify as certify
+    from limitsets.proofs.prover.averaging import average as average
     from limitsets.proofs.prover.certificate import recheck as recheck
     from limitsets.proofs.prover.programs import formulas as formulas
     from limitsets.systems import maps as maps, resilience as resilience

@@ -104,9 +104,11 @@ def _steps(grid: Grid, branches: Sequence[Branch], own: Mask, undecided: Mask) -
     way, least, bend, off = (np.concatenate(column)[order] for column in alike)
     values = np.concatenate([each.values for each in branches], axis=2)[:, :, order]
     cell = number[cell[order]]
+    length, first = np.maximum(ends[1] - ends[0], 1e-300), np.searchsorted(cell, np.arange(own.sum() + 1))
+    mean, low, high = values[0]
     steps = Steps(
-        cell, way, least, bend, off, *values[0], length=np.maximum(ends[1] - ends[0], 1e-300), begin=begin,
-        met=number[k], part=np.maximum(inside, 0.0), first=np.searchsorted(cell, np.arange(own.sum() + 1)),
+        cell, way, least, bend, off, mean=mean, low=low, high=high, length=length, begin=begin,
+        met=number[k], part=np.maximum(inside, 0.0), first=first,
     )  # fmt: skip
     return steps, values
 
@@ -116,9 +118,7 @@ def _ends(grid: Grid) -> tuple[list[Array], list[Array]]:
     return [edges[:-1] for (edges,) in grid.edges], [edges[1:] for (edges,) in grid.edges]
 
 
-def values_of(
-    functions: Sequence[Values], x: Sequence[Array], slopes: Sequence[Array], at: tuple[int, int]
-) -> Array:
+def values_of(functions: Sequence[Values], x: Sequence[Array], slopes: Array, at: tuple[int, int]) -> Array:
     """Give the values of a branch: each function at the ends and the middle of cells, on a side and a branch."""
     of_g = np.array(
         [[one(each, slope, *at) for each, slope in zip(x, slopes, strict=True)] for one in functions]
@@ -126,10 +126,10 @@ def values_of(
     return np.stack([of_g[:, 1], of_g.min(axis=1), of_g.max(axis=1)], axis=1)
 
 
-def bends_of(width: Array, least: Array, slopes: Sequence[Array], wider: float) -> Array:
+def bends_of(width: Array, least: Array, slopes: Array, wider: float) -> Array:
     """Bound |f''|/f'^2 on cells by the slopes at their ends, with neighbours."""
     bend = np.abs(slopes[-1] - slopes[0]) / width / np.maximum(least, LEAST_S) ** 2
-    return wider * np.maximum.reduce([bend, np.roll(bend, 1), np.roll(bend, -1)])
+    return np.asarray(wider * np.maximum.reduce([bend, np.roll(bend, 1), np.roll(bend, -1)]))
 
 
 class Runs(NamedTuple):
@@ -183,7 +183,7 @@ def _runs(changes: Sequence[Change], counts: Sequence[int], width: Array) -> Run
 
 
 @kernel
-def _largest(steps: Any, values: Any, row: int) -> float:
+def _largest(steps: Any, values: Any, row: int) -> Any:
     """Return the largest value of the cells that the image of a row meets."""
     out = values[steps.met[steps.begin[row]]]
     for k in range(steps.begin[row] + 1, steps.begin[row + 1]):
@@ -192,7 +192,7 @@ def _largest(steps: Any, values: Any, row: int) -> float:
 
 
 @kernel
-def _mean(steps: Any, values: Any, row: int) -> float:
+def _mean(steps: Any, values: Any, row: int) -> Any:
     """Return the mean of values over the image of a row."""
     total = 0.0
     for k in range(steps.begin[row], steps.begin[row + 1]):
@@ -201,7 +201,7 @@ def _mean(steps: Any, values: Any, row: int) -> float:
 
 
 @kernel
-def _after_step(steps: Any, sign: float, values: Any, c: int) -> float:
+def _after_step(steps: Any, sign: float, values: Any, c: int) -> Any:
     """Bound the mean of sign g + u over a cell after a step."""
     row = steps.first[c]
     if steps.first[c + 1] == row + 1:
@@ -212,7 +212,7 @@ def _after_step(steps: Any, sign: float, values: Any, c: int) -> float:
 
 
 @kernel(entry=True)
-def _iterate(steps: Any, sign: float, more: Any, span: float, u: Any, change: Any) -> float:
+def _iterate(steps: Any, sign: float, more: Any, span: float, u: Any, change: Any) -> Any:
     """Improve u by relative value iteration until what a step brings spans no more than that; what it spans."""
     apart = math.inf
     for _ in range(STEPS):
@@ -229,7 +229,7 @@ def _iterate(steps: Any, sign: float, more: Any, span: float, u: Any, change: An
 
 
 @kernel
-def _carried(steps: Any, w: Any, c: int) -> float:
+def _carried(steps: Any, w: Any, c: int) -> Any:
     """Return the largest weight that images of a cell meet, by its least slope."""
     row = steps.first[c]
     widest, least = _largest(steps, w, row), steps.least[row]
@@ -251,7 +251,7 @@ def _fill_jumps(steps: Any, runs: Any, w: Any, jumps: Any) -> None:
 
 
 @kernel
-def _asked(steps: Any, s: Any, w: Any, jumps: Any, c: int) -> float:
+def _asked(steps: Any, s: Any, w: Any, jumps: Any, c: int) -> Any:
     """Return what the weight of a cell has to be, with room for the checker."""
     return (s[c] * (1.0 + ROOM) + _carried(steps, w, c) + jumps[c]) * (1.0 + 2.0 * ROUNDED)
 
@@ -277,7 +277,7 @@ def _find_weights(steps: Any, runs: Any, s: Any, w: Any, jumps: Any) -> bool:
 
 
 @kernel(entry=True)
-def _highest(steps: Any, sign: float, more: Any, u: Any) -> float:
+def _highest(steps: Any, sign: float, more: Any, u: Any) -> Any:
     """Return the largest bound that u gives."""
     high = -math.inf
     for c in range(u.size):
@@ -286,7 +286,7 @@ def _highest(steps: Any, sign: float, more: Any, u: Any) -> float:
 
 
 @kernel
-def _apart(steps: Any, values: Any, row: int) -> tuple[float, float]:
+def _apart(steps: Any, values: Any, row: int) -> Any:
     """Return how far values over the image of a row lie apart, and the largest integral of these less their mean."""
     mean, partial, r = _mean(steps, values, row), 0.0, 0.0
     least = most = values[steps.met[steps.begin[row]]]

@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from limitsets.base import AnswerError, Column, Table, shown
-from limitsets.base.arrays import Array, Arrays, Ints, Mask
+from limitsets.base.arrays import Array, Arrays, Mask
 from limitsets.proofs.prover.average_search import Branch, Values, search_component
 from limitsets.proofs.prover.certificate import DeniedError, Saved
 from limitsets.proofs.prover.certificate_of_map import hexed
@@ -242,7 +243,7 @@ UNSOLVED = (
 
 def _found(
     grid: Grid,
-    component: Ints,
+    component: NDArray[Any],
     undecided: Mask,
     branches_of: BranchesOf,
     asked: Asked,
@@ -285,7 +286,7 @@ def _found(
 
 def confirmed(
     grid: Grid,
-    component: Ints,
+    component: NDArray[Any],
     undecided: Mask,
     branches_of: BranchesOf,
     asked: Asked,

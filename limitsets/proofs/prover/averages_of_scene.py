@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +32,9 @@ KNOWN = 2.0**-48
 # A cell that holds a change is smaller than this share of its side; how much larger each cell beside it is.
 SMALL, GRADE = 2.0**-30, 4.0
 
-NOTHING = NamedTuple("scene", [])()  # the parameters of a function that is averaged
+
+class Nothing(NamedTuple):
+    """The parameters of a function that is averaged over throws: none."""
 
 
 @kernel(entry=True)
@@ -120,6 +122,19 @@ def _attracting(box: ParameterBox, tell: Progress) -> Attraction:
     return attractors
 
 
+def _averages(attractors: Attraction, asked: Asked, answer: Callable[[Average], Proof]) -> Average | str:
+    """Find averages that the checker confirms; or say what is missing."""
+    covered = attractors.cover
+    open_cells = (targets(covered, 0)[:, 0] >= 0) & (targets(covered, 1)[:, 0] >= 0)
+    own = functools.partial(branches_of, attractors, asked)
+    return confirmed(covered.grid, attractors.component, open_cells, own, asked, answer)
+
+
+def _with_averages(scene: Scene, attractors: Attraction, begin: float, average: Average) -> Proof:
+    claims = Claim("invariant", "proved", "", {}), Claim("average", "proved", "", average.section)
+    return Proof(scene, {}, {}, (attractors,), claims, time.perf_counter() - begin, average)
+
+
 def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progress | None) -> Proof:
     """Prove between which numbers averages of a scene lie, as the checker confirms them; the claim `average`."""
     begin, tell = time.perf_counter(), progress or silent
@@ -132,7 +147,7 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
 
     sides = sorted(side for side, bands in attractors.cells.extents().items() if bands)
     words = ["lyapunov", *OF_THROWS] if of is None else of
-    asked = asked_for(words, NOTHING, sides or range(box.lo.a.size))
+    asked = asked_for(words, Nothing(), sides or range(box.lo.a.size))
     if box.effects or scattered(scene):
         beyond = "effects beyond the minimal model" if box.effects else "a spread"
         return left(
@@ -140,22 +155,15 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
         )
     if no_cells(attractors.component):
         return left(no_cells(attractors.component))
-    wide, ladder = attractors, (cells,) if cells else CELLS
+    ladder, found = (cells,) if cells else CELLS, NO_WEIGHTS
     for step, count in enumerate(ladder):
         tell(f"{count} cells", step, len(ladder))
-        attractors = attraction(cover_on(box, fine_cells(wide, count, asked)))
-        open_cells = (targets(attractors.cover, 0)[:, 0] >= 0) & (targets(attractors.cover, 1)[:, 0] >= 0)
-
-        def answer(average: Average, attractors: Attraction = attractors) -> Proof:
-            claims = Claim("invariant", "proved", "", {}), Claim("average", "proved", "", average.section)
-            return Proof(scene, {}, {}, (attractors,), claims, time.perf_counter() - begin, average)
-
-        average = confirmed(
-            attractors.cover.grid, attractors.component, open_cells,
-            functools.partial(branches_of, attractors, asked), asked, answer,
-        )  # fmt: skip
+        cut = attraction(cover_on(box, fine_cells(attractors, count, asked)))
+        answer = functools.partial(_with_averages, scene, cut, begin)
+        average = _averages(cut, asked, answer)
         if isinstance(average, Average):
             return answer(average)
-        if NO_WEIGHTS not in average:
+        found = average
+        if NO_WEIGHTS not in found:
             break
-    return left(average)
+    return left(found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from limitsets.base import AnswerError, Progress, arguments_checked, shown, shown_in_notebooks
 from limitsets.feeder.scene import Scene, load
@@ -18,11 +18,29 @@ from limitsets.systems.cells import Grid
 from limitsets.systems.maps import coerce
 
 
+@overload
+def average(
+    map: Scene | str | Path,
+    grid: Any = None,
+    of: Any = None,
+    *,
+    cells: int | None = None,
+    progress: Progress | None = None,
+) -> Proof: ...
+@overload
+def average(
+    map: tuple[Any, ...],
+    grid: Grid | None = None,
+    of: Any = None,
+    *,
+    upper: Any = None,
+    progress: Progress | None = None,
+) -> ProofOfMap: ...
 @shown_in_notebooks
 @arguments_checked
 def average(
     map: Any,  # noqa: A002  # the field's word
-    grid: Grid | None = None,
+    grid: Any = None,
     of: Any = None,
     *,
     upper: Any = None,
@@ -31,9 +49,10 @@ def average(
 ) -> Proof | ProofOfMap:
     """Prove between which numbers averages along almost every orbit lie.
 
-    For a scene, or a map of a line, whose steps stretch distances, on average.  For almost every start in an attracting
-    component the average of a function over n steps converges, to a number between the two; so does its mean over every
-    invariant density.  Single starts, such as those on a periodic orbit, may have other averages.
+    ``average(scene, of)`` of a scene, or ``average(map, grid, of)`` of a map of a line, whose steps stretch distances
+    on average.  For almost every start in an attracting component the average of a function over n steps converges, to
+    a number between the two; so does its mean over every invariant density.  Single starts, such as those on a periodic
+    orbit, may have other averages.
 
     Parameters
     ----------
@@ -43,7 +62,7 @@ def average(
         ``limitsets.map(pieces=(f, g), margin=m)``, or where the image passes the seam of an axis that closes: ``b * x``
         on ``limitsets.grid([(0, 1)], cells=1000, periodic=True)`` is b x modulo 1.
     grid : Grid
-        Of a map alone: the cells; the bounds come nearer as 1/cells.
+        Of a map alone: the cells; the bounds come nearer as 1/cells.  Behind a scene what is averaged may stand here.
     of : str, callable, sequence of (float, float), or a list of some of these
         What is averaged: "lyapunov" for ln |dx'/dx|, a function of x, or ranges of x for the share of steps that are
         in them (a dict gives ranges by side).  Of a scene also "flips_per_throw", "side_shares" and "jogs_per_visit".
@@ -82,18 +101,19 @@ def average(
     (0.319, 0.319)
     """
     if isinstance(map, Scene | str | Path):
-        require_none({"upper": upper, "grid": grid}, "average", "beside a scene")
+        twice = isinstance(grid, Grid) or of is not None  # else what is averaged stands in its place
+        require_none({"upper": upper, "grid": grid if twice else None}, "average", "beside a scene")
         if cells is not None and cells < 1:
             raise AnswerError("the cells of an average", cells, "1 or more", "leave it out")
-        return averages_of_scene(load(map), of, cells, progress)
+        return averages_of_scene(load(map), of if grid is None else grid, cells, progress)
     require_none({"cells": cells}, "average", "beside a map")
     if not isinstance(map, tuple):
         raise AnswerError(
             "the map of an average", shown(map), "a scene, or a map of a line", "make one with limitsets.map"
         )
-    if grid is None:
+    if not isinstance(grid, Grid):
         way = "limitsets.average(map, limitsets.grid([(lo, hi)], cells=1000))"
-        raise AnswerError("the grid of an average", None, "the cells to prove it on", f"pass {way}")
+        raise AnswerError("the grid of an average", shown(grid), "the cells to prove it on", f"pass {way}")
     if grid.dimension != 1:
         raise AnswerError("the grid of an average", f"{grid.dimension} axes", "one", "averages are of a line")
     of = "lyapunov" if of is None else of
