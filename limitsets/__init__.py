@@ -143,6 +143,7 @@ __all__ = [
     "atlas",
     "attractors",
     "audit",
+    "average",
     "basins",
     "certify",
     "continuation",

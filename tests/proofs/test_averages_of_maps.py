@@ -137,6 +137,20 @@ def test_a_range_of_a_map_whose_change_moves():
     assert share[1] - share[0] < 0.01
 
 
+def test_a_histogram_is_one_file_with_a_share_for_each_bin(tmp_path):
+    """The doubling map spreads starts evenly; what orbits do in a bin is asked of each bin alone."""
+    bins = [[(k / 5, (k + 1) / 5)] for k in range(5)]
+    proof = ls.average(ls.map(stretched, b=2.0), circle(500), bins)
+    assert list(proof.average.numbers) == ["share", "share_2", "share_3", "share_4", "share_5"]
+    for by_component in proof.average.numbers.values():
+        lo, hi = by_component[0]
+        assert lo < 0.2 < hi
+        assert hi - lo < 5e-3
+    proof.save(tmp_path / "bins.zip")
+    text = ls.recheck(tmp_path / "bins.zip").statement[-1]
+    assert text.count("the share of steps in") == 5
+
+
 def test_places_that_cut_a_cell():
     places = [(0, 0.2, 0.4), (0, 0.6, 0.7)]
 

@@ -101,6 +101,13 @@ def _share(of: Any) -> Observable | None:
     return Observable("share", {"share": listed}, share, ends)
 
 
+def _is_pairs(of: Sequence[Any]) -> bool:
+    """Whether a list is one of ranges, and not of functions."""
+    return all(
+        isinstance(one, list | tuple) and not any(isinstance(end, list | tuple) for end in one) for one in of
+    )
+
+
 OF_THROWS = ("flips_per_throw", "side_shares", "jogs_per_visit")
 
 
@@ -112,7 +119,7 @@ def asked_for(of: Any, params: Any, sides: Sequence[int] = ()) -> Asked:
     AnswerError
         What is none of the functions.
     """
-    several = isinstance(of, list | tuple) and any(isinstance(one, str) or callable(one) for one in of)
+    several = isinstance(of, list | tuple) and not _is_pairs(of)
     functions, quotients = list[Observable](), list[tuple[str, int, int]]()
     for one in of if several else [of]:
         share = None if isinstance(one, str) or callable(one) else _share(one)
@@ -136,6 +143,12 @@ def asked_for(of: Any, params: Any, sides: Sequence[int] = ()) -> Asked:
             words = ", ".join(f'"{word}"' for word in ("lyapunov", *(OF_THROWS if sides else ())))
             allowed = f"{words}, a function of x, or ranges [(lo, hi)] whose share of time is asked for"
             raise AnswerError("the function to average", shown(one), allowed, 'pass "lyapunov"')
+    names = [each.name for each in functions]
+    alike = [names[:k].count(name) for k, name in enumerate(names)]
+    functions = [
+        each._replace(name=f"{each.name}_{count + 1}") if count else each
+        for each, count in zip(functions, alike, strict=True)
+    ]
     return Asked(tuple(functions), tuple(quotients))
 
 

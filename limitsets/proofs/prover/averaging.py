@@ -66,7 +66,8 @@ def average(
     of : str, callable, sequence of (float, float), or a list of some of these
         What is averaged: "lyapunov" for ln |dx'/dx|, a function of x, or ranges of x for the share of steps that are
         in them (a dict gives ranges by side).  Of a scene also "flips_per_throw", "side_shares" and "jogs_per_visit".
-        Default: "lyapunov", and of a scene all words.
+        A list
+        ``[[(0.0, 0.5)], [(0.5, 1.0)]]`` of lists of ranges is a histogram.  Default: "lyapunov", of a scene all words.
     upper : NamedTuple, optional
         Of a map alone: the upper corner of the parameters; the bounds hold for every fixed value between.
     cells : int, optional
