@@ -110,7 +110,7 @@ def barrier(ell: Any, X: Any, H: Any, signed: bool) -> Any:
 
 
 class Ratios(NamedTuple):
-    """An angle p in [0, 3], with sin(p)/p, V = (1 - cos p)/p^2 and W = (p - sin p)/p^3."""
+    """An angle p from 0 to a full turn, with sin(p)/p, V = (1 - cos p)/p^2 and W = (p - sin p)/p^3."""
 
     p: Arb
     sine: Arb

@@ -20,6 +20,7 @@ from flint import arb
 from .balls import ONE, ZERO, Arb, Array, Rising, UnprovedError, prove, sine_cosine
 from .file import Cells
 from .model import (
+    FULL_TURN,
     at_angle,
     barrier,
     excess,
@@ -115,7 +116,7 @@ class ThrowsOfSide:
         s = self.s
         if not s.exact:
             return ONE - 2 * s.h / (self.kappa - s.small_d), ZERO
-        prove_early(phi)
+        prove_within_a_turn(phi)
         (sin, cos), r = sine_cosine(phi), ratios(phi)
         steep = landing_slope(s, r, self.kappa)
         prove(bool(steep > 0), "that the angle rises with the start is not proved")
@@ -146,9 +147,9 @@ class ThrowsOfSide:
         return branch if slope > 0 else 1 - branch
 
 
-def prove_early(phi: Arb) -> None:
+def prove_within_a_turn(phi: Arb) -> None:
     """Prove that angles are such as `ratios` takes."""
-    prove(bool(phi > 0 and phi < 3), "that the part lands within 3 radians is not proved")
+    prove(bool(phi > 0 and phi < FULL_TURN), "that the part lands within a turn is not proved")
 
 
 def excess_slope(s: Side, x: Arb, phi: Arb, kappa: Arb) -> Arb:
@@ -159,7 +160,7 @@ def excess_slope(s: Side, x: Arb, phi: Arb, kappa: Arb) -> Arb:
     if not s.exact:
         spin = Rising(s.rho2 - s.a * x + 2 * s.a * s.a + s.d * s.d + s.d * s.h, [-s.a])
         return excess(s, spin, Rising(ZERO, [-2 * s.a])).by[0]
-    prove_early(phi)
+    prove_within_a_turn(phi)
     p = Rising(phi, [ONE])
     sin, cos = p.sin_cos()
     H, X = sin * s.a + cos * s.d, cos * s.a - sin * s.d

@@ -24,7 +24,18 @@ COMMANDS = get_command(app).commands
 
 # What prints no table, and what draws nothing.
 NO_TABLE = {"plot", "animate", "new", "explore"}
-NO_FIGURE = {"scenes", "throw", "certify", "recheck", "new", "check", "doctor", "animate", "explore"}
+NO_FIGURE = {
+    "scenes",
+    "throw",
+    "certify",
+    "average",
+    "recheck",
+    "new",
+    "check",
+    "doctor",
+    "animate",
+    "explore",
+}
 
 
 def options(name):

@@ -10,12 +10,13 @@ from flint import arb
 
 import limitsets as ls
 from limitsets.base import AnswerError
+from limitsets.checker import throw_average
 from limitsets.checker.balls import UnprovedError
 from limitsets.checker.claims import average_statement
 from limitsets.checker.file import open_certificate
 from limitsets.checker.report import read_certificate
 from limitsets.checker.scene import read_scene
-from limitsets.checker.throw_average import ThrowsOfSide, excess_slope
+from limitsets.checker.throw_average import ThrowsOfSide
 from limitsets.systems.maps import advance
 from tests.proofs.forge import MODELS, Plain, opened, scene
 from tests.proofs.test_certify import random_scene
@@ -186,10 +187,6 @@ def test_slopes_and_images_of_a_throw(model):
             middle, half = float(at), 2.0**-7
             around = np.array([middle + t * half for t in (-1.0, -0.5, 0.0, 0.5, 1.0)])
             angles = throws.angles((middle - half, middle + half))
-            if not angles < 3:
-                with pytest.raises(UnprovedError, match="3 radians"):
-                    throws.slopes(angles) if plain.exact else throws.slopes(arb(4)) + pytest.fail("none")
-                continue
             slope, second = throws.slopes(angles)
             exact = plain.slope(side, around, plain.kappa)
             assert all(slope.overlaps(arb(float(value), 1e-7)) for value in exact)
@@ -211,31 +208,54 @@ def test_slopes_and_images_of_a_throw(model):
 
 @pytest.mark.parametrize("flip", ["signed", "energy"])
 @pytest.mark.parametrize("model", MODELS)
-def test_the_excess_of_energy_rises_or_falls_as_it_is_said(model, flip):
+def test_which_branch_lies_below_a_change(model, flip):
+    """The excess of energy rises or falls with x as in plain floats; right of the vertex energy alone always flips."""
     checked, plain = pair(model, flip)
     seen = 0
     for side in range(3):
         throws = ThrowsOfSide(checked, side)
         for x in np.linspace(plain.a[side] + 2.0, 0.9 * plain.arm, 24).tolist():
             ends = (x, x + 2.0**-8)
+            angle = plain.phi(side, np.array(ends), plain.kappa)
+            beyond = plain.exact and (plain.a[side] * np.cos(angle) < plain.d[side] * np.sin(angle)).all()
+            if beyond and flip == "energy":
+                with pytest.raises(UnprovedError, match=r"left of the vertex"):
+                    throws.way(1, ends)
+                continue
             try:
-                slope = excess_slope(
-                    throws.s, arb(ends[0]).union(arb(ends[1])), throws.angles(ends), throws.kappa
-                )
-            except UnprovedError:  # where the centre of mass may be right of the vertex all flip
-                assert flip == "energy"
+                way = throws.way(1, ends)
+            except UnprovedError:  # the angle is large, or the excess may turn
                 continue
             values = plain.decision(side, np.array(ends), plain.kappa)
-            if slope > 0 or slope < 0:
-                assert bool(slope > 0) is bool(values[1] > values[0])
-                seen += 1
+            assert way == int(values[1] > values[0]) == 1 - throws.way(0, ends)
+            seen += 1
     assert seen > 20
+
+
+def test_the_excess_falls_where_a_fast_part_turns_backwards():
+    """In the small-angle flight, signed, its slope is a (2 - |om|), below 0 where om < -2."""
+    checked, plain = pair("small", "signed")
+    throws, momentum = ThrowsOfSide(checked, 2), plain.rho**2 + plain.ell[2] ** 2
+    far = (3 * momentum + plain.a[2] ** 2 + plain.d[2] * plain.h) / plain.a[2]  # om = -2
+    assert far + 2 < plain.arm
+    assert (throws.way(1, (far - 1.0, far - 0.99)), throws.way(1, (far + 1.0, far + 1.01))) == (1, 0)
+
+
+@pytest.mark.parametrize("off", [1e-9, -0.3, math.nan])
+def test_an_angle_that_is_guessed_badly_is_refused(off, monkeypatch):
+    throws = ThrowsOfSide(pair("designed")[0], 2)
+    exact = float(throws.angle(arb(20.0)))
+    monkeypatch.setattr(throw_average, "guess_root", lambda *_: exact + off)
+    with pytest.raises(UnprovedError, match="the impact is not bracketed"):
+        throws.angle(arb(20.0))
 
 
 def test_an_undecided_cell_where_the_excess_may_turn_is_refused():
     throws = ThrowsOfSide(pair("designed")[0], 2)
     with pytest.raises(UnprovedError, match="one change of branch at most is not proved"):
         throws.way(0, (9.0, 27.0))
+    with pytest.raises(UnprovedError, match="within a turn"):
+        throws.slopes(arb(6.4))
 
 
 # ---------------------------------------------------------------- forged
