@@ -263,7 +263,7 @@ def check_line(
         prove(most <= MOST_MET, f"an image meets more than {MOST_MET} cells")
         for k, function in enumerate(average.functions):
             with about(f"function {k}") if len(average.functions) > 1 else nullcontext():
-                check_function(line, function, k, component, steps, met, by_cell)
+                check_function(line, function, k, component, steps=steps, met=met, runs=by_cell)
     prove(row == len(average.runs), "there are runs beside no undecided cell")
 
 
@@ -272,6 +272,7 @@ def check_function(
     function: Averaged,
     number: int,
     component: int,
+    *,
     steps: list[Step],
     met: list[Met],
     runs: dict[int, list[int]],

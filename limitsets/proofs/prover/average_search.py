@@ -441,13 +441,13 @@ def search_component(
     runs, best = _best_runs([np.cumsum(width[change.beside]) for change in changes], width, bounds)
     if isinstance(best, str):
         return runs, best
-    found = [best]
+    all_bounds = [best]
     for number in range(1, len(values)):
         answer = bounds(number, runs, best)
         if isinstance(answer, str):
             return runs, answer
-        found.append(answer)
-    return runs, found
+        all_bounds.append(answer)
+    return runs, all_bounds
 
 
 def _best_runs(

@@ -108,7 +108,47 @@ def _is_pairs(of: Sequence[Any]) -> bool:
     )
 
 
-OF_THROWS = ("flips_per_throw", "side_shares", "jogs_per_visit")
+Quotient = tuple[str, int, int]
+"""A name, and the numbers of two functions in a list of some."""
+
+
+def _flips(sides: Sequence[int]) -> tuple[list[Observable], list[Quotient]]:
+    return [_steps("flips_per_throw", [(side, FLIP) for side in sides])], []
+
+
+def _side_shares(sides: Sequence[int]) -> tuple[list[Observable], list[Quotient]]:
+    return [_steps(f"share_of_side_{k}", [(k, JOG), (k, FLIP)]) for k in sides], []
+
+
+def _jogs_per_visit(sides: Sequence[int]) -> tuple[list[Observable], list[Quotient]]:
+    counts = [
+        _steps(f"{word}s_on_side_{k}", [(k, branch)])
+        for k in sides
+        for branch, word in ((JOG, "jog"), (FLIP, "flip"))
+    ]
+    return counts, [(f"jogs_per_visit_of_side_{k}", 2 * at, 2 * at + 1) for at, k in enumerate(sides)]
+
+
+OF_THROWS = {"flips_per_throw": _flips, "side_shares": _side_shares, "jogs_per_visit": _jogs_per_visit}
+"""What can be asked of a scene alone, by its word."""
+
+
+def _asked_alone(one: Any, params: Any, sides: Sequence[int]) -> tuple[list[Observable], list[Quotient]]:
+    """Read one thing that is asked for."""
+    if isinstance(one, str):
+        if one == "lyapunov":
+            return [Observable("lyapunov", {"lyapunov": True}, _logarithm)], []
+        if sides and one in OF_THROWS:
+            return OF_THROWS[one](sides)
+    elif callable(one):
+        return [_formula(one, params)], []
+    else:
+        share = _share(one)
+        if share is not None:
+            return [share], []
+    words = ", ".join(f'"{word}"' for word in ("lyapunov", *(OF_THROWS if sides else ())))
+    allowed = f"{words}, a function of x, or ranges [(lo, hi)] whose share of time is asked for"
+    raise AnswerError("the function to average", shown(one), allowed, 'pass "lyapunov"')
 
 
 def asked_for(of: Any, params: Any, sides: Sequence[int] = ()) -> Asked:
@@ -120,36 +160,18 @@ def asked_for(of: Any, params: Any, sides: Sequence[int] = ()) -> Asked:
         What is none of the functions.
     """
     several = isinstance(of, list | tuple) and not _is_pairs(of)
-    functions, quotients = list[Observable](), list[tuple[str, int, int]]()
+    functions, quotients = list[Observable](), list[Quotient]()
     for one in of if several else [of]:
-        share = None if isinstance(one, str) or callable(one) else _share(one)
-        if one == "lyapunov":
-            functions.append(Observable("lyapunov", {"lyapunov": True}, _logarithm))
-        elif sides and one == "flips_per_throw":
-            functions.append(_steps(one, [(side, FLIP) for side in sides]))
-        elif sides and one == "side_shares":
-            functions += [_steps(f"share_of_side_{k}", [(k, JOG), (k, FLIP)]) for k in sides]
-        elif sides and one == "jogs_per_visit":
-            for k in sides:
-                quotients.append((f"jogs_per_visit_of_side_{k}", len(functions), len(functions) + 1))
-                functions += [
-                    _steps(f"{word}s_on_side_{k}", [(k, b)]) for b, word in ((JOG, "jog"), (FLIP, "flip"))
-                ]
-        elif callable(one):
-            functions.append(_formula(one, params))
-        elif share is not None:
-            functions.append(share)
-        else:
-            words = ", ".join(f'"{word}"' for word in ("lyapunov", *(OF_THROWS if sides else ())))
-            allowed = f"{words}, a function of x, or ranges [(lo, hi)] whose share of time is asked for"
-            raise AnswerError("the function to average", shown(one), allowed, 'pass "lyapunov"')
+        more, between = _asked_alone(one, params, sides)
+        quotients += [(name, i + len(functions), j + len(functions)) for name, i, j in between]
+        functions += more
     names = [each.name for each in functions]
     alike = [names[:k].count(name) for k, name in enumerate(names)]
-    functions = [
+    named = [
         each._replace(name=f"{each.name}_{count + 1}") if count else each
         for each, count in zip(functions, alike, strict=True)
     ]
-    return Asked(tuple(functions), tuple(quotients))
+    return Asked(tuple(named), tuple(quotients))
 
 
 # ---------------------------------------------------------------- the answer
@@ -271,13 +293,13 @@ def _found(
     numbers = range(int(component.max()) + 1)
     for number in numbers:
         own, open_cells = component == number, undecided.copy()
-        beside, found = search_component(
+        beside, numbered = search_component(
             grid, own, open_cells, list(branches_of(own, open_cells, wider)), wider
         )
-        if isinstance(found, str):
-            return found if len(numbers) == 1 else f"component {number}: {found}"
+        if isinstance(numbered, str):
+            return numbered if len(numbers) == 1 else f"component {number}: {numbered}"
         runs += list(zip(beside[::2], beside[1::2], strict=True))
-        for k, (upper, lower, weight, low, high, _) in enumerate(found):
+        for k, (upper, lower, weight, low, high, _) in enumerate(numbered):
             arrays[0, own, k], arrays[1, own, k], arrays[2, own, k] = upper, lower, weight
             size = max(abs(low), abs(high), 1.0) + float(np.abs([upper, lower]).max())
             wide = share * (high - low) + 2.0**-42 * size

@@ -132,7 +132,7 @@ def _averages(attractors: Attraction, asked: Asked, answer: Callable[[Average], 
 
 def _with_averages(scene: Scene, attractors: Attraction, begin: float, average: Average) -> Proof:
     claims = Claim("invariant", "proved", "", {}), Claim("average", "proved", "", average.section)
-    return Proof(scene, {}, {}, (attractors,), claims, time.perf_counter() - begin, average)
+    return Proof(scene, {}, {}, (attractors,), claims, seconds=time.perf_counter() - begin, average=average)
 
 
 def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progress | None) -> Proof:
@@ -155,7 +155,7 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
         )
     if no_cells(attractors.component):
         return left(no_cells(attractors.component))
-    ladder, found = (cells,) if cells else CELLS, NO_WEIGHTS
+    ladder, reason = (cells,) if cells else CELLS, NO_WEIGHTS
     for step, count in enumerate(ladder):
         tell(f"{count} cells", step, len(ladder))
         cut = attraction(cover_on(box, fine_cells(attractors, count, asked)))
@@ -163,7 +163,7 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
         average = _averages(cut, asked, answer)
         if isinstance(average, Average):
             return answer(average)
-        found = average
-        if NO_WEIGHTS not in found:
+        reason = average
+        if NO_WEIGHTS not in reason:
             break
-    return left(found)
+    return left(reason)
