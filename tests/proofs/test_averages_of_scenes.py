@@ -3,6 +3,7 @@
 import functools
 import math
 
+import flint
 import mpmath
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from flint import arb
 
 import limitsets as ls
 from limitsets.base import AnswerError
-from limitsets.checker import throw_average
-from limitsets.checker.balls import UnprovedError
+from limitsets.checker import orbit_average, throw_average
+from limitsets.checker.balls import PRECISION, UnprovedError
 from limitsets.checker.claims import average_statement
 from limitsets.checker.file import open_certificate
 from limitsets.checker.report import read_certificate
@@ -170,12 +171,28 @@ def test_a_share_of_places_and_a_function(designed):
 # ---------------------------------------------------------------- what is enclosed of a throw
 
 
+@pytest.fixture(autouse=True)
+def as_precise_as_the_checker(monkeypatch):
+    monkeypatch.setattr(flint.ctx, "prec", PRECISION)
+
+
 @functools.lru_cache
 def pair(model, flip=""):
     """The checker's scene of a model, and the plain producer's, which shares no code with it."""
     data = scene(model)
     data["model"]["flip"] = flip or data["model"]["flip"]
     return read_scene(data, None), Plain(data)
+
+
+def test_the_second_small_angle_flight_lands_earlier():
+    """phi = 2 (R - a)/(kappa - d), so dx'/dx = 1 - 2 h/(kappa - d) and x' = x - h phi."""
+    data = scene("small")
+    data["model"] = {"flight": "small-angle-2", "flip": "energy"}
+    throws, plain = ThrowsOfSide(read_scene(data, None), 2), Plain(data)
+    over = plain.kappa - plain.d[2]
+    assert float(throws.angle(arb(20.0)).mid()) == pytest.approx(2.0 * (20.0 - plain.a[2]) / over)
+    slope, second = throws.slopes(throws.angle(arb(20.0)))
+    assert (float(slope.mid()), second == 0) == (pytest.approx(1.0 - 2.0 * plain.h / over), True)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -204,6 +221,34 @@ def test_slopes_and_images_of_a_throw(model):
             for branch, image in enumerate((plain.jog, plain.flip)):
                 at_start = image(side, np.array([middle]), plain.kappa)[0]
                 assert abs(float(throws.image(middle, branch).mid()) - at_start) < 1e-11
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_what_is_enclosed_of_a_cell(model):
+    """Least slope, bend and images over a cell that is wide, by plain floats at many places of it."""
+    checked, plain = pair(model)
+    for side in range(3):
+        throws = ThrowsOfSide(checked, side)
+        for first in np.linspace(plain.a[side] + 3.0, 0.8 * plain.arm, 5).tolist():
+            ends, places = (first, first + 0.25), np.linspace(first, first + 0.25, 101)
+            try:
+                listed = throws.cell(
+                    1, ends, [lambda at: (float(at.slope().mid()), *at.ends, at.branch, at.side)]
+                )
+            except UnprovedError:  # the slope may have no sign there
+                assert np.abs(plain.slope(side, places, plain.kappa)).min() < 0.05
+                continue
+            least, bend, low, high, off = listed.numbers
+            slopes = np.abs(plain.slope(side, places, plain.kappa))
+            assert slopes.min() - 0.02 < least < slopes.min() + 1e-6
+            second = np.abs(np.diff(slopes)).max() / (places[1] - places[0])
+            assert second / slopes.max() ** 2 - 1e-5 < bend < second / slopes.min() ** 2 + 0.1
+            images = plain.flip(side, np.array(ends), plain.kappa)
+            assert (low, high) == pytest.approx(sorted(images), abs=1e-11)
+            assert 0.0 < off < 1e-13
+            ((slope, *at),) = listed.functions
+            assert slope == pytest.approx(slopes[50], abs=1e-6)
+            assert at == [*ends, 1, side]
 
 
 @pytest.mark.parametrize("flip", ["signed", "energy"])
@@ -347,6 +392,12 @@ def test_a_forged_average_is_denied(name, designed_file, tmp_path):
     report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
     reasons = {name: said for name, _, said in report.claims}
     assert (report.verdict, why in reasons["average"]) == ("failed", True), reasons
+
+
+def test_an_image_may_not_meet_too_many_cells(designed_file, monkeypatch):
+    """Of a forged file with one image over all cells a recheck would not end."""
+    monkeypatch.setattr(orbit_average, "MOST_MET", 2)
+    assert "an image meets more than 2 cells" in ls.recheck(designed_file).reason
 
 
 BAD = {
