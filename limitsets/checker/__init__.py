@@ -48,7 +48,7 @@ The files follow docs/certificates.md, and each imports only from those before i
     map_cycles   periodic orbits, and balls around them
     map_orbits   lists of all orbits
     map_plane    regions of parameters, and shares of them
-    map_average  averages along almost every orbit
+    map_average  what averages need of the cells of a map
     map_file     the file of a map
     map_words    what is proved, in sentences
     map_weights  almost every start

@@ -20,6 +20,7 @@ from limitsets import maps
 from limitsets.checker import recheck
 from limitsets.feeder.thrower import SmallAngle
 from limitsets.numbers.interval import Interval
+from limitsets.proofs.prover import averages
 from limitsets.systems.graph.images.enclosed import enclosures
 from limitsets.systems.maps import images
 from limitsets.systems.maps.kernels import forced, image
@@ -144,6 +145,64 @@ def test_no_enclosure_is_violated(table):
                 violated += int((good & ~inside).sum())
     assert violated == 0
     table.append(limit("random points outside the image of their cell, of 1e8", violated, "", 1))
+
+
+# ----------------------------------------------------------------
+# Averages: how near the bounds of the exponent come, the search and the recheck of it, beside one long orbit.
+
+ORBIT = "an orbit of 1e6 throws, whose exponent is known to 5e-4"
+
+
+@pytest.mark.parametrize(
+    ("cells", "width", "search", "again"), [(8192, 6e-5, 0.3, 2.0), (131_072, 4e-6, 3.0, 10.0)]
+)
+def test_the_exponent_of_the_designed_feeder(
+    cells, width, search, again, benchmark, table, tmp_path, monkeypatch
+):
+    scene, seconds = ls.load("paper-designed"), []
+    searched = averages.search_component
+
+    def timed(*given):
+        begin = perf_counter()
+        answer = searched(*given)
+        seconds.append(perf_counter() - begin)
+        return answer
+
+    monkeypatch.setattr(averages, "search_component", timed)
+    turns = take_turns(
+        benchmark,
+        lambda: ls.average(scene, "lyapunov", cells=cells),
+        {ORBIT: lambda: maps.lyapunov(scene.map, 20.0, 2, 1_000_000)},
+        rounds=3,
+    )
+    average, what = turns.answer.average, f"paper-designed, exponent, {cells} cells"
+    table.append(limit(f"{what}: width of the bounds", average.hi - average.lo, "", width))
+    table.append(limit(f"{what}: search for the numbers", np.array(seconds), "s", search))
+    table.append(versus(f"{what}: search and recheck", turns, ORBIT, inform=True))
+    report = recheck(turns.answer.save(tmp_path / "average.proof.zip", recheck=False), workers=1)
+    assert report.verdict == "proved"
+    assert average.lo < turns.answers[ORBIT].exponent + 2e-3
+    table.append(limit(f"{what}: recheck", report.seconds, "s", again))
+
+
+@pytest.mark.parametrize("name", ["paper-designed", "paper-initial", "paper-designed-small-angle"])
+def test_a_hundred_million_throws_lie_in_the_bounds(name, table):
+    """Means over orbits from many starts in the limit set, within five standard errors of the bounds."""
+    scene, random = ls.load(name), np.random.default_rng(1)
+    proved = ls.average(scene, ["flips_per_throw", "side_shares", lambda x: x]).average.numbers
+    count, throws = 10_000, 10_000
+    x, side, _, _ = maps.advance(
+        scene.map, random.uniform(0.45, 0.7, count) * scene.map.arm_length, random.integers(0, 3, count), 300
+    )
+    sums = np.zeros((5, count))
+    for _ in range(throws):
+        after, turned, code, _ = maps.advance(scene.map, x, side, 1)
+        sums += np.array([code == 1, side == 0, side == 1, side == 2, x])
+        x, side = after, turned
+    for (what, by_component), own in zip(proved.items(), sums / throws, strict=True):
+        (lo, hi), mean, error = by_component[0], own.mean(), own.std() / math.sqrt(count)
+        beyond = max(lo - mean, mean - hi, 0.0) / error
+        table.append(limit(f"{name}, {what}: 1e8 throws beyond the bounds, standard errors", beyond, "", 5.0))
 
 
 # ----------------------------------------------------------------

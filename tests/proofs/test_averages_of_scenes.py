@@ -18,6 +18,7 @@ from limitsets.checker.file import open_certificate
 from limitsets.checker.report import read_certificate
 from limitsets.checker.scene import read_scene
 from limitsets.checker.throw_average import ThrowsOfSide
+from limitsets.proofs.prover import averages, averages_of_scene
 from limitsets.systems.maps import advance
 from tests.proofs.forge import MODELS, Plain, opened, scene
 from tests.proofs.test_certify import random_scene
@@ -85,6 +86,31 @@ def test_bounds_of_one_proof_agree(designed):
         made = np.sum([between(designed, f"{word}_on_side_{k}") for word in ("jogs", "flips")], axis=0)
         lo, hi = between(designed, f"share_of_side_{k}")
         assert max(lo, made[0]) <= min(hi, made[1])
+
+
+def test_a_share_is_never_below_zero(designed):
+    """No part jogs on side 0, which the proof knows to rounding only."""
+    lo, hi = between(designed, "jogs_on_side_0")
+    assert (lo, 0.0 < hi < 1e-11) == (0.0, True)
+
+
+def test_a_quotient_by_what_may_be_zero_is_left_out(monkeypatch):
+    def flips_by_jogs(sides):
+        one, other = averages.OF_THROWS["jogs_per_visit"](sides[:1])[0]
+        return [other, one], [("flips_by_jogs", 0, 1)]
+
+    monkeypatch.setitem(averages.OF_THROWS, "flips_by_jogs", flips_by_jogs)
+    numbers = ls.average("paper-designed", of="flips_by_jogs", cells=1000).average.numbers
+    assert list(numbers) == ["flips_on_side_0", "jogs_on_side_0"]
+
+
+def test_finer_cells_are_tried_where_there_are_no_weights(monkeypatch):
+    monkeypatch.setattr(averages_of_scene, "CELLS", (60, 1500))
+    assert "no solution" in reason("paper-initial", of="lyapunov", cells=60)
+    proof = ls.average("paper-initial", of="lyapunov")
+    lo, hi = between(proof, "lyapunov")
+    assert lo < 0.0988 < hi
+    assert len(proof.attractions[0].cells) > 1000
 
 
 def test_a_constant_slope_is_its_exponent():
