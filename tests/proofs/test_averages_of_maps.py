@@ -82,7 +82,7 @@ def test_averages_that_are_known(name, tmp_path):
     report = ls.recheck(tmp_path / "own.proof.zip")
     assert report.verdict == "proved"
     assert f"\n    {lo!r} to {hi!r}: " in report.statement[-1]
-    assert str(lo)[:10] in str(proof)
+    assert str(lo)[:5] in str(proof)
 
 
 def test_bounds_come_nearer_with_the_cells():
@@ -141,7 +141,7 @@ def test_a_histogram_is_one_file_with_a_share_for_each_bin(tmp_path):
     """The doubling map spreads starts evenly; what orbits do in a bin is asked of each bin alone."""
     bins = [[(k / 5, (k + 1) / 5)] for k in range(5)]
     proof = ls.average(ls.map(stretched, b=2.0), circle(500), bins)
-    assert list(proof.average.numbers) == ["share", "share_2", "share_3", "share_4", "share_5"]
+    assert list(proof.average.numbers)[1] == "share_of_0.2_to_0.4"
     for by_component in proof.average.numbers.values():
         lo, hi = by_component[0]
         assert lo < 0.2 < hi
@@ -303,7 +303,7 @@ def test_an_average_that_cannot_be_says_why():
     (claim,) = ls.average(ls.map(stretched, b=2.6), circle(200), lambda x: 1.0 / x).claims
     assert "the function is not finite on cell 0" in claim.reason
     (claim,) = ls.average(ls.map(lanford), line(200)).claims
-    assert "periodic=True" in claim.reason
+    assert "close it (periodic)" in claim.reason
 
 
 def test_what_cannot_be_averaged_is_refused():
@@ -314,9 +314,14 @@ def test_what_cannot_be_averaged_is_refused():
         ls.average(ls.load("paper-designed"), line(64))
     with pytest.raises(AnswerError, match="the grid of an average"):
         ls.average(tent(1.7))
-    for of in ("mean", [(0.5, 0.2)], 3.0, [(0.1, 0.2, 0.3)]):
+    for of in ("mean", 3.0):
         with pytest.raises(AnswerError, match="the function to average"):
             ls.average(tent(1.7), line(64), of)
+    for of in ([(0.5, 0.2)], [(0.1, 0.2, 0.3)], [("1 cm", "2 cm")], [(2.0, 3.0)]):
+        with pytest.raises(AnswerError, match="the range to average over"):
+            ls.average(tent(1.7), line(64), of)
+    with pytest.raises(AnswerError, match="the side of a range"):
+        ls.average(tent(1.7), line(64), {1: [(0.1, 0.2)]})
 
 
 # ---------------------------------------------------------------- forged

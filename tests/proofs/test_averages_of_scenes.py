@@ -10,7 +10,7 @@ import pytest
 from flint import arb
 
 import limitsets as ls
-from limitsets.base import AnswerError
+from limitsets.base import AnswerError, LimitsetsError
 from limitsets.checker import orbit_average, throw_average
 from limitsets.checker.balls import PRECISION, UnprovedError
 from limitsets.checker.claims import average_statement
@@ -18,7 +18,7 @@ from limitsets.checker.file import open_certificate
 from limitsets.checker.report import read_certificate
 from limitsets.checker.scene import read_scene
 from limitsets.checker.throw_average import ThrowsOfSide
-from limitsets.proofs.prover import averages, averages_of_scene
+from limitsets.proofs.prover import averages_of_scene, observables
 from limitsets.systems.maps import advance
 from tests.proofs.forge import MODELS, Plain, opened, scene
 from tests.proofs.test_certify import random_scene
@@ -46,10 +46,10 @@ def between(proof, name):
 KNOWN = {
     "lyapunov": (0.205679, 6e-5),
     "flips_per_throw": (0.319163, 6e-4),
-    "share_of_side_0": (0.106391, 2e-4),
-    "share_of_side_1": (0.106391, 2e-4),
-    "share_of_side_2": (0.787218, 4e-4),
-    "jogs_per_visit_of_side_2": (6.399, 0.02),
+    "share_of_throws_from_side_0": (0.106391, 2e-4),
+    "share_of_throws_from_side_1": (0.106391, 2e-4),
+    "share_of_throws_from_side_2": (0.787218, 4e-4),
+    "mean_jogs_per_visit_of_side_2": (6.399, 0.02),
 }
 
 
@@ -68,7 +68,7 @@ def test_the_checker_states_what_is_claimed(designed, designed_file):
     text = "\n".join(report.statement)
     assert f"{lo!r} to {hi!r}: ln |dx'/dx|, whose average is the Lyapunov exponent" in text
     assert "of almost every start in the attracting cells these averages over n steps converge" in text
-    lo, hi = between(designed, "jogs_per_visit_of_side_2")
+    lo, hi = between(designed, "mean_jogs_per_visit_of_side_2")
     # a quotient is rounded by either side on its own
     assert any(
         math.isclose(float(line.split()[0]), lo, rel_tol=1e-15)
@@ -80,28 +80,30 @@ def test_the_checker_states_what_is_claimed(designed, designed_file):
 
 def test_bounds_of_one_proof_agree(designed):
     """Shares add up to 1, and are made of jogs and flips: so each pair of intervals has to meet."""
-    sums = np.sum([between(designed, f"share_of_side_{k}") for k in range(3)], axis=0)
+    sums = np.sum([between(designed, f"share_of_throws_from_side_{k}") for k in range(3)], axis=0)
     assert sums[0] < 1.0 < sums[1]
     for k in range(3):
-        made = np.sum([between(designed, f"{word}_on_side_{k}") for word in ("jogs", "flips")], axis=0)
-        lo, hi = between(designed, f"share_of_side_{k}")
+        made = np.sum(
+            [between(designed, f"{word}_per_throw_on_side_{k}") for word in ("jogs", "flips")], axis=0
+        )
+        lo, hi = between(designed, f"share_of_throws_from_side_{k}")
         assert max(lo, made[0]) <= min(hi, made[1])
 
 
 def test_a_share_is_never_below_zero(designed):
     """No part jogs on side 0, which the proof knows to rounding only."""
-    lo, hi = between(designed, "jogs_on_side_0")
+    lo, hi = between(designed, "jogs_per_throw_on_side_0")
     assert (lo, 0.0 < hi < 1e-11) == (0.0, True)
 
 
 def test_a_quotient_by_what_may_be_zero_is_left_out(monkeypatch):
     def flips_by_jogs(sides):
-        one, other = averages.OF_THROWS["jogs_per_visit"](sides[:1])[0]
+        one, other = observables.OF_THROWS["jogs_per_visit"](sides[:1])[0]
         return [other, one], [("flips_by_jogs", 0, 1)]
 
-    monkeypatch.setitem(averages.OF_THROWS, "flips_by_jogs", flips_by_jogs)
+    monkeypatch.setitem(observables.OF_THROWS, "flips_by_jogs", flips_by_jogs)
     numbers = ls.average("paper-designed", of="flips_by_jogs", cells=1000).average.numbers
-    assert list(numbers) == ["flips_on_side_0", "jogs_on_side_0"]
+    assert list(numbers) == ["flips_per_throw_on_side_0", "jogs_per_throw_on_side_0"]
 
 
 def test_finer_cells_are_tried_where_there_are_no_weights(monkeypatch):
@@ -111,6 +113,21 @@ def test_finer_cells_are_tried_where_there_are_no_weights(monkeypatch):
     lo, hi = between(proof, "lyapunov")
     assert lo < 0.0988 < hi
     assert len(proof.attractions[0].cells) > 1000
+
+
+def test_ranges_without_a_side_are_of_all_sides_and_may_have_units():
+    proof = ls.average(
+        "paper-designed", [[(16.0, 18.0)], {2: [("40.64 cm", "45.72 cm")]}, {0: [(16.0, 18.0)]}], cells=1500
+    )
+    one, other, third = (
+        np.array(ends) for by_component in proof.average.numbers.values() for ends in by_component.values()
+    )
+    assert list(proof.average.numbers) == [
+        "share_of_16_to_18",
+        "share_of_16_to_18_on_side_2",
+        "share_of_16_to_18_on_side_0",
+    ]
+    assert one.mean() > (other + third).mean() - 0.02 > other.mean() > 0.05  # some throws are from side 1 too
 
 
 def test_a_constant_slope_is_its_exponent():
@@ -159,7 +176,9 @@ def require_orbits_inside(seed):
     own = nominal.with_values({"throw.kappa": f"{kappa:.6f} in", "arm.surface_height": f"{height:.6f} in"})
     proof = ls.average(own, of=["flips_per_throw", "side_shares", place])
     means, errors = sampled(own.map)
-    for name, mean, error in zip(("flips_per_throw", "share_of_side_1", "place"), means, errors, strict=True):
+    for name, mean, error in zip(
+        ("flips_per_throw", "share_of_throws_from_side_1", "place"), means, errors, strict=True
+    ):
         lo, hi = between(proof, name)
         assert lo - 6.0 * error < mean < hi + 6.0 * error, name
         assert hi - lo < (0.02 if name != "place" else 0.2)
@@ -177,19 +196,17 @@ def test_orbits_of_many_feeders_lie_inside(seed):
 
 
 def test_a_share_of_places_and_a_function(designed):
-    proof = ls.average(
-        "paper-designed", of=[{2: [(20.0, 40.0)]}, lambda x: 1.0 if False else x * x, "lyapunov"], cells=2000
-    )
+    proof = ls.average("paper-designed", of=[{2: [(20.0, 40.0)]}, lambda x: x * x, "lyapunov"], cells=2000)
     throw, counted = ls.load("paper-designed").map, []
     for x, side, _ in orbits(throw, (400, 2000)):
         counted.append([((side == 2) & (x > 20.0)).mean(), (x * x).mean()])
     means = np.mean(counted, axis=0)
-    for name, mean in zip(("share", "function"), means, strict=True):
+    for name, mean in zip(("share_of_20_to_40_on_side_2", "function"), means, strict=True):
         lo, hi = between(proof, name)
         assert lo - 2e-3 * mean < mean < hi + 2e-3 * mean
     # beyond the critical point of side 2 the part flips, and nowhere else
-    lo, hi = between(proof, "share")
-    flips = between(designed, "flips_on_side_2")
+    lo, hi = between(proof, "share_of_20_to_40_on_side_2")
+    flips = between(designed, "flips_per_throw_on_side_2")
     assert lo < flips[1]
     assert flips[0] < hi
 
@@ -483,9 +500,18 @@ def test_scenes_without_an_average_say_why():
 
 def test_what_is_no_average_of_a_scene_is_refused():
     for of, allowed in (
+        ("flips_per_throws", "did you mean 'flips_per_throw'"),
+        ({7: [(8.0, 9.0)]}, "allowed: 0, 1, 2"),
+        ({2: [(60.0, 70.0)]}, "where states of side 2 lie"),
+        ([(60.0, 70.0)], "where states of side 0 lie"),
+        ([("10 kg", "20 kg")], "kg"),
+    ):
+        with pytest.raises(LimitsetsError, match=allowed):
+            ls.average("paper-designed", of=of)
+    for of, allowed in (
         ("mean", "side_shares"),
         (["lyapunov", 3.0], "a function of x"),
-        ([(2.0, 1.0)], "ranges"),
+        ([(2.0, 1.0)], "the lower one first"),
     ):
         with pytest.raises(AnswerError, match=allowed):
             ls.average("paper-designed", of=of)

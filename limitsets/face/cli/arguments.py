@@ -91,17 +91,16 @@ def scattering_of(scene: Scene, words: list[str] | None, law: str) -> Scattering
     return scattering_from(scene, random, law) if random else None
 
 
-def laid_ranges(words: list[str] | None) -> dict[int, list[tuple[float | str, float | str]]] | None:
-    """Read the words of --laid, SIDE=LO:HI each; bare numbers are in the scene's unit.
+def laid_ranges(
+    words: list[str] | None, option: str = "--laid", thing: str = "where parts are laid down"
+) -> dict[int, list[tuple[float | str, float | str]]] | None:
+    """Read the words of --laid or another option, SIDE=LO:HI each; bare numbers are in the scene's unit.
 
     A unit behind one end holds for both.
     """
     ranges: dict[int, list[tuple[float | str, float | str]]] = {}
-    thing, remedy = (
-        "where parts are laid down",
-        "name a side, the sign =, and two places with : between them, like 0=8:20",
-    )
-    for side, text in named(words, "--laid", thing, form="SIDE=LO:HI", remedy=remedy, once=False):
+    remedy = "name a side, the sign =, and two places with : between them, like 0=8:20"
+    for side, text in named(words, option, thing, form="SIDE=LO:HI", remedy=remedy, once=False):
         ends = [number(end.strip("'\" ")) for end in text.split(":")]
         units = [end.lstrip("+-.0123456789eE").strip() for end in ends if isinstance(end, str)]
         if len(units) == 1:
@@ -155,9 +154,9 @@ def goal_at(scene: Scene, text: str) -> Goal:
 # Certificates as files of the commands: their names, and `--certificate FILE`, checked before it gets its name.
 
 
-def own_file(scene: Scene) -> Path:
+def own_file(scene: Scene, kind: str = "") -> Path:
     """Name a certificate after the scene's file; a certificate of another scene that has this name stays."""
-    file = Path(f"{stem_of(scene)}.proof.zip")
+    file = Path(f"{stem_of(scene)}{kind}.proof.zip")
     if question := _question_of(file):
         refuse_other("the certificate", file, question[0]["name"], scene)
     return file

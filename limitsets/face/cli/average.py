@@ -8,14 +8,14 @@ from typing import Annotated, Any
 
 import limitsets as ls
 from limitsets.base import Table
-from limitsets.face.cli.arguments import certified_claims, own_file, said_of, with_ending
+from limitsets.face.cli.arguments import certified_claims, laid_ranges, own_file, said_of, with_ending
 from limitsets.face.cli.certify import records_of
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
 from limitsets.face.cli.output import saved
-from limitsets.face.cli.subjects import MapOfFile, domain_of, of_scene_alone, spans, subject
+from limitsets.face.cli.subjects import MapOfFile, domain_of, of_scene_alone, subject
 
-# Cells of a map's domain.
-CELLS = 10_000
+# Cells of a map's domain; what stands in the name of a certificate, beside that of a goal.
+CELLS, KIND = 10_000, ".averages"
 
 
 @command(out="--save")
@@ -39,8 +39,9 @@ def average(
     scene : SCENE
         A built-in name, a TOML file, or a map of a line FILE.py:NAME; the Python file is run.
     of : WORD,WORD
-        What is averaged: lyapunov, or LO:HI for the share of steps there; of a scene also flips_per_throw, side_shares,
-        jogs_per_visit, and SIDE=LO:HI; repeatable; by default all words.
+        What is averaged: lyapunov, the mean of ln |dx'/dx|; LO:HI, the share of steps from there on all sides, and
+        SIDE=LO:HI on one; of a scene also flips_per_throw, side_shares (of throws from each side) and jogs_per_visit
+        (the mean number before the part flips); repeatable; by default all words.
     set_ : NAME=NUMBER
         Of a map: the value of a parameter, like a=1.4, or its range, like a=1.4:1.41; repeatable.
     domain : LO:HI
@@ -48,9 +49,9 @@ def average(
     periodic
         Of a map: it is taken modulo the width of the domain.
     cells : N
-        Cells: the bounds come nearer as 1/N.
+        Cells, 8192 by default, of a map 10 000: the bounds come nearer as 1/N.
     out : FILE
-        The certificate, NAME.proof.zip; ./ and the name of the scene or map by default.
+        The certificate, NAME.proof.zip; ./ and the name of the scene or map with .averages by default.
     """
     functions = [_function(word.strip()) for each in of or [] for word in each.split(",")] or None
     chosen = subject(scene, set_)
@@ -59,13 +60,13 @@ def average(
         how: dict[str, Any] = {"grid": line, "upper": chosen.upper}
         thing, file, name = (
             chosen.lower,
-            with_ending(run.out or Path(f"{chosen.name}.proof.zip")),
+            with_ending(run.out or Path(f"{chosen.name}{KIND}.proof.zip")),
             chosen.name,
         )
     else:
         of_scene_alone(chosen, {"--domain": domain, "--periodic": periodic or None})
         how, thing, name = {"cells": cells}, chosen, chosen.name
-        file = own_file(chosen) if run.out is None else with_ending(run.out)
+        file = own_file(chosen, KIND) if run.out is None else with_ending(run.out)
     with saved(file):  # refuses a place that cannot be written before anything is proved
         proof = ls.average(thing, of=functions, progress=run.tell, **how)
     run.tell("recheck", 0, 1)
@@ -89,5 +90,6 @@ def _function(word: str) -> Any:
     """Read a word, or a range with a side before it."""
     if ":" not in word:
         return word
-    side, _, box = word.rpartition("=")
-    return {int(side) if side.isdigit() else 0: spans(box, "--of")}
+    thing = "the range to average over"
+    ranges = laid_ranges([word if "=" in word else f"0={word}"], "--of", thing) or {}
+    return ranges if "=" in word else ranges[0]

@@ -11,8 +11,9 @@ import numpy as np
 
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.proofs.prover.average_search import Branch, bends_of, values_of
-from limitsets.proofs.prover.averages import Asked, Average, asked_for, confirmed
+from limitsets.proofs.prover.averages import Average, confirmed
 from limitsets.proofs.prover.certificate_of_map import IMPOSSIBLE, OF_SIZE
+from limitsets.proofs.prover.observables import Asked, Subject, asked_for
 from limitsets.proofs.prover.proof import Claim, undecided
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.systems.cells import Grid
@@ -152,11 +153,19 @@ def ways_of(params: Any, grid: Grid, cells: Ints, side: int, branch: int) -> Int
 # ---------------------------------------------------------------- the answer
 
 
+def asked_of_map(of: Any, params: Any, grid: Grid) -> Asked:
+    """Read what is averaged of a map on a grid."""
+    lo, hi = grid.domain.lo[:, 0].tolist(), grid.domain.hi[:, 0].tolist()
+    return asked_for(of, Subject(params, dict(enumerate(zip(lo, hi, strict=True)))))
+
+
 def averaged(proof: ProofOfMap, of: Any) -> ProofOfMap:
     """Prove between which numbers the average of a function lies, as the checker confirms it; the claim `average`."""
-    asked = asked_for(of, proof.map)
+    asked = asked_of_map(of, proof.map, proof.graph.grid)
     if not len(proof.cells):
-        reason = "there are no attracting cells: widen the domain, or pass periodic=True for a map modulo its width"
+        reason = (
+            "there are no attracting cells: images may leave the domain; widen it, or close it (periodic)"
+        )
         return replace(proof, claims=(undecided("average", reason),))
 
     def answer(average: Average) -> ProofOfMap:

@@ -6,6 +6,7 @@ import functools
 import math
 import time
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,12 +14,14 @@ import numpy as np
 from limitsets.base import Progress, silent
 from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.scene import Scene
+from limitsets.feeder.scene.units import exact_factor, parse
 from limitsets.numbers.jit import kernel
 from limitsets.proofs.prover.attraction import Attraction, attraction, no_cells
 from limitsets.proofs.prover.average_search import NO_WEIGHTS, Branch, bends_of, values_of
-from limitsets.proofs.prover.averages import OF_THROWS, Asked, Average, asked_for, confirmed
+from limitsets.proofs.prover.averages import Average, confirmed
 from limitsets.proofs.prover.averages_of_map import cut_at_changes, ways_of
 from limitsets.proofs.prover.cover import cover, cover_on, targets
+from limitsets.proofs.prover.observables import OF_THROWS, Asked, Subject, asked_for
 from limitsets.proofs.prover.parameters import ParameterBox, parameter_box, scattered
 from limitsets.proofs.prover.proof import Claim, Proof, undecided
 from limitsets.systems.cells import Grid
@@ -135,6 +138,14 @@ def _with_averages(scene: Scene, attractors: Attraction, begin: float, average: 
     return Proof(scene, {}, {}, (attractors,), claims, seconds=time.perf_counter() - begin, average=average)
 
 
+def _length(scene: Scene, end: Any) -> float:
+    """Read the end of a range: a number in the scene's unit, or a text with a unit."""
+    if not isinstance(end, str):
+        return float(end)
+    number, unit = parse(end, "length", key="of")
+    return float(Fraction(number) * exact_factor(unit, scene.unit))
+
+
 def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progress | None) -> Proof:
     """Prove between which numbers averages of a scene lie, as the checker confirms them; the claim `average`."""
     begin, tell = time.perf_counter(), progress or silent
@@ -147,14 +158,20 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
 
     sides = sorted(side for side, bands in attractors.cells.extents().items() if bands)
     words = ["lyapunov", *OF_THROWS] if of is None else of
-    asked = asked_for(words, Nothing(), sides or range(box.lo.a.size))
+    rests = np.flatnonzero(box.rests).tolist()
+    places = {side: (float(box.lo.a[side]), scene.arm_length) for side in rests}
+    asked = asked_for(words, Subject(Nothing(), places, functools.partial(_length, scene), sides or rests))
     if box.effects or scattered(scene):
-        beyond = "effects beyond the minimal model" if box.effects else "a spread"
+        beyond = (
+            ("effects beyond the minimal model", "analyse")
+            if box.effects
+            else ("a spread", "noise_statistics")
+        )
         return left(
-            f"averages with {beyond} cannot be proved in this version; limitsets.noise_statistics finds such numbers"
+            f"averages with {beyond[0]} cannot be proved in this version; limitsets.{beyond[1]} samples them"
         )
     if no_cells(attractors.component):
-        return left(no_cells(attractors.component))
+        return left(f"{no_cells(attractors.component)}; `limitsets check` says what is unusual of a scene")
     ladder, reason = (cells,) if cells else CELLS, NO_WEIGHTS
     for step, count in enumerate(ladder):
         tell(f"{count} cells", step, len(ladder))

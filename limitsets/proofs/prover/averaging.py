@@ -7,8 +7,7 @@ from typing import Any, overload
 
 from limitsets.base import AnswerError, Progress, arguments_checked, shown, shown_in_notebooks
 from limitsets.feeder.scene import Scene, load
-from limitsets.proofs.prover.averages import asked_for
-from limitsets.proofs.prover.averages_of_map import averaged, cut_at_changes
+from limitsets.proofs.prover.averages_of_map import asked_of_map, averaged, cut_at_changes
 from limitsets.proofs.prover.averages_of_scene import averages_of_scene
 from limitsets.proofs.prover.certifying import require_none
 from limitsets.proofs.prover.of_map import certify_map
@@ -119,5 +118,5 @@ def average(
         raise AnswerError("the grid of an average", f"{grid.dimension} axes", "one", "averages are of a line")
     of = "lyapunov" if of is None else of
     corners = coerce(map), coerce(map if upper is None else upper)
-    fine = cut_at_changes(*corners, grid, asked_for(of, corners[0]).jumps)
+    fine = cut_at_changes(*corners, grid, asked_of_map(of, corners[0], grid).jumps)
     return averaged(certify_map(map, fine, ["invariant"], upper=upper, progress=progress), of)
