@@ -97,8 +97,8 @@ def average(
     >>> lo < math.log(2.6) < hi, hi - lo < 1e-9
     (True, True)
     >>> flips = ls.average("paper-designed", of="flips_per_throw", cells=1000).average
-    >>> round(flips.lo, 3), round(flips.hi, 3)
-    (0.319, 0.319)
+    >>> flips.lo < 0.31916 < flips.hi < flips.lo + 0.01
+    True
     """
     if isinstance(map, Scene | str | Path):
         twice = isinstance(grid, Grid) or of is not None  # else what is averaged stands in its place
