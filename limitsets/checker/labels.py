@@ -58,6 +58,11 @@ class Labelled:
 
     component: Array
     rank: Array
+    start: Array  # the first cell of each side; at the end the number of all cells
+
+    def side_of(self, cells: Array) -> Array:
+        """Return the side of each of some cells."""
+        return np.searchsorted(self.start, cells, side="right") - 1
 
     def name(self, cell: int) -> str:
         """Name a cell, for people."""

@@ -11,7 +11,7 @@ import numpy as np
 from flint import arb
 
 from .any_map import Map
-from .balls import Arb, Array, UnprovedError, floats_around, prove
+from .balls import Arb, Array, about, floats_around, prove
 from .map_cells import MapCells
 from .observable import Average, Observed, OnCell, observed
 from .orbit_average import Enclosed, Step, check_line, enclosed, step_of
@@ -40,12 +40,10 @@ def enclosed_steps(the_map: Map, c: MapCells, functions: list[Observed], own: Ar
         prove(period is None or len(possible) == 1, "an axis closes, of a map of two branches")
         listed, ways, rows = list[Enclosed](), list[int](), list[tuple[bool, bool]]()
         for cell, ends in zip(cells.tolist(), c.ends(cells, side).tolist(), strict=True):
-            try:
+            outer = [cell == c.start[side], cell == c.start[side + 1] - 1]
+            with about(c.name(cell)):
                 ways.append(way_of(the_map, (side, branch), ends) if both[cell] else 0)
-                outer = [cell == c.start[side], cell == c.start[side + 1] - 1]
                 one, *row = enclosed_cell(the_map, functions, (side, branch), ends, (edges[0], period, outer))
-            except UnprovedError as error:
-                raise UnprovedError(f"{c.name(cell)}: {error}") from None
             listed.append(one)
             rows.append((row[0], row[1]))
         target = np.where(both[cells, None], c.target[branch][cells].astype(np.int64), -1)

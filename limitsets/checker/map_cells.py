@@ -85,10 +85,6 @@ class MapCells(Labelled):
             for s, rows in enumerate(target[cells][self.thin[cells]] for cells in own)
         )
 
-    def side_of(self, cells: Array) -> Array:
-        """Return the side of each of some cells."""
-        return np.searchsorted(self.start, cells, side="right") - 1
-
     def ends(self, cells: Array, side: int) -> Array:
         """Return the ends of some cells of a side: lower, upper along each axis in turn."""
         at = np.unravel_index(cells - self.start[side], tuple(self.counts[side]))

@@ -117,16 +117,6 @@ class Line(NamedTuple):
 
     c: Labelled
     edges: list[Array]  # by side
-    start: Array  # the first cell of each side, and the number of all
-
-    @classmethod
-    def of(cls, c: Labelled, edges: list[Array]) -> "Line":
-        """Count the cells."""
-        return cls(c, edges, np.concatenate([[0], np.cumsum([len(e) - 1 for e in edges])]))
-
-    def side_of(self, cell: int) -> int:
-        """Return the side of a cell."""
-        return int(np.searchsorted(self.start, cell, side="right")) - 1
 
 
 # ----------------------------------------------------------------
@@ -172,7 +162,7 @@ def met_cells(line: Line, step: Step, own: Array) -> Met:
     that run are as near to the true ones.  Of the image on one of two branches a part of it alone lies there: in the
     target cells of the file, with neighbours.
     """
-    edges, begin = line.edges[step.to], int(line.start[step.to])
+    edges, begin = line.edges[step.to], int(line.c.start[step.to])
     mine, middle = own[begin : begin + len(edges) - 1], step.ends.mean(axis=1)
     at = np.clip(np.searchsorted(edges, middle, "right") - 1, 0, len(mine) - 1)
     alone, inside = step.target[:, 0] < 0, np.ones(len(own), dtype=bool)
@@ -241,7 +231,7 @@ def check_line(
     c: Labelled, edges: list[Array], average: Average, steps_of: Callable[[Array], Iterable[Step]]
 ) -> None:
     """Check the bounds of all components that have them; `steps_of` encloses the steps of a component's cells."""
-    line, count, row = Line.of(c, edges), len(c.rank), 0
+    line, count, row = Line(c, edges), len(c.rank), 0
     alike = all(len(one) == count for f in average.functions for one in (f.upper, f.lower, f.weight))
     prove(alike, "the numbers of the average do not have one row for each cell")
     for component in average.components():
@@ -340,8 +330,8 @@ def add_run(line: Line, own: Array, run: tuple[int, int], term: float, sides: Si
     """Add the terms of one side of a change to the cells of its run, from the first to the last."""
     first, last = run
     next_to = first - 1 if above else last + 1
-    side = line.side_of(next_to)
-    edges, begin, end = line.edges[side], int(line.start[side]), int(line.start[side + 1])
+    side, start = int(line.c.side_of(np.array([next_to]))[0]), line.c.start
+    edges, begin, end = line.edges[side], int(start[side]), int(start[side + 1])
     fits = begin <= min(first, next_to) and max(last, next_to) < end and first <= last
     prove(
         fits and bool(own[first : last + 1].all()),

@@ -60,6 +60,7 @@ from .scene import (
     check_by_halves,
     check_parameters,
     check_tolerance,
+    is_exact,
     left_out,
     quantities,
     read_scene,
@@ -416,18 +417,13 @@ def failed_at_once(file: Certificate, gap: str, own: dict[str, Any] | None) -> d
     if "feeds" in claims and (file.tolerance is not None or len(file.scenes) > 1):
         failed["feeds"] = "it is about one scene: not with a tolerance"
     single = file.noise is None and file.tolerance is None and len(file.scenes) == 1
-    if "average" in claims and not (single and exact_alone(file.raw[0])):
+    if "average" in claims and not (single and is_exact(file.raw[0])):
         failed["average"] = "it is about one scene: not with noise, nor with a tolerance or an interval"
     for name in {"goal", "refuted"} & set(claims):
         goal = claims[name].get("goal", claims[name])
         if own is not None and content_of_goal(goal) != content_of_goal(own):
             failed[name] = "the scene in this file has another goal of its own"
     return failed
-
-
-def exact_alone(raw: dict[str, Any]) -> bool:
-    """Whether no quantity of a scene is an interval."""
-    return not any(isinstance(value, list) for _, value in quantities(raw))
 
 
 def work_of(file: Certificate) -> int:

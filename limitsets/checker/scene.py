@@ -120,6 +120,11 @@ def quantities(value: object, where: str = "") -> Iterator[tuple[str, object]]:
         yield where, value
 
 
+def is_exact(raw: dict[str, Any]) -> bool:
+    """Whether no quantity of a scene is an interval."""
+    return not any(isinstance(value, list) for _, value in quantities(raw))
+
+
 def place_of(tree: Any, name: str) -> tuple[Any, Any]:
     """Find where a quantity stands: the object and its key, or the list and the number in it."""
     holder = at = None

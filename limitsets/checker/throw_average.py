@@ -17,7 +17,7 @@ from fractions import Fraction
 import numpy as np
 from flint import arb
 
-from .balls import ONE, ZERO, Arb, Array, Rising, UnprovedError, prove, sine_cosine
+from .balls import ONE, ZERO, Arb, Array, Rising, about, prove, sine_cosine
 from .file import Cells
 from .model import (
     FULL_TURN,
@@ -65,11 +65,9 @@ def enclosed_throws(scene: Scene, c: Cells, functions: list[Observed], own: Arra
             for cell, undecided in zip(cells.tolist(), both.tolist(), strict=True):
                 k = cell - int(c.start[side])
                 ends = float(edges[k]), float(edges[k + 1])
-                try:
+                with about(c.name(cell)):
                     ways.append(throws.way(branch, ends) if undecided else 0)
                     listed.append(throws.cell(branch, ends, functions))
-                except UnprovedError as error:
-                    raise UnprovedError(f"{c.name(cell)}: {error}") from None
             target = np.where(both[:, None], targets[cells] - c.start[to], -1)
             yield step_of(cells, to, listed, target, both, np.array(ways))
 

@@ -15,7 +15,7 @@ from flint import arb
 import limitsets as ls
 from limitsets.checker.program import Formulas, Program, read_operation
 from limitsets.proofs.prover.averages_of_map import averaged
-from tests.proofs.forge import opened
+from tests.proofs.forge import opened, section_of_average
 
 LEFT, RIGHT, BEND, TOP = 1.62, 1.55, 0.11, 0.87
 STRETCH, MORE = 2.35, 0.12
@@ -173,8 +173,7 @@ def test_the_checker_asks_for_each_term(file, seed, end, tmp_path):
     forged.arrays["0.average.upper"], forged.arrays["0.average.lower"] = u.copy(), u.copy()
     runs = forged.arrays["0.average.runs"]
     runs[:] = random.integers(1, runs + 1)
-    claims = forged.header["boxes"][0]["claims"]
-    section = next(c["section"]["functions"][0] for c in claims if c["claim"] == "average")
+    section = section_of_average(forged)["functions"][0]
 
     def accepted(c, w):
         forged.arrays["0.average.weight"] = w

@@ -514,6 +514,33 @@ def refined(m: Plain, word: np.ndarray, lo: float, hi: float) -> dict:
     }
 
 
+def section_of_average(f: Forged) -> dict:
+    """The section of the claim `average`, of a scene or of the first box of a map."""
+    claims = f.header["claims"] if "claims" in f.header else f.header["boxes"][0]["claims"]
+    return next(each["section"] for each in claims if each["claim"] == "average")
+
+
+def end_moved(number: int, key: str, share: float) -> Callable[[Forged], None]:
+    """Move the lower or upper end of a function by a share of the width of its bounds."""
+
+    def change(f: Forged) -> None:
+        one = section_of_average(f)["functions"][number]
+        lo, hi = (float.fromhex(one[end][0]) for end in ("lower", "upper"))
+        one[key] = [(float.fromhex(one[key][0]) + share * (hi - lo)).hex()]
+
+    return change
+
+
+def average_changed(word: str, change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Forged], None]:
+    """Change an array of the claim `average`."""
+
+    def forged(f: Forged) -> None:
+        name = f"0.average.{word}"
+        f.arrays[name] = np.ascontiguousarray(change(f.arrays[name]))
+
+    return forged
+
+
 def with_sets(f: Forged, model: str) -> Forged:
     """The claims of end points and of some periodic orbits besides "invariant", and no others."""
     m, spans = Plain(scene(model)), attracting(f)

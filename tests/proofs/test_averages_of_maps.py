@@ -9,7 +9,7 @@ from flint import arb
 import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.checker.observable import LEAST_WEIGHT, OnCell, bounds_of_share
-from tests.proofs.forge import opened
+from tests.proofs.forge import average_changed, end_moved, opened, section_of_average
 
 GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
 
@@ -334,30 +334,8 @@ def tent_file(tmp_path_factory):
     return file
 
 
-def section(forged):
-    return next(c["section"] for c in forged.header["boxes"][0]["claims"] if c["claim"] == "average")
-
-
 def averaged(forged):
-    return section(forged)["functions"][0]
-
-
-def narrower(forged):
-    lo, hi = (float.fromhex(averaged(forged)[key][0]) for key in ("lower", "upper"))
-    averaged(forged)["upper"] = [(hi - 0.3 * (hi - lo)).hex()]
-
-
-def other_lower(forged):
-    lo, hi = (float.fromhex(averaged(forged)[key][0]) for key in ("lower", "upper"))
-    averaged(forged)["lower"] = [(lo + 0.3 * (hi - lo)).hex()]
-
-
-def array(word, change):
-    def forged(file):
-        name = f"0.average.{word}"
-        file.arrays[name] = np.ascontiguousarray(change(file.arrays[name]))
-
-    return forged
+    return section_of_average(forged)["functions"][0]
 
 
 def at_least(values):
@@ -365,24 +343,30 @@ def at_least(values):
 
 
 FORGED = {
-    "a narrower upper end": (narrower, "upper end of the average is not proved"),
-    "a narrower lower end": (other_lower, "lower end of the average is not proved"),
-    "no weights": (array("weight", lambda w: 0.0 * w), "weight is not between"),
-    "small weights": (array("weight", lambda w: at_least(0.9 * w)), "weight is smaller"),
-    "large weights": (array("weight", lambda w: 10.0 * w), "end of the average is not proved"),
-    "another u": (array("upper", lambda u: -u), "is not proved"),
-    "u of both ends exchanged": (array("lower", lambda u: -u), "is not proved"),
-    "a run that leaves its component": (array("runs", lambda r: r + 150), "a run beside it"),
-    "a run that leaves its side": (array("runs", lambda r: r + 5000), "a run beside it"),
+    "a narrower upper end": (end_moved(0, "upper", -0.3), "upper end of the average is not proved"),
+    "a narrower lower end": (end_moved(0, "lower", 0.3), "lower end of the average is not proved"),
+    "no weights": (average_changed("weight", lambda w: 0.0 * w), "weight is not between"),
+    "small weights": (average_changed("weight", lambda w: at_least(0.9 * w)), "weight is smaller"),
+    "large weights": (average_changed("weight", lambda w: 10.0 * w), "end of the average is not proved"),
+    "another u": (average_changed("upper", lambda u: -u), "is not proved"),
+    "u of both ends exchanged": (average_changed("lower", lambda u: -u), "is not proved"),
+    "a run that leaves its component": (average_changed("runs", lambda r: r + 150), "a run beside it"),
+    "a run that leaves its side": (average_changed("runs", lambda r: r + 5000), "a run beside it"),
     "a run beyond the last cell": (
-        array("runs", lambda r: r + np.array([[0, 10**6]], r.dtype)),
+        average_changed("runs", lambda r: r + np.array([[0, 10**6]], r.dtype)),
         "a run beside it",
     ),
-    "an empty run": (array("runs", lambda r: 0 * r), "a run beside it"),
-    "a run on the wrong side": (array("runs", lambda r: -r), "a run beside it"),
-    "one more run": (array("runs", lambda r: np.concatenate([r, r])), "runs beside no undecided cell"),
-    "no runs": (array("runs", lambda r: r[:0]), "no runs beside it"),
-    "a component without cells": (lambda f: section(f).update(components=[3]), "component 3 has no cells"),
+    "an empty run": (average_changed("runs", lambda r: 0 * r), "a run beside it"),
+    "a run on the wrong side": (average_changed("runs", lambda r: -r), "a run beside it"),
+    "one more run": (
+        average_changed("runs", lambda r: np.concatenate([r, r])),
+        "runs beside no undecided cell",
+    ),
+    "no runs": (average_changed("runs", lambda r: r[:0]), "no runs beside it"),
+    "a component without cells": (
+        lambda f: section_of_average(f).update(components=[3]),
+        "component 3 has no cells",
+    ),
 }
 
 
@@ -445,7 +429,7 @@ def test_a_change_on_the_border_of_two_cells_is_not_overlooked(name, tmp_path):
 
 
 BAD = {
-    "a number that is not finite": array("upper", lambda u: u + np.inf),
+    "a number that is not finite": average_changed("upper", lambda u: u + np.inf),
     "too few numbers": lambda f: averaged(f).update(lower=[]),
     "two functions": lambda f: averaged(f).update(of={"lyapunov": True, "share": []}),
     "no function": lambda f: averaged(f).update(of={}),

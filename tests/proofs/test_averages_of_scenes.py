@@ -20,7 +20,15 @@ from limitsets.checker.scene import read_scene
 from limitsets.checker.throw_average import ThrowsOfSide
 from limitsets.proofs.prover import averages_of_scene, observables
 from limitsets.systems.maps import advance
-from tests.proofs.forge import MODELS, Plain, opened, scene
+from tests.proofs.forge import (
+    MODELS,
+    Plain,
+    average_changed,
+    end_moved,
+    opened,
+    scene,
+    section_of_average,
+)
 from tests.proofs.test_certify import random_scene
 
 
@@ -349,27 +357,6 @@ def test_an_undecided_cell_where_the_excess_may_turn_is_refused():
 # ---------------------------------------------------------------- forged
 
 
-def section(forged):
-    return next(c["section"] for c in forged.header["claims"] if c["claim"] == "average")
-
-
-def moved(number, key, share):
-    def change(forged):
-        one = section(forged)["functions"][number]
-        lo, hi = (float.fromhex(one[end][0]) for end in ("lower", "upper"))
-        one[key] = [(float.fromhex(one[key][0]) + share * (hi - lo)).hex()]
-
-    return change
-
-
-def array(word, change):
-    def forged(file):
-        name = f"0.{word}"
-        file.arrays[name] = np.ascontiguousarray(change(file.arrays[name]))
-
-    return forged
-
-
 def scene_of(forged):
     return forged.header["boxes"][0]["scene"]
 
@@ -380,7 +367,7 @@ def as_interval(forged):
 
 
 def exchanged(forged):
-    one, other = section(forged)["functions"][1:3]
+    one, other = section_of_average(forged)["functions"][1:3]
     one["of"], other["of"] = other["of"], one["of"]
 
 
@@ -398,24 +385,24 @@ def everywhere_open(forged):
 
 
 FORGED = {
-    "a narrower upper end": (moved(0, "upper", -0.3), "upper end of the average is not proved"),
+    "a narrower upper end": (end_moved(0, "upper", -0.3), "upper end of the average is not proved"),
     "a narrower lower end of another function": (
-        moved(4, "lower", 0.3),
+        end_moved(4, "lower", 0.3),
         "lower end of the average is not proved",
     ),
     "functions exchanged": (exchanged, "function 1: "),
-    "no weights": (array("average.weight", lambda w: 0.0 * w), "weight is not between"),
-    "smaller weights": (array("average.weight", lambda w: 0.9 * w), "weight is smaller"),
-    "columns exchanged": (array("average.upper", lambda u: u[:, ::-1]), "function 0: "),
-    "runs that are too long": (array("average.runs", lambda r: r + 5000), "a run beside it"),
-    "no runs": (array("average.runs", lambda r: r[:0]), "no runs beside it"),
-    "all cells undecided": (everywhere_open, ""),
+    "no weights": (average_changed("weight", lambda w: 0.0 * w), "weight is not between"),
+    "smaller weights": (average_changed("weight", lambda w: 0.9 * w), "weight is smaller"),
+    "columns exchanged": (average_changed("upper", lambda u: u[:, ::-1]), "function 0: "),
+    "runs that are too long": (average_changed("runs", lambda r: r + 5000), "a run beside it"),
+    "no runs": (average_changed("runs", lambda r: r[:0]), "no runs beside it"),
+    "all cells undecided": (everywhere_open, "more than 2048 cells"),
     "noise": (lambda f: f.header.update(noise={"landing.x": "0.001 in"}), "it is about one scene"),
     "one more run": (
-        array("average.runs", lambda r: np.concatenate([r, r])),
+        average_changed("runs", lambda r: np.concatenate([r, r])),
         "runs beside no undecided cell",
     ),
-    "numbers that overflow": (array("average.upper", lambda u: u + 1e300), "u are not between"),
+    "numbers that overflow": (average_changed("upper", lambda u: u + 1e300), "u are not between"),
     "an interval of a quantity": (as_interval, "nor with a tolerance or an interval"),
     "a cavity before the cells end": (
         lambda f: scene_of(f).update(
@@ -423,7 +410,10 @@ FORGED = {
         ),
         "where parts fall into the cavity",
     ),
-    "a component without cells": (lambda f: section(f).update(components=[3]), "component 3 has no cells"),
+    "a component without cells": (
+        lambda f: section_of_average(f).update(components=[3]),
+        "component 3 has no cells",
+    ),
 }
 
 
@@ -444,17 +434,23 @@ def test_an_image_may_not_meet_too_many_cells(designed_file, monkeypatch):
 
 
 BAD = {
-    "no function": lambda f: section(f).update(functions=[]),
-    "a quotient of a function that is none": lambda f: section(f).update(quotients=[[0, 99]]),
-    "a quotient by what may be 0": lambda f: section(f).update(quotients=[[0, 5]]),
-    "a step on a branch that is none": lambda f: section(f)["functions"][1].update(of={"steps": [[0, 2]]}),
-    "a step on a side that is none": lambda f: section(f)["functions"][1].update(of={"steps": [[3, 0]]}),
-    "a parameter in a formula": lambda f: section(f)["functions"][1].update(
+    "no function": lambda f: section_of_average(f).update(functions=[]),
+    "a quotient of a function that is none": lambda f: section_of_average(f).update(quotients=[[0, 99]]),
+    "a quotient by what may be 0": lambda f: section_of_average(f).update(quotients=[[0, 5]]),
+    "a step on a branch that is none": lambda f: section_of_average(f)["functions"][1].update(
+        of={"steps": [[0, 2]]}
+    ),
+    "a step on a side that is none": lambda f: section_of_average(f)["functions"][1].update(
+        of={"steps": [[3, 0]]}
+    ),
+    "a parameter in a formula": lambda f: section_of_average(f)["functions"][1].update(
         of={"formula": {"ops": [["p", "b"]], "out": [0]}}
     ),
-    "ends that do not ascend": lambda f: section(f)["functions"][10].update(upper=[(0.0).hex()]),
-    "an end that is too large": lambda f: section(f)["functions"][0].update(upper=[(2.0**1000).hex()]),
-    "too few columns": array("average.upper", lambda u: u[:, 1:]),
+    "ends that do not ascend": lambda f: section_of_average(f)["functions"][10].update(upper=[(0.0).hex()]),
+    "an end that is too large": lambda f: section_of_average(f)["functions"][0].update(
+        upper=[(2.0**1000).hex()]
+    ),
+    "too few columns": average_changed("upper", lambda u: u[:, 1:]),
     "an array too many": lambda f: f.arrays.update({"0.average.more": np.zeros(3)}),
 }
 

@@ -57,27 +57,23 @@ def average(
     chosen = subject(scene, set_)
     if isinstance(chosen, MapOfFile):
         line = ls.grid(domain_of(chosen, domain), cells=cells or CELLS, periodic=periodic)
-        how: dict[str, Any] = {"grid": line, "upper": chosen.upper}
-        thing, file, name = (
-            chosen.lower,
-            with_ending(run.out or Path(f"{chosen.name}{KIND}.proof.zip")),
-            chosen.name,
-        )
+        how: dict[str, Any] = {"map": chosen.lower, "grid": line, "upper": chosen.upper}
+        file = with_ending(run.out or Path(f"{chosen.name}{KIND}.proof.zip"))
     else:
         of_scene_alone(chosen, {"--domain": domain, "--periodic": periodic or None})
-        how, thing, name = {"cells": cells}, chosen, chosen.name
+        how = {"map": chosen, "cells": cells}
         file = own_file(chosen, KIND) if run.out is None else with_ending(run.out)
     with saved(file):  # refuses a place that cannot be written before anything is proved
-        proof = ls.average(thing, of=functions, progress=run.tell, **how)
+        proof = ls.average(of=functions, progress=run.tell, **how)
     run.tell("recheck", 0, 1)
     proof, written, missing = certified_claims(proof, file, recheck=not no_recheck)
 
     def words() -> Iterator[str | Table]:
         if proof.average is None:
-            yield f"{name}: nothing is proved: {proof.claims[-1].reason}"
+            yield f"{chosen.name}: nothing is proved: {proof.claims[-1].reason}"
         else:
             table = proof.average.table()
-            yield f"{name}: {table.how}"
+            yield f"{chosen.name}: {table.how}"
             yield table
         yield from said_of(written, missing)
 

@@ -21,14 +21,14 @@ from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction, attraction
 from limitsets.proofs.prover.certificate import arrays_of
-from limitsets.proofs.prover.cover import cell_ends, cover, met
+from limitsets.proofs.prover.cover import cover, met
 from limitsets.proofs.prover.goals import cuts, prove
 from limitsets.proofs.prover.goals.kind import above, throws_to_reach
 from limitsets.proofs.prover.goals.violating_orbits import MORE_THAN_ROUNDING, middle
 from limitsets.proofs.prover.numbers import RationalInterval
 from limitsets.proofs.prover.orbits import follow
 from limitsets.proofs.prover.parameters import ParameterBox, SceneBox, parameter_box
-from limitsets.systems.cells import CellSet
+from limitsets.systems.cells import CellSet, cell_ends
 from limitsets.systems.maps import Orbit, orbit
 
 # ----------------------------------------------------------------

@@ -15,9 +15,9 @@ from limitsets.feeder.scene import Scene, require_rests
 from limitsets.proofs.policies.game import Game, game_of, image_of
 from limitsets.proofs.prover.attraction import components_of
 from limitsets.proofs.prover.certifying import spelled_deviations
-from limitsets.proofs.prover.cover import Cover, cell_ends, cover_on, cut_at
+from limitsets.proofs.prover.cover import Cover, cover_on, cut_at
 from limitsets.proofs.prover.parameters import ParameterBox, joined, parameter_box, scattered
-from limitsets.systems.cells import CellSet, Domain, Grid, grid
+from limitsets.systems.cells import CellSet, Domain, Grid, cell_ends, grid
 
 Starts: TypeAlias = float | Mapping[int, tuple[float, float]] | None
 Progress: TypeAlias = Callable[[str, int, int], None] | None

@@ -1,4 +1,4 @@
-"""Averages of functions along almost every orbit: what is averaged, the numbers that prove it, and the answer.
+"""Averages of functions along almost every orbit: the answer, and how it is found and confirmed.
 
 docs/certificates.md, "Averages", and limitsets/checker/orbit_average.py, which has the theorem: numbers u and w by cell
 that satisfy two inequalities on every cell prove the bound c.  `average_search` finds them in floats; what it finds is
@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from limitsets.base import Column, Table
 from limitsets.base.arrays import Arrays, Mask
-from limitsets.proofs.prover.average_search import Branch, search_component
+from limitsets.proofs.prover.average_search import search_component
+from limitsets.proofs.prover.average_steps import Branch
 from limitsets.proofs.prover.certificate import DeniedError, Saved
 from limitsets.proofs.prover.observables import Asked
 from limitsets.systems.cells import Grid

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from limitsets.base.arrays import Array, Ints, Mask
-from limitsets.proofs.prover.average_search import Branch, bends_of, values_of
+from limitsets.proofs.prover.average_steps import Branch, bends_of, values_of
 from limitsets.proofs.prover.averages import Average, confirmed
 from limitsets.proofs.prover.certificate_of_map import IMPOSSIBLE, OF_SIZE
 from limitsets.proofs.prover.observables import Asked, Subject, asked_for
@@ -163,10 +163,8 @@ def averaged(proof: ProofOfMap, of: Any) -> ProofOfMap:
     """Prove between which numbers the average of a function lies, as the checker confirms it; the claim `average`."""
     asked = asked_of_map(of, proof.map, proof.graph.grid)
     if not len(proof.cells):
-        reason = (
-            "there are no attracting cells: images may leave the domain; widen it, or close it (periodic)"
-        )
-        return replace(proof, claims=(undecided("average", reason),))
+        why = "there are no attracting cells: images may leave the domain; widen it, or close it (periodic)"
+        return replace(proof, claims=(undecided("average", why),))
 
     def answer(average: Average) -> ProofOfMap:
         claim = Claim("average", "proved", "", average.section)
@@ -177,8 +175,6 @@ def averaged(proof: ProofOfMap, of: Any) -> ProofOfMap:
         proof.graph.grid, proof.arrays["component"], open_cells,
         functools.partial(branches_of, proof, asked), asked, answer,
     )  # fmt: skip
-    return (
-        answer(average)
-        if isinstance(average, Average)
-        else replace(proof, claims=(undecided("average", average),))
-    )
+    if isinstance(average, Average):
+        return answer(average)
+    return replace(proof, claims=(undecided("average", average),))

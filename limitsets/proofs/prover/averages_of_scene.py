@@ -6,7 +6,6 @@ import functools
 import math
 import time
 from collections.abc import Callable, Iterator
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,18 +13,18 @@ import numpy as np
 from limitsets.base import Progress, silent
 from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.units import exact_factor, parse
-from limitsets.numbers.jit import kernel
+from limitsets.feeder.scene.units import convert, parse
 from limitsets.proofs.prover.attraction import Attraction, attraction, no_cells
-from limitsets.proofs.prover.average_search import NO_WEIGHTS, Branch, bends_of, values_of
+from limitsets.proofs.prover.average_search import NO_WEIGHTS
+from limitsets.proofs.prover.average_steps import Branch, bends_of, values_of
 from limitsets.proofs.prover.averages import Average, confirmed
 from limitsets.proofs.prover.averages_of_map import cut_at_changes, ways_of
 from limitsets.proofs.prover.cover import cover, cover_on, targets
-from limitsets.proofs.prover.observables import OF_THROWS, Asked, Subject, asked_for
+from limitsets.proofs.prover.observables import FLIP, JOG, OF_THROWS, Asked, Subject, asked_for
 from limitsets.proofs.prover.parameters import ParameterBox, parameter_box, scattered
 from limitsets.proofs.prover.proof import Claim, Proof, undecided
 from limitsets.systems.cells import Grid
-from limitsets.systems.maps.kernels import image_on
+from limitsets.systems.maps import along
 
 # Cells per side on which the attracting cells are found, in turn; and cells of these, until there are weights.
 FIRST = (2048, 8192, 32768)
@@ -38,19 +37,6 @@ SMALL, GRADE = 2.0**-30, 4.0
 
 class Nothing(NamedTuple):
     """The parameters of a function that is averaged over throws: none."""
-
-
-@kernel(entry=True)
-def _throw_all(params: Any, side: int, branch: int, xs: Any, after: Any, slopes: Any) -> None:
-    """Throw from one side on one branch, with slopes."""
-    for k in range(xs.size):
-        after[k], _, slopes[k] = image_on(params, xs[k], side, branch)
-
-
-def _thrown(params: Any, side: int, branch: int, x: Array) -> tuple[Array, Array]:
-    after, slopes = np.empty((2, x.size))
-    _throw_all(params, side, branch, np.ascontiguousarray(x), after, slopes)
-    return after, slopes
 
 
 def fine_cells(attractors: Attraction, cells: int, asked: Asked) -> Grid:
@@ -86,33 +72,30 @@ def branches_of(
 ) -> Iterator[Branch]:
     """Give what the search needs of a component."""
     covered = attractors.cover
-    grid, params = covered.grid, covered.box.lo
-    for side in range(grid.sides):
-        for branch in (0, 1):
-            to, cells = targets(covered, branch), grid.of_side(side)
-            mine = cells.start + np.flatnonzero(own[cells] & (to[cells, 0] >= 0))
-            if not mine.size:
-                continue
-            lo, hi = (ends[:, 0] for ends in grid.boxes(mine, side))
-            places = (lo, 0.5 * (lo + hi), hi)
-            after, slopes = (
-                np.array(column)
-                for column in zip(*(_thrown(params, side, branch, x) for x in places), strict=True)
-            )
-            least = np.abs(slopes).min(axis=0)
-            least = np.where((slopes > 0.0).all(axis=0) | (slopes < 0.0).all(axis=0), least, 0.0)
-            bend = bends_of(hi - lo, least, slopes, wider)
-            after_side = (side + branch) % grid.sides
-            way = np.zeros(mine.size, np.int64)
-            both = open_cells[mine]
-            if both.any():
-                way[both] = ways_of(params, grid, mine[both], side, branch)
-            yield Branch(
-                mine, way, least * (1.0 - 0.6 * (hi - lo) * bend * least), bend, off=KNOWN * np.abs(after).max(axis=0),
-                values=values_of([each.values for each in asked.functions], places, slopes, (side, branch)),
-                ends=np.sort(after[::2], axis=0), covered=to[mine].T.astype(np.int64) - int(grid.offset[after_side]),
-                first=int(grid.offset[after_side]), edges=grid.edges[after_side][0],
-            )  # fmt: skip
+    grid, params, led = covered.grid, covered.box.lo, [targets(covered, branch) for branch in (JOG, FLIP)]
+    for side, branch in np.ndindex(grid.sides, len(led)):
+        cells, to, after_side = grid.of_side(side), led[branch], (side + branch) % grid.sides
+        mine = cells.start + np.flatnonzero(own[cells] & (to[cells, 0] >= 0))
+        if not mine.size:
+            continue
+        lo, hi = (ends[:, 0] for ends in grid.boxes(mine, side))
+        places, first = (lo, 0.5 * (lo + hi), hi), int(grid.offset[after_side])
+        thrown = [along(params, x, side, [branch]) for x in places]
+        after, slopes = (np.array([each[k] for each in thrown]) for k in (0, 2))
+        one_sign = (slopes > 0.0).all(axis=0) | (slopes < 0.0).all(axis=0)
+        least = np.where(one_sign, np.abs(slopes).min(axis=0), 0.0)
+        bend = bends_of(hi - lo, least, slopes, wider)
+        way, both = np.zeros(mine.size, np.int64), open_cells[mine]
+        if both.any():
+            way[both] = ways_of(params, grid, mine[both], side, branch)
+        # between the three places the slope falls by half of what it changes over a cell, and a little
+        falls = 0.6 * (hi - lo) * bend * least
+        yield Branch(
+            mine, way, least * (1.0 - falls), bend, off=KNOWN * np.abs(after).max(axis=0),
+            values=values_of([each.values for each in asked.functions], places, slopes, (side, branch)),
+            ends=np.sort(after[::2], axis=0), covered=to[mine].T.astype(np.int64) - first,
+            first=first, edges=grid.edges[after_side][0],
+        )  # fmt: skip
 
 
 def _attracting(box: ParameterBox, tell: Progress) -> Attraction:
@@ -128,7 +111,7 @@ def _attracting(box: ParameterBox, tell: Progress) -> Attraction:
 def _averages(attractors: Attraction, asked: Asked, answer: Callable[[Average], Proof]) -> Average | str:
     """Find averages that the checker confirms; or say what is missing."""
     covered = attractors.cover
-    open_cells = (targets(covered, 0)[:, 0] >= 0) & (targets(covered, 1)[:, 0] >= 0)
+    open_cells = (targets(covered, JOG)[:, 0] >= 0) & (targets(covered, FLIP)[:, 0] >= 0)
     own = functools.partial(branches_of, attractors, asked)
     return confirmed(covered.grid, attractors.component, open_cells, own, asked, answer)
 
@@ -142,8 +125,7 @@ def _length(scene: Scene, end: Any) -> float:
     """Read the end of a range: a number in the scene's unit, or a text with a unit."""
     if not isinstance(end, str):
         return float(end)
-    number, unit = parse(end, "length", key="of")
-    return float(Fraction(number) * exact_factor(unit, scene.unit))
+    return convert(parse(end, "length", key="of"), scene.unit)
 
 
 def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progress | None) -> Proof:
@@ -162,14 +144,10 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
     places = {side: (float(box.lo.a[side]), scene.arm_length) for side in rests}
     asked = asked_for(words, Subject(Nothing(), places, functools.partial(_length, scene), sides or rests))
     if box.effects or scattered(scene):
-        beyond = (
-            ("effects beyond the minimal model", "analyse")
-            if box.effects
-            else ("a spread", "noise_statistics")
-        )
-        return left(
-            f"averages with {beyond[0]} cannot be proved in this version; limitsets.{beyond[1]} samples them"
-        )
+        beyond, by = "a spread", "noise_statistics"
+        if box.effects:
+            beyond, by = "effects beyond the minimal model", "analyse"
+        return left(f"averages with {beyond} cannot be proved in this version; limitsets.{by} samples them")
     if no_cells(attractors.component):
         return left(f"{no_cells(attractors.component)}; `limitsets check` says what is unusual of a scene")
     ladder, reason = (cells,) if cells else CELLS, NO_WEIGHTS

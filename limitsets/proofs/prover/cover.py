@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.base import AnswerError
-from limitsets.base.arrays import Array, Ints, Mask
+from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.thrower import Exact
 from limitsets.feeder.thrower.flight_box import bracket, exact_turn, turn_box, turn_point
 from limitsets.feeder.thrower.impact import margin, strike
@@ -418,13 +418,6 @@ def cover_on(
         for side, (edges,) in enumerate(cells.edges)
     )
     return Cover(box, cells, enclosed, _graph(box, cells, enclosed), points)
-
-
-def cell_ends(cells: Grid) -> tuple[Ints, Array, Array]:
-    """Return of every cell its side, its lower and its upper end."""
-    lo = np.concatenate([edges[:-1] for (edges,) in cells.edges])
-    hi = np.concatenate([edges[1:] for (edges,) in cells.edges])
-    return cells.side_of(np.arange(cells.n_cells)), lo, hi
 
 
 def _graph(box: ParameterBox, cells: Grid, enclosed: Sequence[Enclosures]) -> TransitionGraph:

@@ -11,7 +11,7 @@ import numpy as np
 
 from limitsets.base import AnswerError, LimitsetsError, shown
 from limitsets.base.arrays import Array
-from limitsets.proofs.prover.average_search import Values
+from limitsets.proofs.prover.average_steps import Values
 from limitsets.proofs.prover.certificate_of_map import hexed
 from limitsets.proofs.prover.programs import evaluate
 from limitsets.proofs.prover.recording import names_of, recorded

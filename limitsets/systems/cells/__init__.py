@@ -5,6 +5,6 @@ last axis runs fastest): the numbers are the nodes of the transition graph.
 """
 
 from limitsets.systems.cells.domain import Domain, as_domain
-from limitsets.systems.cells.grids import CellSet, Grid, grid
+from limitsets.systems.cells.grids import CellSet, Grid, cell_ends, grid
 
-__all__ = ["CellSet", "Domain", "Grid", "as_domain", "grid"]
+__all__ = ["CellSet", "Domain", "Grid", "as_domain", "cell_ends", "grid"]

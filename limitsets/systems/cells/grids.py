@@ -14,6 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from limitsets.base import Column, GridError, Table, Tabled, shown
 from limitsets.systems.cells.domain import Domain, as_domain
 
+
+def cell_ends(cells: Grid) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return of every cell of a grid on lines its side, its lower and its upper end."""
+    lo = np.concatenate([edges[:-1] for (edges,) in cells.edges])
+    hi = np.concatenate([edges[1:] for (edges,) in cells.edges])
+    return cells.side_of(np.arange(cells.n_cells)), lo, hi
+
+
 # ----------------------------------------------------------------
 # Grids: uniform, or graded so that cells shrink in proportion to their distance from an anchor.
 

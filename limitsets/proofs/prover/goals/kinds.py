@@ -15,7 +15,7 @@ from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.goals import AttractsAll, FlipOrder, OrientedBeyond, Predicate, StaysOnArm
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.cover import cell_ends, targets
+from limitsets.proofs.prover.cover import targets
 from limitsets.proofs.prover.goals.kind import (
     Answer,
     Kind,
@@ -41,7 +41,7 @@ from limitsets.proofs.prover.goals.recurrent_orbits import (
 from limitsets.proofs.prover.goals.violating_orbits import State, one_throw, start_that_leaves
 from limitsets.proofs.prover.thinning import perron_frobenius_bound, slopes
 from limitsets.proofs.prover.two_throws import stays_below
-from limitsets.systems.cells import CellSet
+from limitsets.systems.cells import CellSet, cell_ends
 from limitsets.systems.maps import codes
 
 # ----------------------------------------------------------------

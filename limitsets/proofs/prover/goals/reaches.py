@@ -11,7 +11,6 @@ from limitsets.base.arrays import Mask
 from limitsets.feeder.goals import Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.cover import cell_ends
 from limitsets.proofs.prover.goals.kind import (
     Answer,
     Kind,
@@ -28,7 +27,7 @@ from limitsets.proofs.prover.goals.kind import (
 from limitsets.proofs.prover.goals.recurrent_orbits import Loop, Refutation, cycle_that, meets
 from limitsets.proofs.prover.goals.violating_orbits import sample_passage
 from limitsets.proofs.prover.thinning import perron_frobenius_bound, slopes
-from limitsets.systems.cells import CellSet
+from limitsets.systems.cells import CellSet, cell_ends
 
 
 def _wanted(attraction: Attraction, goal: Reaches) -> Mask:

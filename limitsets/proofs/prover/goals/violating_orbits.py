@@ -16,10 +16,9 @@ import numpy as np
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.goals import Laid
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.cover import cell_ends
 from limitsets.proofs.prover.orbits import replay
 from limitsets.proofs.prover.parameters import ParameterBox
-from limitsets.systems.cells import Grid
+from limitsets.systems.cells import Grid, cell_ends
 from limitsets.systems.maps import codes, images, orbit
 
 Wrong: TypeAlias = Callable[[Any, Any], Any]
