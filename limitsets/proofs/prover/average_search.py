@@ -31,7 +31,7 @@ ROOM, LARGER = 0.05, 3e-4
 # What balls differ by from our boxes, as a share: their radii have 30 bits.
 ROUNDED = 1e-8
 
-NO_WEIGHTS = "the inequality of variations has no solution of use"
+NO_WEIGHTS = "the inequality of variations has no solution of use; four times as many cells may help"
 
 
 @kernel
@@ -274,7 +274,11 @@ def search_component(
     cells_of = np.flatnonzero(own)
     if not (steps.least > 0.0).all() or not np.isfinite(steps.bend).all():
         worst = np.argmin(np.where(np.isfinite(steps.bend), steps.least, -1.0))
-        return [], f"the slope may be 0 or jump at cell {int(cells_of[steps.cell[worst]])}"
+        where = f"the slope may be 0 or jump at cell {int(cells_of[steps.cell[worst]])}"
+        return (
+            [],
+            f"{where}: write a kink or jump as a change of branch, limitsets.map(pieces=(f, g), margin=m)",
+        )
     bounded = np.isfinite(values).all(axis=(0, 1))
     if not bounded.all():
         return [], f"the function is not finite on cell {int(cells_of[steps.cell[np.argmin(bounded)]])}"

@@ -130,8 +130,8 @@ BranchesOf = Callable[[Mask, Mask, float], Iterable[Branch]]
 """Gives the branches of a component from its cells, those where the branch is open, and the factor on D."""
 
 UNSOLVED = (
-    "{reason}; four times as many cells may help. An average is proved where steps stretch: no cycle that attracts or"
-    " is neutral, no slope 0, no change of branch that comes back to its own side too soon"
+    "{reason}. An average is proved where steps stretch: no cycle that attracts or is neutral, no slope 0, no change of"
+    " branch that comes back to its own side too soon"
 )
 
 
