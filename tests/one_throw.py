@@ -1,21 +1,28 @@
 """What proved bounds have to hold: means after one throw with noise, by midpoints, and the places of long orbits."""
 
 import numpy as np
+from scipy import stats
 
 import limitsets as ls
-from limitsets.feeder.scattering import thrown
+from limitsets.feeder.scattering import Uniform, thrown
 from limitsets.systems.maps import advance
+
+
+def deviations(law, count):
+    """Quantiles of a law, in the middle of as many parts that are equally likely."""
+    share = (np.arange(count) + 0.5) / count
+    if law is None:
+        return [0.0]
+    return law.bound * (2.0 * share - 1.0) if isinstance(law, Uniform) else law.sigma * stats.norm.ppf(share)
 
 
 def mean_after(scene, scatter, rows, x, side, count):
     """Mean of a function after one throw from x; `rows`: by side its nodes and values, it is affine between them.
 
-    Each law is uniform, or there is none; `count` midpoints of each.
+    Each law is uniform or normal, or there is none; `count` deviations of each, equally likely.
     """
     total = np.zeros(x.size)
-    share = (np.arange(count) + 0.5) / count
-    speed = [0.0] if scatter.speed is None else scatter.speed.bound * (2.0 * share - 1.0)
-    landing = [0.0] if scatter.landing is None else scatter.landing.bound * (2.0 * share - 1.0)
+    speed, landing = (deviations(law, count) for law in (scatter.speed, scatter.landing))
     at = thrown(scene.map)
     for delta in speed:
         after, turned, code, _ = advance(at(1.0 / (1.0 + delta) ** 2), x, side, 1)

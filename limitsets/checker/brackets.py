@@ -6,18 +6,19 @@ within those claimed.
 
 import itertools
 import math
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb
 
-from .averages import INFLATE, OUTERMOST, Mesh, Rows, Spread, mean_rows
 from .balls import Array, UnprovedError, exact, prove
 from .cells import Progress
 from .file import (
     LENGTHS,
     Arrays,
+    decimal,
     hex_float,
     number_and_unit,
     plain,
@@ -30,9 +31,12 @@ from .file import (
     table,
     whole_number,
 )
-from .landings import MOST_PLACE, Chain, Noisy
+from .landings import Noisy
+from .laws import SIGMAS, Law, normal_law, uniform_law
 from .links import ABSORBED, HARD, LIVE, chain_of
-from .scene import Scene, read_noise, read_scene
+from .means import INFLATE, Mesh, Rows, Spread, mean_rows
+from .scene import NONE, Scene, read_scene
+from .steps import Chain
 
 # ----------------------------------------------------------------
 # The claim `probabilities`, brackets of where a noisy chain ends, and when: how it is read, and put in words.
@@ -42,23 +46,39 @@ from .scene import Scene, read_noise, read_scene
 
 
 ANY, LEFT = "any", "exits"
+# Landings are followed up to so many arms, more than shifts and scatter make of them; nodes end at so many of these.
+ARMS, OUTERMOST = 8.0, 32.0
 MOST_NODES, MOST_STRATA, MOST_BRACKETS = 120_000, 64, 2_000
+UNIFORM, NORMAL = "uniform", "gaussian"
+KINDS_OF_NOISE = {"throw.speed": "share", "landing.x": "length"}
+# Parts of a normal law, and finer strata in each: throws are enclosed at the ends of parts of the speed.
+NORMAL_SPEED, FINE, NORMAL_LANDING, FINE_LANDING = 96, 4, 24, 8
 Place = tuple[int, Fraction, Fraction]  # side, from x, to x
 
 
-class Chances(NamedTuple):
-    """What is claimed: read, and not yet believed; lengths in the scene's unit."""
+class Setting(NamedTuple):
+    """The chain that is spoken of: laws, scene, starts and places that absorb; lengths in the scene's unit."""
 
-    raw: dict[str, Any]
-    laws: dict[str, str]
+    laws: dict[str, tuple[str, str]]
     scene: Scene
     noisy: Noisy
     starts: list[Place]
     absorbing: dict[str, list[Place]]
+
+
+class Chances(NamedTuple):
+    """What is claimed: read, and not yet believed."""
+
+    setting: Setting
     edges: list[Array]
     within: dict[str, Array]  # by name two columns: lower and upper bound after 0, 1, ... throws
     quantiles: list[tuple[str, Fraction, int, int]]
     mean: tuple[float, float] | None
+
+    @property
+    def raw(self) -> dict[str, Any]:
+        """The scene as the file has it."""
+        return self.setting.scene.raw
 
 
 def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chances:
@@ -66,21 +86,35 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     keys = "scene laws starts absorbing strata names quantiles mean"
     nothing = "a file of probabilities has no boxes, no other noise and no tolerance"
     section = section_alone(header, "probabilities", "probabilities", keys, nothing)
+    setting = read_setting(section)
+    names = rows(section["names"], "names", 1, 100)
+    known = all(isinstance(name, str) and name in (ANY, LEFT, *setting.absorbing) for name in names)
+    require(known and len(set(names)) == len(names), "names are not those of places that absorb")
+    edges, within = read_brackets(header["arrays"], entries, names, setting)
+    quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
+    mean = None if section["mean"] is None else read_mean(section["mean"])
+    return Chances(setting, edges, within, quantiles, mean)
+
+
+def read_setting(section: dict[str, Any]) -> Setting:
+    """Read the chain of a section; raises BadFileError."""
     laws = read_laws(section["laws"])
-    scene = read_scene(section["scene"], laws)
+    scene = read_scene(section["scene"], bounds_of_laws(laws))
     require(
         all(side.concave for side in scene.sides), "kappa > ell is not given: the impact may not be unique"
     )
     require(scene.arm[0] == scene.arm[1] and not scene.cuts(), "a quantity of the scene is an interval")
+    require(scene.end is None, "the scene has a cavity, which the claim leaves out")
     still = read_scene({k: v for k, v in scene.raw.items() if k != "effects"}, None)
-    speed = read_noise(laws, "throw.speed", "share")
-    landing = read_noise(laws, "landing.x", "length").lo / LENGTHS[scene.unit]
-    require(landing > 0, "landing.x: without scatter of the landing place nothing is rechecked")
-    # far nodes hold where throws land at all, and what is not followed lies off the arm on both branches
-    near = all(bool(abs(side.shift) < MOST_PLACE / 2) for side in scene.sides)
-    require(near and landing < MOST_PLACE, "landings are too far out")
     strata = whole_number(section["strata"], 1, MOST_STRATA, f"strata is not from 1 to {MOST_STRATA}")
-    noisy = Noisy(still.sides, still.k_lo.union(still.k_hi), speed.lo, landing, strata)
+    speed = law_of(laws, "throw.speed", Fraction(1), (strata, NORMAL_SPEED, FINE))
+    landing = law_of(laws, "landing.x", LENGTHS[scene.unit], (1, NORMAL_LANDING, FINE_LANDING))
+    # far nodes hold where throws land at all, and what is not followed lies off the arm on both branches
+    far = ARMS * 2.0 ** math.ceil(math.log2(scene.arm[0]))
+    near = all(bool(abs(side.shift) < far / 2) for side in scene.sides)
+    require(near and landing.reach < far, "landings are too far out")
+    require(speed.reach < 1, "noise reaches 100 %")
+    noisy = Noisy(still.sides, still.k_lo.union(still.k_hi), speed, landing, far)
     places = {
         plain(name): read_places(some, name, scene)
         for name, some in table_of(section["absorbing"], "absorbing").items()
@@ -89,33 +123,16 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     require(not overlapping(places), "two places that absorb overlap")
     starts = read_places(section["starts"], "starts", scene)
     require(not overlapping({"starts": starts}), "two stretches of starts overlap: they would count twice")
-    names = rows(section["names"], "names", 1, 100)
-    known = all(isinstance(name, str) and name in (ANY, LEFT, *places) for name in names)
-    require(known and len(set(names)) == len(names), "names are not those of places that absorb")
-    edges, within = read_brackets(header["arrays"], entries, names, scene)
-    quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
-    mean = None if section["mean"] is None else read_mean(section["mean"])
-    return Chances(
-        scene.raw,
-        laws,
-        scene,
-        noisy=noisy,
-        starts=starts,
-        absorbing=places,
-        edges=edges,
-        within=within,
-        quantiles=quantiles,
-        mean=mean,
-    )
+    return Setting(laws, scene, noisy, starts, places)
 
 
 def read_brackets(
-    said: object, entries: dict[str, memoryview], names: list[str], scene: Scene
+    said: object, entries: dict[str, memoryview], names: list[str], setting: Setting
 ) -> tuple[list[Array], dict[str, Array]]:
     """Read the arrays: the edges of the cells of each side, and the brackets of each name."""
     arrays = Arrays(said, entries)
-    edges = [arrays.read(f"edges.{i}", "<f8") for i in range(len(scene.sides))]
-    require_edges(edges, scene)
+    edges = [arrays.read(f"edges.{i}", "<f8") for i in range(len(setting.scene.sides))]
+    require_edges(edges, setting)
     within = {name: arrays.read(f"within.{k}", "<f8", 2) for k, name in enumerate(names)}
     arrays.require_no_others()
     lengths = {len(each) for each in within.values()}
@@ -130,14 +147,37 @@ def table_of(value: object, where: str) -> dict[str, Any]:
     return known
 
 
-def read_laws(value: object) -> dict[str, str]:
-    """Read the laws, of which one kind is known: uniform, within a deviation."""
-    laws = table(value, "laws", "landing.x", "throw.speed")
-    for name, law in laws.items():
+def read_laws(value: object) -> dict[str, tuple[str, str]]:
+    """Read the laws, each uniform within a bound or normal with a standard deviation: its kind and this number."""
+    laws = {}
+    for name, law in table(value, "laws", "", " ".join(KINDS_OF_NOISE)).items():
         kind = table(law, f"law of {name}", "", " ".join(law) if isinstance(law, dict) else "")
-        require(list(kind) == ["uniform"], f"law of {name}: this checker knows uniform laws only")
-        require(isinstance(kind["uniform"], str), f"law of {name}: its bound is not a text")
-    return {name: law["uniform"] for name, law in laws.items()}
+        known = len(kind) == 1 and set(kind) <= {UNIFORM, NORMAL}
+        require(known, f"law of {name}: this checker knows {UNIFORM} and {NORMAL} laws only")
+        ((word, text),) = kind.items()
+        require(isinstance(text, str), f"law of {name}: its number is not a text")
+        laws[name] = (word, text)
+    return laws
+
+
+def bounds_of_laws(laws: dict[str, tuple[str, str]]) -> dict[str, str] | None:
+    """Return the bounds within which the laws deviate, as a file states noise: normal ones are cut off."""
+    bounds = {}
+    for name, (word, text) in laws.items():
+        number, unit = number_and_unit(text, KINDS_OF_NOISE[name], f"law of {name}")
+        most = f"{decimal(100 * SIGMAS * number)} %" if unit == "%" else f"{decimal(SIGMAS * number)} m"
+        bounds[name] = text if word == UNIFORM else most
+    return bounds or None
+
+
+def law_of(laws: dict[str, tuple[str, str]], name: str, unit: Fraction, strata: tuple[int, int, int]) -> Law:
+    """Cut a law in strata: their number for a uniform law, and for a normal one that of its parts and finer ones."""
+    word, text = laws.get(name, (UNIFORM, ""))
+    size = quantity(text, KINDS_OF_NOISE[name], name) if text else NONE
+    require(size.lo == size.hi >= 0, f"law of {name}: its number is negative, or an interval")
+    if word == UNIFORM:
+        return uniform_law(size.lo / unit, strata[0])
+    return normal_law(size.lo / unit, *strata[1:])
 
 
 def read_places(value: object, where: str, scene: Scene) -> list[Place]:
@@ -168,13 +208,14 @@ def overlapping(places: dict[str, list[Place]]) -> bool:
     return any(a[0] == b[0] and b[1] < a[2] for a, b in itertools.pairwise(every))
 
 
-def require_edges(edges: list[Array], scene: Scene) -> None:
+def require_edges(edges: list[Array], setting: Setting) -> None:
     """Require that the nodes of each side ascend, and reach from before the joint to beyond the arm's end."""
+    scene, most = setting.scene, setting.noisy.far / 2
     require(sum(len(e) for e in edges) <= MOST_NODES, f"more than {MOST_NODES} nodes")
     for i, e in enumerate(edges):
         require(len(e) >= 2 and bool((np.diff(e) > 0).all()), f"side {i}: the nodes do not ascend")
         whole = bool(arb(float(e[0])) <= scene.sides[i].a) and Fraction(float(e[-1])) >= scene.arm[0]
-        require(whole and float(np.abs(e).max()) < MOST_PLACE / 2, f"side {i}: the nodes do not span the arm")
+        require(whole and float(np.abs(e).max()) < most, f"side {i}: the nodes do not span the arm")
 
 
 def read_quantile(value: object, names: list[Any]) -> tuple[str, Fraction, int, int]:
@@ -197,13 +238,13 @@ def read_mean(value: object) -> tuple[float, float]:
 def chances_in_words(c: Chances) -> list[str]:
     """Put the claim in words, from the numbers that were checked."""
     last = len(next(iter(c.within.values()))) - 1
-    unit = c.scene.unit
+    unit = c.setting.scene.unit
     lines = [
         "probabilities: T is the throw with which a part first comes to rest at a place named below, or leaves the arm",
         "    all deviations are independent of each other",
-        f"    starts, equally likely per length: {places_in_words(c.starts, unit)}",
+        f"    starts, equally likely per length: {places_in_words(c.setting.starts, unit)}",
     ]
-    for name, places in c.absorbing.items():
+    for name, places in c.setting.absorbing.items():
         lines.append(f"    {name}: {places_in_words(places, unit)}")
     for name, said in c.within.items():
         lo, hi = (float(end) for end in said[-1])
@@ -236,15 +277,17 @@ def places_in_words(places: list[Place], unit: str) -> str:
 MOST_MEAN = 5_000  # steps in which a mean is bounded
 # A mean is bounded from above once no state's bound grows by more than this share of a throw.
 GROWTH = 0.5
+# Bounds that move by less have come to rest; one above this grows without end.
+STILL, HOPELESS = 1e-9, 1e6
 
 
-def mesh_of(edges: list[Array]) -> Mesh:
+def mesh_of(edges: list[Array], outermost: float) -> Mesh:
     """Put the nodes of all sides together, with one far out at either end."""
-    whole = [np.concatenate([[-OUTERMOST], each, [OUTERMOST]]) for each in edges]
+    whole = [np.concatenate([[-outermost], each, [outermost]]) for each in edges]
     return Mesh(np.concatenate(whole), np.concatenate([[0], np.cumsum([len(each) for each in whole])]))
 
 
-def kinds_of(c: Chances, mesh: Mesh) -> tuple[Array, dict[str, Array]]:
+def kinds_of(c: Setting, mesh: Mesh) -> tuple[Array, dict[str, Array]]:
     """Find what each cell is, exactly, and by name the nodes of the cells that absorb, or may do so in part."""
     kinds = np.full(len(mesh.place), -1)
     absorbed: dict[str, set[int]] = {name: set() for name in (LEFT, *c.absorbing)}
@@ -266,14 +309,22 @@ def kinds_of(c: Chances, mesh: Mesh) -> tuple[Array, dict[str, Array]]:
     return kinds, {name: np.array(sorted(nodes), dtype=np.int64) for name, nodes in absorbed.items()}
 
 
-def start_row(c: Chances, mesh: Mesh) -> Rows:
+def start_row(c: Setting, mesh: Mesh) -> Rows:
     """Build the row that makes the mean over the starts, which are equally likely per length."""
     side, lo, hi = (np.array(column) for column in zip(*c.starts, strict=True))
     length = hi - lo
     weight = (length / length.sum()).astype(float)
     row = np.zeros(len(side), dtype=np.int64)
     spread = Spread(row, weight, side.astype(np.int64), lo.astype(float), hi.astype(float))
-    return mean_rows(1, mesh, spread, 0.0)
+    rows = mean_rows(1, mesh, [spread])
+    # the ends of the starts are rounded
+    return rows._replace(off=rows.off + 2.0**-50 * mesh.size() / float(length.min()))
+
+
+def chain_on(c: Setting, edges: list[Array], advance: Callable[[int], None]) -> tuple[Chain, Rows]:
+    """Prove the throws of a chain on some cells; with the row that makes means over its starts."""
+    mesh = mesh_of(edges, OUTERMOST * c.noisy.far)
+    return chain_of(c.noisy, mesh, *kinds_of(c, mesh), advance), start_row(c, mesh)
 
 
 def mean_above(row: Rows, values: Array) -> float:
@@ -281,8 +332,10 @@ def mean_above(row: Rows, values: Array) -> float:
     return float(row.times(values)[0]) + row.off * float(np.abs(values).max())
 
 
-def brackets_of(chain: Chain, row: Rows, name: str, count: int) -> Array:
-    """Prove brackets of one name after 0, 1, ... throws, so many in all."""
+def brackets_of(
+    chain: Chain, row: Rows, name: str, count: int, told: Callable[[int], None] = lambda done: None
+) -> tuple[Array, Array]:
+    """Prove brackets of one name after 0, 1, ... throws, so many in all; with bounds at the nodes after the last."""
     value = {each: float(name in (ANY, each)) for each in chain.absorbed}
     fixed = [chain.fixed({each: sign * v for each, v in value.items()}) for sign in (-1.0, 1.0)]
     bound = [chain.first(each) for each in fixed]
@@ -291,10 +344,11 @@ def brackets_of(chain: Chain, row: Rows, name: str, count: int) -> Array:
         if n:
             bound = [chain.above(values, each) for values, each in zip(bound, fixed, strict=True)]
         brackets[n] = -mean_above(row, bound[0]), mean_above(row, bound[1])
+        told(n)
     # to have ended is for ever: a lower bound holds later on, an upper one earlier
     brackets[:, 0] = np.maximum(np.maximum.accumulate(brackets[:, 0]), 0.0)
     brackets[:, 1] = np.minimum(np.minimum.accumulate(brackets[::-1, 1])[::-1], 1.0)
-    return brackets
+    return brackets, np.stack([-bound[0], bound[1]])
 
 
 def check_within(name: str, said: Array, brackets: Array) -> None:
@@ -318,25 +372,24 @@ def check_quantiles(c: Chances, brackets: dict[str, Array]) -> None:
         prove(none_before and there, quantile)
 
 
-def check_mean(chain: Chain, row: Rows, said: tuple[float, float]) -> None:
-    """Check the bounds of the mean number of throws.
+def means_below(chain: Chain, row: Rows) -> Iterator[float]:
+    """Bound the mean number of throws from below, ever better: by the mean of the lesser of T and n."""
+    none = chain.fixed(dict.fromkeys(chain.absorbed, 0.0))
+    below, low, change = chain.first(none), 0.0, math.inf
+    for _ in range(MOST_MEAN):
+        yield low
+        if not change > STILL:
+            return
+        before, below = below, chain.above(below, none, -1.0)
+        low, change = max(low, -mean_above(row, below)), float((before - below).max())
 
-    From below it is at least the mean of the lesser of T and n.  From above: with V >= 0 and 1 + K V <= U <= V + c on
-    the cells from which throws are made, V / (1 - c) is a bound.
+
+def means_above(chain: Chain, row: Rows) -> Iterator[float]:
+    """Bound the mean number of throws from above, ever better.
+
+    With V >= 0 and 1 + K V <= U <= V + c on the cells from which throws are made, V / (1 - c) is a bound.
     """
     none = chain.fixed(dict.fromkeys(chain.absorbed, 0.0))
-    below, low = chain.first(none), 0.0
-    for _ in range(MOST_MEAN):
-        if low >= said[0]:
-            break
-        before, below = below, chain.above(below, none, -1.0)
-        low = max(low, -mean_above(row, below))
-        if not float((before - below).max()) > 1e-9:
-            break
-    proved = f"the mean is at least {said[0]!r}: only {rounded(low, up=False)} is proved"
-    prove(low >= said[0], proved)
-    if said[1] == math.inf:
-        return
     made = np.unique(np.concatenate([chain.live, chain.live + 1, chain.hard.at, chain.hard.at + 1]))
     above, best = chain.first(none), math.inf
     for _ in range(MOST_MEAN):
@@ -344,17 +397,32 @@ def check_mean(chain: Chain, row: Rows, said: tuple[float, float]) -> None:
         growth = float((after - above)[made].max())
         if growth < GROWTH and bool((above >= 0.0).all()):
             best = min(best, mean_above(row, above) / (1.0 - growth) * INFLATE)
-        if best <= said[1] or growth <= 1e-9 or not float(after.max()) < 1e6:
-            break
+        yield best
+        if growth <= STILL or not float(after.max()) < HOPELESS:
+            return
         above = after
+
+
+def check_mean(chain: Chain, row: Rows, said: tuple[float, float]) -> None:
+    """Check the bounds of the mean number of throws."""
+    low = best = 0.0
+    for low in means_below(chain, row):
+        if low >= said[0]:
+            break
+    proved = f"the mean is at least {said[0]!r}: only {rounded(low, up=False)} is proved"
+    prove(low >= said[0], proved)
+    if said[1] == math.inf:
+        return
+    for best in means_above(chain, row):
+        if best <= said[1]:
+            break
     prove(best <= said[1], f"the mean is at most {said[1]!r}: only {best!r} is proved")
 
 
 def check_chances(c: Chances, progress: Progress) -> None:
     """Check everything that is claimed."""
-    mesh = mesh_of(c.edges)
-    kinds, absorbed = kinds_of(c, mesh)
-    work, done = len(mesh.place) + len(c.within) * len(mesh.place), 0
+    nodes = sum(len(each) for each in c.edges)
+    work, done = (1 + len(c.within)) * nodes, 0
 
     def advance(more: int) -> None:
         nonlocal done
@@ -362,11 +430,11 @@ def check_chances(c: Chances, progress: Progress) -> None:
         if progress is not None:
             progress(done, work)
 
-    chain, row = chain_of(c.noisy, mesh, kinds, absorbed, advance), start_row(c, mesh)
+    chain, row = chain_on(c.setting, c.edges, advance)
     brackets: dict[str, Array] = {}
     for name, said in c.within.items():
-        brackets[name] = brackets_of(chain, row, name, len(said))
-        advance(len(mesh.place))
+        brackets[name], _ = brackets_of(chain, row, name, len(said))
+        advance(nodes)
         check_within(name, said, brackets[name])
     check_quantiles(c, brackets)
     if c.mean is not None:

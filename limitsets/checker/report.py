@@ -16,7 +16,7 @@ import flint
 
 from .any_map import map_in_words
 from .balls import PRECISION, reason_of
-from .brackets import Chances, chances_in_words, check_chances, read_chances
+from .brackets import UNIFORM, Chances, bounds_of_laws, chances_in_words, check_chances, read_chances
 from .cells import Crew, Progress, extents, scene_of_box
 from .claims import CLAIMS, check_box_claims, failing, read_claims
 from .feeding import verdict_of_feeds
@@ -351,11 +351,12 @@ def recheck_plane(plane: Plane, workers: int, progress: Progress, report: Report
 
 def recheck_chances(c: Chances, _: int, progress: Progress, report: Report) -> None:
     """Check probabilities, and fill in the report."""
-    for name, text in c.laws.items():
-        report.parameters[f"law of {name}"] = f"uniform, within {quantity(text, KINDS, name)}"
+    for name, (word, text) in c.setting.laws.items():
+        said = "uniform, within" if word == UNIFORM else "normal, with a standard deviation of"
+        report.parameters[f"law of {name}"] = f"{said} {quantity(text, KINDS, name)}"
     report.cells = sum(len(e) - 1 for e in c.edges)
     report.statement = chances_in_words(c)
-    if goal_of_scene(c.raw, len(c.scene.sides)) is not None:
+    if goal_of_scene(c.raw, len(c.setting.scene.sides)) is not None:
         report.statement.append(NO_GOAL)
     check_chances(c, progress)
 
@@ -375,7 +376,7 @@ def recheck_policy(policy: Policy, workers: int, progress: Progress, report: Rep
 ALONE: dict[str, tuple[Callable[..., Any], Callable[..., None], Callable[[Any], object]]] = {
     "region": (read_plane, recheck_plane, lambda _: None),
     "policy": (read_policy, recheck_policy, lambda policy: policy.noise),
-    "probabilities": (read_chances, recheck_chances, lambda chances: chances.laws),
+    "probabilities": (read_chances, recheck_chances, lambda chances: bounds_of_laws(chances.setting.laws)),
 }
 """The claims that stand alone in a file: how each is read and checked, and the noise that it has."""
 

@@ -50,7 +50,7 @@ def certificate(model, laws, starts, absorbing, edges, within, **more):
     scene = forge.scene(model)
     section = {
         "scene": scene,
-        "laws": {name: {"uniform": bound} for name, bound in laws.items()},
+        "laws": {name: law if isinstance(law, dict) else {"uniform": law} for name, law in laws.items()},
         "starts": starts,
         "absorbing": absorbing,
         "strata": 8,
@@ -162,12 +162,12 @@ def entries_of(forged, tmp_path):
 def good(tmp_path_factory):
     """The certificate that claims what the checker finds, and no more."""
     with flint.ctx.workprec(checker.balls.PRECISION):
-        module, links = (sys.modules[f"{checker.__name__}.{name}"] for name in ("brackets", "links"))
+        module = sys.modules[f"{checker.__name__}.brackets"]
         claim = module.read_chances(*entries_of(noisy(), tmp_path_factory.mktemp("probabilities")))
-        whole = module.mesh_of(claim.edges)
-        chain = links.chain_of(claim.noisy, whole, *module.kinds_of(claim, whole), lambda more: None)
-        row = module.start_row(claim, whole)
-        found = {name: module.brackets_of(chain, row, name, len(said)) for name, said in claim.within.items()}
+        chain, row = module.chain_on(claim.setting, claim.edges, lambda more: None)
+        found = {
+            name: module.brackets_of(chain, row, name, len(said))[0] for name, said in claim.within.items()
+        }
     quantiles = [["any", "50 %", *median_of(found["any"])]]
     return noisy(found, quantiles=quantiles, mean=[(12.2).hex(), (12.4).hex()])
 
@@ -202,22 +202,36 @@ def test_a_hard_cell_is_compared_with_the_first_node_that_is_thrown_from():
 
 def test_bounds_of_a_step_are_not_below_the_exact_sums():
     """A step with nothing but a mean, or a hard cell: the sum of two numbers, which floats round either way."""
-    chain, generator = sys.modules[f"{checker.__name__}.landings"].Chain, np.random.default_rng(5)
+    modules = (sys.modules[f"{checker.__name__}.{name}"] for name in ("steps", "means"))
+    (steps, means), generator = modules, np.random.default_rng(5)
     none = np.zeros(0, np.int64)
     for most, mean, more in generator.uniform(0.0, 1.0, (100, 3)):
         step = SimpleNamespace(
+            mesh=means.Mesh(np.arange(4.0), np.array([0, 4])),
+            scatter=None,
+            beyond=0.0,
             rows=SimpleNamespace(times=lambda values: np.full(4, mean), off=np.zeros(4)),  # noqa: B023  # called here
-            nodes=SimpleNamespace(at=none, much=np.zeros(0), ends=lambda values: (np.zeros(0), np.zeros(0))),
-            deficits=lambda values: np.zeros(4),
+            nodes=SimpleNamespace(
+                at=none,
+                much=np.zeros(0),
+                varied=np.zeros(0),
+                steep=np.zeros(0),
+                ends=lambda g: (np.zeros(0), np.zeros(0)),
+                variation=lambda g: np.zeros(0),
+                steepest=lambda g: np.zeros(0),
+            ),
+            deficits=lambda g: np.zeros(4),
+            cells=SimpleNamespace(at=np.array([0]), ends=lambda g: (np.zeros(1), np.full(1, np.inf))),
             hard=SimpleNamespace(
                 at=np.array([2]),
-                much=np.array([np.inf]),
-                ends=lambda values: (np.zeros(1), np.array([most])),  # noqa: B023  # called here
+                steep=np.array([np.inf]),
+                ends=lambda g: (np.zeros(1), np.array([most])),  # noqa: B023  # called here
+                steepest=lambda g: np.zeros(1),
             ),
             live=np.array([0]),
             beside=np.array([0]),
         )
-        bounds = chain.above(step, np.ones(4), np.full(4, -np.inf), more)
+        bounds = steps.Chain.above(step, np.ones(4), np.full(4, -np.inf), more)
         exact = [Fraction(mean) + Fraction(more)] * 2 + [Fraction(most) + Fraction(more)] * 2
         assert all(Fraction(bound) >= sum_ for bound, sum_ in zip(bounds.tolist(), exact, strict=True))
         assert bounds.tolist() == pytest.approx([float(sum_) for sum_ in exact], abs=1e-14)
@@ -292,10 +306,14 @@ def test_what_has_become_false_is_not_proved(good, tmp_path, name):
     assert report.reason.startswith("probabilities: ")
 
 
+CAVITY = {"position": "15 in", "width": "6 in", "depth": "3 in", "angle": "60 deg"}
 ODD = {
-    "uniform laws only": put(*AT, "laws", "landing.x", {"gaussian": "0.2 in"}),
-    "landing.x missing": lambda forged: section_of(forged)["laws"].pop("landing.x"),
-    "nothing is rechecked": put(*AT, "laws", "landing.x", "uniform", "0 in"),
+    "uniform and gaussian laws only": put(*AT, "laws", "landing.x", {"cauchy": "0.2 in"}),
+    "laws only": put(*AT, "laws", "landing.x", {"uniform": "0.2 in", "gaussian": "0.2 in"}),
+    "its number is not a text": put(*AT, "laws", "landing.x", "uniform", ["0.2 in", "0.2 in"]),
+    "noise reaches 100": put(*AT, "laws", "throw.speed", {"gaussian": "17 %"}),
+    "has a cavity": put(*AT, "scene", "cavity", CAVITY),
+    "is not negative": put(*AT, "laws", "landing.x", "uniform", "-0.2 in"),
     "reaches 100": put(*AT, "laws", "throw.speed", "uniform", "120 %"),
     "stretches of starts overlap": put(*AT, "starts", 2, 0, 1),
     "overlap": put(*AT, "absorbing", "wrong", [[2, "21 in", None]]),
@@ -329,6 +347,28 @@ def test_what_is_odd_is_refused_in_words(good, tmp_path, said):
     assert said in report.reason
 
 
+def test_what_lands_far_beyond_the_arm_has_left_it(tmp_path, monkeypatch):
+    """Of a cell of which no branch is known; its parts land beyond 300 in, and scatter by 199 in: none stays."""
+    own = forge.scene
+
+    def high(model):
+        scene = own(model)
+        scene["arm"] = {"surface_height": "-40 in", "length": "99 in"}
+        scene["throw"]["kappa"] = "32 in"
+        return scene
+
+    monkeypatch.setattr(forge, "scene", high)
+    steps = [np.linspace(2.1, 97.9, 100)] * 2 + [np.linspace(4.5, 50.0, 100)]
+    places = {"right": [[0, "2 in", None], [1, "2 in", None]]}
+    edges = mesh("small", steps, {0: [2.0], 1: [2.0]})
+    for most, word in ((1.0, "proved"), (0.97, "failed")):
+        said = np.array([[0.0, 1.0], [0.0, most]])
+        forged = certificate(
+            "small", {"landing.x": "199 in"}, [[2, "90 in", "90.001 in"]], places, edges, {"exits": said}
+        )
+        assert verdict(forged, tmp_path).verdict == word
+
+
 # ------------------------------------------------------------------------------------------------- from the package
 
 
@@ -349,8 +389,45 @@ def test_brackets_are_saved_and_rechecked(tmp_path):
     assert ls.recheck(tmp_path / "initial.denied.zip").verdict == "failed"
 
 
-def test_laws_that_are_not_rechecked_are_refused(tmp_path):
-    for scatter in (Scattering(landing=Gaussian(0.1)), Scattering(speed=Uniform(0.01))):
-        found = absorption_brackets("paper-initial", scatter, right=(20.0, 2), cells=60, throws=1, mean=False)
-        with pytest.raises(ls.errors.AnswerError, match="uniform law of the landing place"):
-            found.save(tmp_path / "x.proof.zip")
+def test_a_scene_in_other_units_has_the_same_brackets():
+    inches = ls.load("paper-initial")
+
+    def in_millimetres(each):
+        if isinstance(each, dict):
+            return {key: in_millimetres(value) for key, value in each.items()}
+        if isinstance(each, list):
+            return [in_millimetres(value) for value in each]
+        number, _, unit = str(each).partition(" ")
+        return f"{float(number) * 25.4!r} mm" if unit == "in" else each
+
+    scene = ls.load(in_millimetres(inches.text))
+    pair = [
+        absorption_brackets(
+            each,
+            Scattering(landing=Uniform(0.1 * scale)),
+            right=(20.0 * scale, 2),
+            cells=100,
+            throws=5,
+            mean=False,
+        ).within["right"][:, 5]
+        for each, scale in ((inches, 1.0), (scene, 25.4))
+    ]
+    assert pair[0] == pytest.approx(pair[1], abs=1e-6)
+    assert scene.unit == "mm"
+
+
+@pytest.mark.parametrize(
+    ("scatter", "said"),
+    [
+        (Scattering(landing=Gaussian(0.1)), {"landing.x": "normal, with a standard deviation of 0.1 in"}),
+        (Scattering(speed=Uniform(0.01)), {"throw.speed": "uniform, within 1 %"}),
+        (Scattering(), {}),
+    ],
+)
+def test_every_law_is_saved_and_rechecked(tmp_path, scatter, said):
+    found = absorption_brackets("paper-initial", scatter, right=(20.0, 2), cells=60, throws=1, mean=False)
+    report = ls.recheck(found.save(tmp_path / "x.proof.zip"))
+    assert (report.verdict, report.reason) == ("proved", "")
+    assert {name: text for name, text in report.parameters.items() if name.startswith("law")} == {
+        f"law of {name}": text for name, text in said.items()
+    }

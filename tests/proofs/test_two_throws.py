@@ -268,11 +268,10 @@ def chain_of(speed, landing, strata, tmp_path):
         strata=strata,
     )
     path = forged.write(tmp_path / "x.proof.zip")
-    brackets, links = of_checker("brackets"), of_checker("links")
+    brackets = of_checker("brackets")
     claim = brackets.read_chances(*checker.report.open_certificate(path))
-    whole = brackets.mesh_of(claim.edges)
-    chain = links.chain_of(claim.noisy, whole, *brackets.kinds_of(claim, whole), lambda more: None)
-    return chain, [slice(*whole.first[k : k + 2]) for k in range(3)]
+    chain, _ = brackets.chain_on(claim.setting, claim.edges, lambda more: None)
+    return chain, [slice(*chain.mesh.first[k : k + 2]) for k in range(3)]
 
 
 # speed, landing, strata, midpoints of each law
@@ -287,7 +286,7 @@ def test_one_throw_is_bounded_at_every_place(speed, landing, strata, count, tmp_
     scatter = Scattering(speed=Uniform(speed) if speed else None, landing=Uniform(landing))
     chain, rows = chain_of(speed, landing, strata, tmp_path)
     place = chain.mesh.place
-    assert not np.isfinite(chain.hard.much).all()
+    assert not np.isfinite(chain.hard.steep).all()
     random = np.random.default_rng(5)
     side = random.integers(0, 3, 3000)
     x = random.uniform(scene.sides.a[side] + 1e-3, np.where(side == 2, X, 24.0))
@@ -342,7 +341,7 @@ def test_a_mean_below_the_geometric_one_is_not_proved(stays):
     brackets, chain = of_checker("brackets"), Chain(stays)
     chain.live = np.array([], dtype=np.int64)
     chain.hard.at = np.array([0])
-    row = of_checker("averages").Rows(1, np.array([0]), np.array([0]), np.array([1.0]), 0.0)
+    row = of_checker("means").Rows(1, np.array([0]), np.array([0]), np.array([1.0]), 0.0)
     mean = 1.0 / (1.0 - stays)  # of a geometric law
     unproved = of_checker("balls").UnprovedError
     for share in (0.7, 0.9, 0.999999):

@@ -2,22 +2,24 @@
 
 import math
 from fractions import Fraction
+from itertools import pairwise
 
-import mpmath
 import numpy as np
 import pytest
 from scipy import stats
 
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+from flint import arb
+
 import limitsets as ls
 from limitsets.base.errors import AnswerError
+from limitsets.checker.laws import normal_law, uniform_law
+from limitsets.checker.means import Graph, Mesh, Ranges, Spread, mean_rows
 from limitsets.feeder.scattering import Gaussian, Given, Scattering, Uniform, starts_from
 from limitsets.parameters.noise.sampling import throw_many
 from limitsets.proofs.chances.absorption import absorption_brackets
-from limitsets.proofs.chances.averages import Nodes, mean_matrix, rounding_of, running
 from limitsets.proofs.chances.chain import chain_of
-from limitsets.proofs.chances.deficits import staircase
-from limitsets.proofs.chances.landings import ERROR, moments
-from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.systems.maps import advance
 from tests.closed_forms import ladder
 from tests.one_throw import mean_after
@@ -25,26 +27,42 @@ from tests.one_throw import mean_after
 BOTH = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
 
 
-def test_moments_of_sine_and_cosine_are_within_their_error():
-    phi = np.array([0.0, 1e-9, 1e-3, 0.7, 1.9, 3.2, 6.283])
-    found = moments(phi)
-    for k in range(3):
-        for p, c, s in zip(phi, found.c[k], found.s[k], strict=True):
-            for mine, f in ((c, mpmath.cos), (s, mpmath.sin)):
-                exact = mpmath.quad(lambda t, f=f, k=k, p=p: t**k * f(p * t), [0, 0.5, 1])
-                assert abs(mine - exact) < ERROR
-
-
-def test_normal_strata_have_the_masses_of_the_law():
-    law = staircase(Gaussian(0.5), 48, "x")
-    exact = np.diff(stats.norm(scale=0.5).cdf(law.borders))
-    assert np.abs(law.weight - exact).max() < 1e-15
+def test_a_normal_law_has_its_probabilities_and_its_density():
+    law, exact = normal_law(Fraction(1, 2), 96, 4), stats.truncnorm(-6.0, 6.0, scale=0.5)
+    assert np.abs(law.weights - np.diff(exact.cdf(law.cuts))).max() < 1e-15
     assert 1.9e-9 < law.beyond < 2.0e-9  # 2 (1 - Phi(6)) = 1.973e-9
-    # The density on a stratum differs from its mean by the ripple at most: integral of |p - step| over the law.
-    fine = np.linspace(-3.0, 3.0, 48 * 50 + 1)
-    middle = 0.5 * (fine[1:] + fine[:-1])
-    off = np.abs(stats.norm(scale=0.5).pdf(middle).reshape(48, -1) - law.density[:, None]).sum(axis=1)
-    assert (0.5 * off * (fine[1] - fine[0])).max() <= law.ripple
+    assert law.most == pytest.approx(exact.pdf(0.0), rel=1e-12)
+    # what a stratum's even density leaves out, at most and all together: |F - F_even|, the law's function and its own
+    fine = np.linspace(law.cuts[:-1], law.cuts[1:], 41)
+    off = np.abs(exact.cdf(fine) - np.linspace(exact.cdf(law.cuts[:-1]), exact.cdf(law.cuts[1:]), 41))
+    assert off.max() <= law.ripple < 3.0 * off.max()
+    assert np.trapezoid(off, fine, axis=0).sum() <= law.tilt < 3.0 * np.trapezoid(off, fine, axis=0).sum()
+    ends = np.array([float(end) for end in law.ends])
+    assert [(j, float(change)) for j, change in law.jumps] == [
+        (0, pytest.approx(exact.pdf(-3.0 + 1e-12))),
+        (96, pytest.approx(-exact.pdf(3.0 - 1e-12))),
+    ]
+    for column in law.columns:
+        inside = np.linspace(ends[column.first], ends[column.last], 101)
+        density = 2.0 * stats.norm.pdf(2.0 * inside)
+        slope = np.abs(4.0 * inside * density)
+        assert float(column.change) == pytest.approx(density[-1] - density[0], abs=1e-7)
+        assert density.max() <= column.most * (1.0 + 1e-8) <= density.max() * (1.0 + 1e-6)
+        assert slope.max() <= column.steep * (1.0 + 1e-8) <= slope.max() * 1.01
+        assert float(law.density(arb(inside[40]))) == pytest.approx(density[40], rel=1e-8)
+
+
+def test_a_uniform_law_jumps_at_its_ends_and_has_narrow_columns():
+    law = uniform_law(Fraction(3, 100), 16)
+    assert law.weights.tolist() == [1.0 / 16.0] * 16
+    assert [(j, float(change)) for j, change in law.jumps] == [
+        (0, pytest.approx(100.0 / 6.0)),
+        (16, pytest.approx(-100.0 / 6.0)),
+    ]
+    widths = [law.ends[each.last] - law.ends[each.first] for each in law.columns]
+    assert sum(widths) == Fraction(6, 100)
+    assert max(widths) <= Fraction(1, 100)
+    assert uniform_law(Fraction(0), 16).certain
 
 
 # ------------------------------------------------------------ one throw of any function, at any place
@@ -56,6 +74,11 @@ NOISES = [
     (Scattering(speed=Uniform(0.01)), 1000),
     (Scattering(speed=Uniform(0.1)), 1000),
     (Scattering(speed=Uniform(0.1), landing=Uniform(0.05)), 100),
+    (Scattering(), 1),
+    (Scattering(speed=Gaussian(0.005)), 1000),
+    (Scattering(landing=Gaussian(0.02)), 1000),
+    (Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02)), 100),
+    (Scattering(speed=Gaussian(0.005), landing=Uniform(0.02)), 100),
 ]
 
 
@@ -64,23 +87,23 @@ NOISES = [
 @pytest.mark.parametrize("name", ["paper-designed", "paper-initial"])
 def test_one_throw_is_bounded_at_every_place(name, scatter, count):
     scene = ls.load(name)
-    chain = chain_of(parameter_box(scene), scatter, {"right": [(2, 25.0, math.inf)]}, 250)
-    nodes, random = chain.nodes, np.random.default_rng(3)
+    chain = chain_of(scene, scatter, [(2, 8.0, 20.0)], {"right": [(2, 25.0, math.inf)]}, 250).steps
+    mesh, random = chain.mesh, np.random.default_rng(3)
     x, side = random.uniform(6.0, 22.0, 1000), random.integers(0, 3, 1000)
-    rows = [nodes.of_side(k) for k in range(3)]
-    phase = nodes.side()
+    rows = [slice(first, last) for first, last in pairwise(mesh.first.tolist())]
+    place, phase = np.clip(mesh.place, -60.0, 60.0), np.repeat(np.arange(3), np.diff(mesh.first))
     for values in (
-        np.sin(3.0 * nodes.place + phase) + (nodes.place > 17.3),
-        np.sin(nodes.place + 2.0 * phase),
-        (nodes.place > 17.3) + 0.5 * (phase == 1),
-        np.clip(nodes.place - 15.0, -20.0, 20.0) ** 2 / 100.0 - phase,
+        np.sin(3.0 * place + phase) + (place > 17.3),
+        np.sin(place + 2.0 * phase),
+        (place > 17.3) + 0.5 * (phase == 1),
+        np.clip(place - 15.0, -20.0, 20.0) ** 2 / 100.0 - phase,
     ):
-        found = mean_after(scene, scatter, [(nodes.place[row], values[row]) for row in rows], x, side, count)
-        none = np.full(chain.free.size, -np.inf)
+        found = mean_after(scene, scatter, [(mesh.place[row], values[row]) for row in rows], x, side, count)
+        none = np.full(place.size, -np.inf)
         above, below = chain.above(values, none), -chain.above(-values, none)
         on = [side == k for k in range(3)]
         high, low = (
-            np.select(on, [np.interp(x, nodes.place[row], b[row]) for row in rows]) for b in (above, below)
+            np.select(on, [np.interp(x, mesh.place[row], b[row]) for row in rows]) for b in (above, below)
         )
         # Midpoints of a function that jumps where the branch changes and at 17.3: each by half a weight.
         slack = np.ptp(values) / count
@@ -139,28 +162,29 @@ def test_speed_alone_has_its_closed_form():
 
 
 def test_sums_over_spans_keep_small_numbers_beside_large_ones():
-    """Differences of running sums stand for sums: exact in rationals, never below them."""
+    """Differences of running sums stand for the variation on spans: exact in rationals, never below it."""
     random = np.random.default_rng(1)
-    numbers = random.uniform(0.0, 1.0, 3000) * 10.0 ** random.integers(-9, 4, 3000)
-    sums = running(numbers)
-    first = random.integers(0, 2990, 400)
-    last = first + random.integers(1, 10, 400)
-    exact = [float(sum(map(Fraction, numbers[i:j]))) for i, j in zip(first, last, strict=True)]
-    found = sums.between(first, last)
+    values = np.cumsum(random.uniform(-1.0, 1.0, 3000) * 10.0 ** random.integers(-9, 4, 3000))
+    graph = Graph(Mesh(np.arange(3000.0), np.array([0, 3000])), values)
+    first = random.integers(0, 2980, 400)
+    last = first + random.integers(0, 9, 400)
+    steps = [abs(Fraction(b) - Fraction(a)) for a, b in pairwise(values.tolist())]
+    exact = [float(sum(steps[i : j + 1])) for i, j in zip(first, last, strict=True)]
+    found = graph.variation_on(Ranges(first, last))
     assert (found >= exact).all()
-    assert (found <= np.array(exact) + 2.0 * sums.off).all()
+    assert (found <= np.array(exact) + 2.0 * graph.rounding).all()
 
 
 def test_the_rounding_of_a_mean_grows_with_its_entries():
-    nodes = Nodes(np.linspace(0.0, 1.0, 40_001), np.array([0, 40_001]))
+    mesh = Mesh(np.linspace(0.0, 1.0, 40_001), np.array([0, 40_001]))
     one = np.array([0])
-    row = mean_matrix(1, nodes, one, np.ones(1), one, np.array([0.1]), np.array([0.9]))
+    rows = mean_rows(1, mesh, [Spread(one, np.ones(1), one, np.array([0.1]), np.array([0.9]))])
     # 32 001 products, one after the other: (k - 1) roundings of at most the whole sum
-    assert rounding_of(row) >= 32_001 * 2.0**-53
+    assert rows.off >= 32_001 * 2.0**-53
     values = np.where(np.arange(40_001) % 2, 1.0, -1.0) * np.linspace(0.0, 1.0, 40_001)
-    entries = row.toarray()[0]
-    exact = sum(Fraction(float(w)) * Fraction(float(v)) for w, v in zip(entries, values, strict=True))
-    assert abs(float((row @ values)[0]) - float(exact)) <= rounding_of(row)
+    pairs = zip(rows.entry.tolist(), values[rows.column].tolist(), strict=True)
+    exact = sum(Fraction(entry) * Fraction(value) for entry, value in pairs)
+    assert abs(float(rows.times(values)[0]) - float(exact)) <= rows.off
 
 
 @pytest.mark.sweep

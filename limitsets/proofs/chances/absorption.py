@@ -1,8 +1,7 @@
 """Brackets of the probabilities of absorption, of quantiles and means, for a scene that scatters: what is proved.
 
-Within n throws both bounds come from n steps from V_0 = 1 on the target.  The mean from below is that of min(T, n);
-from above it is a finite V >= 1 + K V off the absorbing states: with V_(n+1) <= V_n + c for c < 1,
-V_n / (1 - c) is one.
+Within n throws both bounds come from n steps from V_0 = 1 on the target; the mean number of throws has a bound from
+below and one from above (`limitsets/checker/brackets.py`).
 """
 
 from __future__ import annotations
@@ -21,9 +20,7 @@ from limitsets.base import AnswerError, Column, Table, Tabled, as_table, picked,
 from limitsets.base.arrays import Array
 from limitsets.feeder.scattering import Scattering, scattering_of, starts_from
 from limitsets.numbers.interval import guard
-from limitsets.proofs.chances.averages import Nodes, mean_matrix, rounding_of
-from limitsets.proofs.chances.chain import EXITS, Chain, Place, chain_of
-from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.proofs.chances.chain import EXITS, Chain, Place, chain_of, write
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
@@ -35,8 +32,8 @@ if TYPE_CHECKING:
 
 # Any absorbing set or exit.
 ANY = "any"
-# A certificate claims slightly wider brackets than the proof gives, and the checker's cells are finer: see `chain`.
-ALLOWANCE, FINER = 1e-6, 2
+# A certificate claims slightly wider brackets than the proof gives: see `chain`.
+ALLOWANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +52,13 @@ class AbsorptionBrackets(Tabled):
         By name side, from x, to x of the places that absorb [length]; the exits ("exits") do too.
     starts : tuple of (int, float, float)
         Side, from x, to x: starts are equally likely per length on all of these [length].
-    nodes : Nodes
-        The cells: functions are affine between neighbouring nodes of a side.
-    strata : dict of str to ndarray
-        By quantity the ends of the strata into which its law is cut.
+    chain : Chain
+        The chain on its cells: functions are affine between neighbouring nodes of a side (`chain.nodes`).
     within : dict of str to ndarray, shape (2, throws + 1)
         By name bounds of the probability of having ended there after 0, 1, ... throws; "any" is that of T <= n.
     values : dict of str to ndarray, shape (2, n_nodes)
-        By name the bounds at the nodes after the last throw, for starts there.
+        By name the bounds at the nodes after the last throw, for starts there; they belong to `chain.steps.mesh`, which
+        has two far nodes more on each side.
     mean : (float, float)
         Bounds of the mean of T; the upper one is infinite where no finite bound is proved.
     seconds : float
@@ -77,8 +73,7 @@ class AbsorptionBrackets(Tabled):
     scatter: Scattering
     absorbing: dict[str, tuple[Place, ...]]
     starts: tuple[Place, ...]
-    nodes: Nodes
-    strata: dict[str, Array]
+    chain: Chain
     within: dict[str, Array]
     values: dict[str, Array]
     mean: tuple[float, float]
@@ -111,7 +106,7 @@ class AbsorptionBrackets(Tabled):
         return as_table(
             **picked(self, "scene", "unit", "how", "absorbing", "starts", "seconds"),
             scatter=self.scatter.words(),
-            cells=int(np.isfinite(self.nodes.width).sum()),
+            cells=self.chain.nodes.place.size - self.chain.nodes.first.size + 1,
             within={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.within.items()},
             mean={"lo": self.mean[0], "hi": self.mean[1] if math.isfinite(self.mean[1]) else None},
             quantiles={
@@ -120,9 +115,7 @@ class AbsorptionBrackets(Tabled):
             },
         )
 
-    def save(
-        self, path: str | Path, *, allowance: float = ALLOWANCE, finer: int = FINER, recheck: bool = True
-    ) -> Path:
+    def save(self, path: str | Path, *, allowance: float = ALLOWANCE, recheck: bool = True) -> Path:
         """Write the brackets as a certificate, which gets its name once the checker has made the steps anew.
 
         Parameters
@@ -131,16 +124,11 @@ class AbsorptionBrackets(Tabled):
             The file, NAME.proof.zip; an older one is replaced whole.
         allowance : float
             The claimed brackets are wider by this at both ends; bounds of the mean by this times the number of throws.
-        finer : int
-            Parts into which each cell is cut for the checker, whose bounds of a throw are slightly wider.
         recheck : bool
             Whether to check it first: from seconds to as long as the proof.
 
         Raises
         ------
-        AnswerError
-            Laws that the checker does not know: it knows a uniform one of the landing place, and of the speed a
-            uniform one or none.
         DeniedError
             The checker's own brackets are wider than what is claimed; the file is kept as NAME.denied.zip.
 
@@ -155,20 +143,7 @@ class AbsorptionBrackets(Tabled):
         ...     ls.recheck(brackets.save(f"{folder}/initial.proof.zip")).verdict
         'proved'
         """
-        from limitsets.proofs.chances.chain import write
-
-        return write(
-            path,
-            self.source,
-            self.scatter,
-            places=(self.starts, self.absorbing),
-            nodes=self.nodes,
-            within=self.within,
-            mean=self.mean,
-            allowance=allowance,
-            finer=finer,
-            recheck=recheck,
-        )
+        return write(path, self.chain, self.within, self.mean, allowance=allowance, recheck=recheck)
 
 
 # ----------------------------------------------------------------
@@ -176,95 +151,24 @@ class AbsorptionBrackets(Tabled):
 
 
 CELLS, THROWS = 4000, 200
-# The mean from above: once no state is left with a larger probability, throws without end are bounded.
-LEFT, MOST_THROWS = 1e-4, 3000
-# A bound of the mean above this grows without end: the cells are too coarse, or nothing absorbs.
-HOPELESS = 1e6
+# Bounds of a mean are good enough once so many throws more narrow them by less than this share.
+PATIENCE, NARROWED = 50, 1e-3
 
 
-def _start_row(nodes: Nodes, starts: Sequence[Place]) -> Any:
-    """Return the row that makes the mean over the starts of values at nodes."""
-    side, lo, hi = (np.array(column) for column in zip(*starts, strict=True))
-    length = (hi - lo).astype(np.float64)
-    row = np.zeros(side.size, dtype=np.int64)
-    return mean_matrix(
-        1,
-        nodes,
-        row,
-        weight=length / length.sum(),
-        side=side.astype(np.int64),
-        one=lo.astype(float),
-        two=hi.astype(float),
-    )
-
-
-def _mean_above(row: Any, values: Array) -> float:
-    return float((row @ values)[0]) + rounding_of(row) * float(np.abs(values).max())
-
-
-def _at_most(nodes: Nodes, values: Array, most: float) -> Array:
-    """Lower bounds far above the largest possible value to this value; raise those at the nodes next to them to it."""
-    far = values > most + 0.5
-    if not far.any():
-        return values
-    joined = np.isfinite(nodes.width)
-    near = far.copy()
-    near[1:] |= far[:-1] & joined[:-1]
-    near[:-1] |= far[1:] & joined[:-1]
-    return np.where(far, most, np.where(near, np.maximum(values, most), values))
-
-
-def within_brackets(
-    chain: Chain,
-    value: Mapping[str, float],
-    row: Any,
-    throws: int,
-    progress: Callable[[int, int], None] | None = None,
-) -> tuple[Array, Array]:
-    """Bound the probability of having ended, after 0 to `throws` throws, at places of value 1 (others have 0).
-
-    Returns
-    -------
-    (within, values)
-        Bounds for the starts, shape (2, throws + 1), and at the nodes after the last throw, shape (2, n).
-    """
-    fixed = chain.fixed(value), chain.fixed({name: -number for name, number in value.items()})
-    bound = [chain.first(each) for each in fixed]
-    brackets = np.empty((2, throws + 1))
-    for n in range(throws + 1):
-        if n:
-            bound = [
-                _at_most(chain.nodes, chain.above(values, each), most)
-                for values, each, most in zip(bound, fixed, (1.0, 0.0), strict=True)
-            ]
-        brackets[:, n] = -_mean_above(row, bound[1]), _mean_above(row, bound[0])
-        if progress is not None:
-            progress(n, throws)
-    # Having ended is for ever: a bound from below holds later, one from above holds earlier.
-    low = np.maximum.accumulate(np.clip(brackets[0], 0.0, 1.0))
-    high = np.minimum.accumulate(np.clip(brackets[1], 0.0, 1.0)[::-1])[::-1]
-    return np.stack([low, high]), np.stack([-bound[1], bound[0]])
-
-
-def mean_brackets(chain: Chain, row: Any) -> tuple[float, float]:
+def mean_brackets(chain: Chain) -> tuple[float, float]:
     """Bound the mean number of throws until absorption."""
-    none = chain.fixed(dict.fromkeys(chain.absorbs, 0.0))
-    above = below = chain.first(none)
-    low, high = 0.0, math.inf
-    for _ in range(MOST_THROWS):
-        below, before = chain.above(below, none, -1.0), below
-        low = max(low, -_mean_above(row, below))
-        if not float((before - below).max()) > LEFT:
-            break
-    for _ in range(MOST_THROWS):
-        after = chain.above(above, none, 1.0)
-        change, above = float((after - above)[chain.free].max()), after
-        if change < LEFT:
-            # K of c V is c times K of V, so V / (1 - c) >= 1 + K V / (1 - c).
-            return low, _mean_above(row, above) / (1.0 - change) * (1.0 + 1e-12)
-        if not float(above.max()) < HOPELESS:
-            break
-    return low, high
+    from limitsets.checker.brackets import means_above, means_below
+
+    ends = []
+    for bounds in (means_below(chain.steps, chain.row), means_above(chain.steps, chain.row)):
+        every: list[float] = []
+        for bound in bounds:
+            every.append(bound)
+            before = every[-PATIENCE] if len(every) > PATIENCE else math.nan
+            if math.isfinite(bound) and abs(bound - before) <= NARROWED * bound:
+                break
+        ends.append(every[-1])
+    return ends[0], ends[1]
 
 
 @shown_in_notebooks
@@ -337,16 +241,23 @@ def absorption_brackets(
     begin = tuple(_default_starts(read, right) if starts is None else starts)
     _require(read, "a start", begin)
     tell = progress or (lambda stage, done, total: None)
-    tell("cells", 0, 1)
-    chain = chain_of(parameter_box(read), noise, places, cells)
-    tell("cells", 1, 1)
-    row = _start_row(chain.nodes, begin)
+    from limitsets.checker.brackets import brackets_of
+
+    nodes = 0
+
+    def told(more: int) -> None:
+        nonlocal nodes
+        nodes += more
+        tell("cells", min(nodes, len(read.sides) * cells), len(read.sides) * cells)
+
+    chain = chain_of(read, noise, begin, places, cells, told)
     within, values = {}, {}
-    for name in (ANY, *chain.absorbs):
-        value = {each: float(name in (ANY, each)) for each in chain.absorbs}
-        within[name], values[name] = within_brackets(chain, value, row, throws, partial(tell, name))
+    for name in (ANY, *chain.steps.absorbed):
+        told_of = partial(_told, partial(tell, name), throws)
+        pair, values[name] = brackets_of(chain.steps, chain.row, name, throws + 1, told_of)
+        within[name] = pair.T
     tell("mean", 0, 1)
-    means = mean_brackets(chain, row) if mean else (0.0, math.inf)
+    means = mean_brackets(chain) if mean else (0.0, math.inf)
     tell("mean", 1, 1)
     return AbsorptionBrackets(
         read,
@@ -355,13 +266,16 @@ def absorption_brackets(
         scatter=noise,
         absorbing={name: tuple(each) for name, each in places.items()},
         starts=begin,
-        nodes=chain.nodes,
-        strata={"speed": chain.speed.borders, "landing": chain.landing_law.borders},
+        chain=chain,
         within=within,
         values=values,
         mean=means,
         seconds=time.perf_counter() - begun,
     )
+
+
+def _told(tell: Callable[[int, int], None], of: int, done: int) -> None:
+    tell(done, of)
 
 
 def _places(

@@ -101,6 +101,17 @@ def require_confirmed(file: Path, kept: Path, verdicts: Mapping[str, str], worke
 
 
 @arguments_checked
+def require_checker() -> None:
+    """Refuse to go on without the checker's arithmetic."""
+    if find_spec("flint") is None:
+        raise AnswerError(
+            "the arithmetic of the checker",
+            "not installed",
+            "python-flint",
+            "pip install python-flint",
+        )
+
+
 def recheck(
     path: str | Path, *, workers: int | None = 1, progress: Callable[[int, int], None] | None = None
 ) -> Report:
@@ -137,13 +148,7 @@ def recheck(
     ...     ls.recheck(file).verdict
     'proved'
     """
-    if find_spec("flint") is None:
-        raise AnswerError(
-            "the arithmetic of the recheck",
-            "not installed",
-            "python-flint",
-            "pip install python-flint",
-        )
+    require_checker()
     from limitsets.checker import recheck as check
 
     if progress is None and in_notebook():
