@@ -108,20 +108,24 @@ class Links(Landings):
             self.rate[node] = max(self.rate[node], *(upper(abs(each.d)) for each in over))
         two = self.place[cell : cell + 2]
         lo, hi = float(two.min()) - slack, float(two.max()) + slack
+        gap, branches = self.undecided(cell, border)
+        places = [self.range_of(branch, lo, hi) for branch in branches]
+        self.parts.at_cells.rows.append((at, gap, *places[0], *places[1]))
+        one_way = all(each.d > 0 for each in over) or all(each.d < 0 for each in over)
+        self.folds[cell : cell + 2] |= not one_way
+        curved = not self.certain and one_way and self.add_ends(cell, border, over, h, slacks)
+        if border.below == border.above and (not curved or hi - lo < 8.0 * h):
+            self.add_turns(cell, border.below, over, h, slack)
+
+    def undecided(self, cell: int, border: Border) -> tuple[float, tuple[int, int]]:
+        """Return the share of the law of which the branch is open or not a node's, and by which branches it lands."""
         other = max(self.mismatch(cell + k, border, k) for k in (0, 1))
         gap = border.gap + other
         if border.below != border.above:  # the density, where the branch changes, changes too
             steep = max(column.steep for column in self.columns)
             gap += (border.cut[1] - border.cut[0]) ** 2 * 0.125 * steep * INFLATE
         # throws that a node reckons by another branch land elsewhere than the cell's
-        branches = (0, 1) if other > 0.0 else (border.below, border.above)
-        places = [self.range_of(branch, lo, hi) for branch in branches]
-        self.parts.at_cells.rows.append((at, min(gap, 1.0), *places[0], *places[1]))
-        one_way = all(each.d > 0 for each in over) or all(each.d < 0 for each in over)
-        self.folds[cell : cell + 2] |= not one_way
-        curved = not self.certain and one_way and self.add_ends(cell, border, over, h, slacks)
-        if border.below == border.above and (not curved or hi - lo < 8.0 * h):
-            self.add_turns(cell, border.below, over, h, slack)
+        return min(gap, 1.0), (0, 1) if other > 0.0 else (border.below, border.above)
 
     def slopes(self, cell: int, column: Column) -> Slopes:
         """Enclose the derivatives over a cell and a column."""
@@ -334,7 +338,7 @@ def chain_of(
     noisy: Noisy, mesh: Mesh, kinds: Array, absorbed: dict[str, Array], advance: Callable[[int], None]
 ) -> Chain:
     """Prove the throws of all sides, and put together what a step needs."""
-    scatter = None if noisy.landing.certain else Scatter(mesh, noisy.landing)
+    scatter = Scatter(mesh, noisy.landing) if not noisy.landing.certain else None
     goal = mesh if scatter is None else scatter.mesh
     parts, spread = Parts(), list[Spread]()
     for number in range(len(noisy.sides)):
@@ -345,4 +349,4 @@ def chain_of(
     chunks = [spread[k : k + NODES] for k in range(0, len(spread), NODES)]
     together = (Spread(*(np.concatenate(column) for column in zip(*some, strict=True))) for some in chunks)
     rows = mean_rows(len(mesh.place), goal, together)
-    return Chain(mesh, goal, rows, absorbed, parts, scatter, noisy.speed)
+    return Chain(mesh, scatter, rows, absorbed, parts, noisy.speed.beyond)

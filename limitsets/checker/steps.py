@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from .balls import Array
-from .laws import Law
 from .means import INFLATE, Graph, Mesh, Rows, Scatter, lifts
 
 
@@ -109,15 +108,14 @@ class Chain:
     def __init__(
         self,
         mesh: Mesh,
-        goal: Mesh,
+        scatter: Scatter | None,
         rows: Rows,
         absorbed: dict[str, Array],
         parts: Parts,
-        scatter: Scatter | None,
-        speed: Law,
+        beyond: float,
     ):
-        self.mesh, self.goal, self.rows, self.absorbed = mesh, goal, rows, absorbed
-        self.scatter, self.beyond = scatter, speed.beyond
+        self.mesh, self.scatter, self.rows, self.absorbed, self.beyond = mesh, scatter, rows, absorbed, beyond
+        self.goal = goal = mesh if scatter is None else scatter.mesh
         self.live = np.sort(parts.at_cells.array("at", np.int64))
         self.cells, self.nodes, self.hard = (
             Reach(goal, some) for some in (parts.at_cells, parts.at_nodes, parts.hard)

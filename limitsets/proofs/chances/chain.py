@@ -16,7 +16,7 @@ import numpy as np
 
 from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Mask
-from limitsets.feeder.scattering import Gaussian, Scattering, Uniform
+from limitsets.feeder.scattering import SIGMAS, Gaussian, Scattering, Uniform
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.chances.nodes import CLOSE, Nodes, extra, nodes_of
 from limitsets.proofs.prover.certificate import pack, require_checker, tidy
@@ -36,8 +36,6 @@ STRATA = 16
 GRADED = 0.43
 # Places at which those are looked for where the branch of a throw changes, and how often these are halved.
 SAMPLES, BISECTIONS = 4096, 48
-# Functions are constant beyond the arm; of a normal law nothing is said beyond so many standard deviations.
-SIGMAS = 6.0
 
 
 @dataclass(frozen=True, eq=False)
