@@ -6,7 +6,7 @@ within those claimed.
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -31,10 +31,11 @@ from .file import (
     table,
     whole_number,
 )
+from .horizon import check_ever, check_mean, mean_above, proves_mean_above
 from .landings import Noisy
 from .laws import SIGMAS, Law, normal_law, uniform_law
 from .links import ABSORBED, HARD, LIVE, chain_of
-from .means import INFLATE, Mesh, Rows, Spread, mean_rows
+from .means import Mesh, Rows, Spread, mean_rows
 from .scene import NONE, Scene, read_scene
 from .steps import Chain
 
@@ -74,6 +75,8 @@ class Chances(NamedTuple):
     within: dict[str, Array]  # by name two columns: lower and upper bound after 0, 1, ... throws
     quantiles: list[tuple[str, Fraction, int, int]]
     mean: tuple[float, float] | None
+    ever: dict[str, tuple[float, float]]
+    functions: dict[str, Array]
 
     @property
     def raw(self) -> dict[str, Any]:
@@ -85,15 +88,17 @@ def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chan
     """Read a file; raises BadFileError."""
     keys = "scene laws starts absorbing strata names quantiles mean"
     nothing = "a file of probabilities has no boxes, no other noise and no tolerance"
-    section = section_alone(header, "probabilities", "probabilities", keys, nothing)
+    section = section_alone(header, "probabilities", "probabilities", keys, nothing, optional="ever")
     setting = read_setting(section)
     names = rows(section["names"], "names", 1, 100)
     known = all(isinstance(name, str) and name in (ANY, LEFT, *setting.absorbing) for name in names)
     require(known and len(set(names)) == len(names), "names are not those of places that absorb")
-    edges, within = read_brackets(header["arrays"], entries, names, setting)
+    ever = {name: (lo, hi) for name, lo, hi in map(read_ever, rows(section.get("ever", []), "ever", 0, 100))}
+    require(set(ever) <= set(setting.absorbing), "ever: a name is not that of places that absorb")
+    edges, within, functions = read_brackets(header["arrays"], entries, names, list(ever), setting)
     quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
     mean = None if section["mean"] is None else read_mean(section["mean"])
-    return Chances(setting, edges, within, quantiles, mean)
+    return Chances(setting, edges, within, quantiles, mean=mean, ever=ever, functions=functions)
 
 
 def read_setting(section: dict[str, Any]) -> Setting:
@@ -127,17 +132,24 @@ def read_setting(section: dict[str, Any]) -> Setting:
 
 
 def read_brackets(
-    said: object, entries: dict[str, memoryview], names: list[str], setting: Setting
-) -> tuple[list[Array], dict[str, Array]]:
-    """Read the arrays: the edges of the cells of each side, and the brackets of each name."""
+    said: object, entries: dict[str, memoryview], names: list[str], ever: list[str], setting: Setting
+) -> tuple[list[Array], dict[str, Array], dict[str, Array]]:
+    """Read the arrays: the edges of the cells of each side, the brackets of each name, and functions at the nodes."""
     arrays = Arrays(said, entries)
     edges = [arrays.read(f"edges.{i}", "<f8") for i in range(len(setting.scene.sides))]
     require_edges(edges, setting)
     within = {name: arrays.read(f"within.{k}", "<f8", 2) for k, name in enumerate(names)}
+    needed = [f"ever.{k}.{end}" for k in range(len(ever)) for end in ("lower", "upper")]
+    held = [name for name in ("mean.lower", "mean.upper") if f"{name}.npy" in entries]
+    functions = {name: arrays.read(name, "<f8") for name in (*held, *needed)}
+    nodes = sum(len(each) + 2 for each in edges)
+    require(
+        all(len(each) == nodes for each in functions.values()), "a function has not one number for each node"
+    )
     arrays.require_no_others()
     lengths = {len(each) for each in within.values()}
     require(len(lengths) == 1 and 1 <= lengths.pop() <= MOST_BRACKETS + 1, "the brackets are not alike many")
-    return edges, within
+    return edges, within, functions
 
 
 def table_of(value: object, where: str) -> dict[str, Any]:
@@ -235,6 +247,14 @@ def read_mean(value: object) -> tuple[float, float]:
     return low, high
 
 
+def read_ever(value: object) -> tuple[str, float, float]:
+    """Read the bounds of one probability."""
+    name, lo, hi = rows(value, "ever", 3, 3)
+    low, high = hex_float(lo, "ever"), hex_float(hi, "ever")
+    require(isinstance(name, str) and 0 <= low <= high <= 1, "ever: the bounds are none")
+    return name, low, high
+
+
 def chances_in_words(c: Chances) -> list[str]:
     """Put the claim in words, from the numbers that were checked."""
     last = len(next(iter(c.within.values()))) - 1
@@ -259,6 +279,11 @@ def chances_in_words(c: Chances) -> list[str]:
         lines.append(
             f"    the least number of throws within which {float(100 * share):.6g} % {what}: {count}"
         )
+    for name, (low, high) in c.ever.items():
+        lines.append(
+            f'    P(ever ended "{name}"), after any number of throws: between {rounded(low, up=False)} and'
+            f" {rounded(high, up=True)}"
+        )
     if c.mean is not None:
         most = f", at most {rounded(c.mean[1], up=True)}" if math.isfinite(c.mean[1]) else ""
         lines.append(f"    the mean of T: at least {rounded(c.mean[0], up=False)}{most}")
@@ -272,13 +297,6 @@ def places_in_words(places: list[Place], unit: str) -> str:
 
 # ----------------------------------------------------------------
 # The brackets of a noisy chain, found anew.
-
-
-MOST_MEAN = 5_000  # steps in which a mean is bounded
-# A mean is bounded from above once no state's bound grows by more than this share of a throw.
-GROWTH = 0.5
-# Bounds that move by less have come to rest; one above this grows without end.
-STILL, HOPELESS = 1e-9, 1e6
 
 
 def mesh_of(edges: list[Array], outermost: float) -> Mesh:
@@ -327,11 +345,6 @@ def chain_on(c: Setting, edges: list[Array], advance: Callable[[int], None]) -> 
     return chain_of(c.noisy, mesh, *kinds_of(c, mesh), advance), start_row(c, mesh)
 
 
-def mean_above(row: Rows, values: Array) -> float:
-    """Bound the mean over the starts from above."""
-    return float(row.times(values)[0]) + row.off * float(np.abs(values).max())
-
-
 def brackets_of(
     chain: Chain, row: Rows, name: str, count: int, told: Callable[[int], None] = lambda done: None
 ) -> tuple[Array, Array]:
@@ -372,53 +385,6 @@ def check_quantiles(c: Chances, brackets: dict[str, Array]) -> None:
         prove(none_before and there, quantile)
 
 
-def means_below(chain: Chain, row: Rows) -> Iterator[float]:
-    """Bound the mean number of throws from below, ever better: by the mean of the lesser of T and n."""
-    none = chain.fixed(dict.fromkeys(chain.absorbed, 0.0))
-    below, low, change = chain.first(none), 0.0, math.inf
-    for _ in range(MOST_MEAN):
-        yield low
-        if not change > STILL:
-            return
-        before, below = below, chain.above(below, none, -1.0)
-        low, change = max(low, -mean_above(row, below)), float((before - below).max())
-
-
-def means_above(chain: Chain, row: Rows) -> Iterator[float]:
-    """Bound the mean number of throws from above, ever better.
-
-    With V >= 0 and 1 + K V <= U <= V + c on the cells from which throws are made, V / (1 - c) is a bound.
-    """
-    none = chain.fixed(dict.fromkeys(chain.absorbed, 0.0))
-    made = np.unique(np.concatenate([chain.live, chain.live + 1, chain.hard.at, chain.hard.at + 1]))
-    above, best = chain.first(none), math.inf
-    for _ in range(MOST_MEAN):
-        after = chain.above(above, none, 1.0)
-        growth = float((after - above)[made].max())
-        if growth < GROWTH and bool((above >= 0.0).all()):
-            best = min(best, mean_above(row, above) / (1.0 - growth) * INFLATE)
-        yield best
-        if growth <= STILL or not float(after.max()) < HOPELESS:
-            return
-        above = after
-
-
-def check_mean(chain: Chain, row: Rows, said: tuple[float, float]) -> None:
-    """Check the bounds of the mean number of throws."""
-    low = best = 0.0
-    for low in means_below(chain, row):
-        if low >= said[0]:
-            break
-    proved = f"the mean is at least {said[0]!r}: only {rounded(low, up=False)} is proved"
-    prove(low >= said[0], proved)
-    if said[1] == math.inf:
-        return
-    for best in means_above(chain, row):
-        if best <= said[1]:
-            break
-    prove(best <= said[1], f"the mean is at most {said[1]!r}: only {best!r} is proved")
-
-
 def check_chances(c: Chances, progress: Progress) -> None:
     """Check everything that is claimed."""
     nodes = sum(len(each) for each in c.edges)
@@ -437,7 +403,12 @@ def check_chances(c: Chances, progress: Progress) -> None:
         advance(nodes)
         check_within(name, said, brackets[name])
     check_quantiles(c, brackets)
+    lower, upper = (c.functions.get(f"mean.{end}") for end in ("lower", "upper"))
     if c.mean is not None:
-        check_mean(chain, row, c.mean)
+        check_mean(chain, row, c.mean, (lower, upper))
+    ends = upper is not None and proves_mean_above(chain, upper)
+    for k, (name, said_of) in enumerate(c.ever.items()):
+        pair = c.functions[f"ever.{k}.lower"], c.functions[f"ever.{k}.upper"]
+        check_ever(chain, row, name, said_of, pair, ends)
     if progress is not None:
         progress(work, work)

@@ -374,12 +374,19 @@ def read_sections(value: object, where: str = "claims", least: int = 1) -> dict[
 
 
 def section_alone(
-    header: dict[str, Any], word: str, of: str, keys: str, nothing: str, *, noisy: bool = False
+    header: dict[str, Any],
+    word: str,
+    of: str,
+    keys: str,
+    nothing: str,
+    *,
+    optional: str = "",
+    noisy: bool = False,
 ) -> dict[str, Any]:
     """Return the section of a claim that stands alone in a file, which says so for a file with more in it."""
     sections = read_sections(header["claims"])
     require(len(sections) == 1, f"the claims of {of} are more than one")
-    section = table(sections[word], f"section of {word}", keys)
+    section = table(sections[word], f"section of {word}", keys, optional)
     quiet = header["tolerance"] is None and (noisy or header["noise"] is None)
     require(header["boxes"] == [] and quiet, nothing)
     return section

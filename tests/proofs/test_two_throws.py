@@ -238,7 +238,7 @@ def test_a_box_whose_terms_are_nan_stays_open():
 
 
 # ----------------------------------------------------------------
-# One step of the checker's noisy chain against midpoints, at any place; its bound of a mean against small chains.
+# One step of the checker's noisy chain against midpoints, at any place.
 
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
@@ -315,38 +315,3 @@ def test_one_throw_is_bounded_at_every_place(speed, landing, strata, count, tmp_
         slack = 2.0 / count
         assert (found <= high + slack).all()
         assert (found >= low - slack).all()
-
-
-class Chain:
-    """A chain of one state that throws stay in with a probability: V at the state, and at the place that absorbs."""
-
-    def __init__(self, stays):
-        self.stays, self.absorbed = stays, {"right": np.array([1])}
-        self.live = np.array([0])
-        self.hard = type("Hard", (), {"at": np.array([], dtype=np.int64)})()
-
-    def fixed(self, value):
-        return np.array([-np.inf, value["right"]])
-
-    def first(self, fixed):
-        return np.maximum(fixed, 0.0)
-
-    def above(self, values, fixed, more=0.0):
-        return np.array([more + self.stays * values[0] + (1.0 - self.stays) * values[1], fixed[1]])
-
-
-@pytest.mark.usefixtures("precision")
-@pytest.mark.parametrize("stays", [0.1, 0.4, 0.9])
-def test_a_mean_below_the_geometric_one_is_not_proved(stays):
-    brackets, chain = of_checker("brackets"), Chain(stays)
-    chain.live = np.array([], dtype=np.int64)
-    chain.hard.at = np.array([0])
-    row = of_checker("means").Rows(1, np.array([0]), np.array([0]), np.array([1.0]), 0.0)
-    mean = 1.0 / (1.0 - stays)  # of a geometric law
-    unproved = of_checker("balls").UnprovedError
-    for share in (0.7, 0.9, 0.999999):
-        with pytest.raises(unproved, match="at most"):
-            brackets.check_mean(chain, row, (0.0, share * mean))
-    brackets.check_mean(chain, row, (0.999 * mean, 1.001 * mean))
-    with pytest.raises(unproved, match="at least"):
-        brackets.check_mean(chain, row, (1.001 * mean, np.inf))

@@ -208,12 +208,18 @@ def _proved(brackets: AbsorptionBrackets) -> Iterator[str]:
     for name in ("right", "wrong", "wall"):
         if name in brackets.within:
             low, high = brackets.within[name][:, -1].tolist()
-            lo, hi = math.floor(low * 1e6) / 1e6, math.ceil(high * 1e6) / 1e6
-            yield f"PROVED: {FED[name]} within {last} throws: {lo:.6f} to {hi:.6f}"
+            yield f"PROVED: {FED[name]} within {last} throws: {_outward(low, high)}"
+        if name in brackets.ever:
+            yield f"PROVED: {FED[name]} after any number of throws: {_outward(*brackets.ever[name])}"
     first, by = brackets.quantile(0.95)
     if first is not None and by is not None:
         count = f"{first}" if first == by else f"{first} to {by}"
         yield f"PROVED: the least number of throws within which 95 % have ended: {count}"
+
+
+def _outward(low: float, high: float) -> str:
+    """Write a bracket of a probability, rounded outward."""
+    return f"{math.floor(low * 1e6) / 1e6:.6f} to {math.ceil(high * 1e6) / 1e6:.6f}"
 
 
 # ----------------------------------------------------------------

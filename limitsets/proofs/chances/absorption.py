@@ -21,6 +21,7 @@ from limitsets.base.arrays import Array
 from limitsets.feeder.scattering import Scattering, scattering_of, starts_from
 from limitsets.numbers.interval import guard
 from limitsets.proofs.chances.chain import EXITS, Chain, Place, chain_of, write
+from limitsets.proofs.chances.forever import forever
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
@@ -61,6 +62,10 @@ class AbsorptionBrackets(Tabled):
         has two far nodes more on each side.
     mean : (float, float)
         Bounds of the mean of T; the upper one is infinite where no finite bound is proved.
+    ever : dict of str to (float, float)
+        By name bounds of the probability of ever ending there, after any number of throws; empty without `mean`.
+    functions : dict of str to ndarray
+        The functions at the nodes that prove `mean` and `ever`, as a certificate has them.
     seconds : float
         Time it took.
     how : str
@@ -77,6 +82,8 @@ class AbsorptionBrackets(Tabled):
     within: dict[str, Array]
     values: dict[str, Array]
     mean: tuple[float, float]
+    ever: dict[str, tuple[float, float]]
+    functions: dict[str, Array]
     seconds: float
     how: str = "proved"
 
@@ -97,7 +104,8 @@ class AbsorptionBrackets(Tabled):
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         last = self.within[ANY].shape[1] - 1
-        rows = [(name, last, (low[-1], high[-1])) for name, (low, high) in self.within.items()]
+        rows = [(name, str(last), (low[-1], high[-1])) for name, (low, high) in self.within.items()]
+        rows += [(name, "any number of", pair) for name, pair in self.ever.items()]
         columns = ("ends at", "within throws", Column("probability", show=".6f", ends=True))
         return (Table(columns, rows, f"{self.scene}: brackets of probabilities", self.how),)
 
@@ -108,6 +116,7 @@ class AbsorptionBrackets(Tabled):
             scatter=self.scatter.words(),
             cells=self.chain.nodes.place.size - self.chain.nodes.first.size + 1,
             within={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.within.items()},
+            ever={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.ever.items()},
             mean={"lo": self.mean[0], "hi": self.mean[1] if math.isfinite(self.mean[1]) else None},
             quantiles={
                 str(share): dict(zip(("lo", "hi"), self.quantile(share), strict=True))
@@ -143,7 +152,8 @@ class AbsorptionBrackets(Tabled):
         ...     ls.recheck(brackets.save(f"{folder}/initial.proof.zip")).verdict
         'proved'
         """
-        return write(path, self.chain, self.within, self.mean, allowance=allowance, recheck=recheck)
+        forever = self.mean, self.ever, self.functions
+        return write(path, self.chain, self.within, forever, allowance=allowance, recheck=recheck)
 
 
 # ----------------------------------------------------------------
@@ -151,24 +161,6 @@ class AbsorptionBrackets(Tabled):
 
 
 CELLS, THROWS = 4000, 200
-# Bounds of a mean are good enough once so many throws more narrow them by less than this share.
-PATIENCE, NARROWED = 50, 1e-3
-
-
-def mean_brackets(chain: Chain) -> tuple[float, float]:
-    """Bound the mean number of throws until absorption."""
-    from limitsets.checker.brackets import means_above, means_below
-
-    ends = []
-    for bounds in (means_below(chain.steps, chain.row), means_above(chain.steps, chain.row)):
-        every: list[float] = []
-        for bound in bounds:
-            every.append(bound)
-            before = every[-PATIENCE] if len(every) > PATIENCE else math.nan
-            if math.isfinite(bound) and abs(bound - before) <= NARROWED * bound:
-                break
-        ends.append(every[-1])
-    return ends[0], ends[1]
 
 
 @shown_in_notebooks
@@ -208,7 +200,7 @@ def absorption_brackets(
     throws : int
         n up to which probabilities within n throws are bounded.
     mean : bool
-        Bound the mean of T too: some hundreds of throws more.
+        Bound the mean of T too, and the probabilities of ever ending at a place: some hundreds of throws more.
     progress : callable, optional
         Told (stage, done, all).
 
@@ -257,7 +249,7 @@ def absorption_brackets(
         pair, values[name] = brackets_of(chain.steps, chain.row, name, throws + 1, told_of)
         within[name] = pair.T
     tell("mean", 0, 1)
-    means = mean_brackets(chain) if mean else (0.0, math.inf)
+    means, ever, functions = forever(chain, places, values) if mean else ((0.0, math.inf), {}, {})
     tell("mean", 1, 1)
     return AbsorptionBrackets(
         read,
@@ -270,6 +262,8 @@ def absorption_brackets(
         within=within,
         values=values,
         mean=means,
+        ever=ever,
+        functions=functions,
         seconds=time.perf_counter() - begun,
     )
 

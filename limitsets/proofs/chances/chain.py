@@ -225,12 +225,12 @@ def write(
     path: str | Path,
     chain: Chain,
     within: Mapping[str, Array],
-    mean: tuple[float, float],
+    forever: tuple[tuple[float, float], Mapping[str, tuple[float, float]], Mapping[str, Array]],
     *,
     allowance: float,
     recheck: bool,
 ) -> Path:
-    """Write it, replacing an older file whole."""
+    """Write it, replacing an older file whole; `forever` are the mean, what is `ever`, and the functions of both."""
     names = [name for name in within if name != EXITS]
     section: dict[str, Any] = chain.section | {"names": names, "quantiles": [], "mean": None}
     claimed = {
@@ -243,13 +243,19 @@ def write(
             ends = _quantile(pair, float(share.split()[0]) / 100.0)
             if ends is not None:
                 section["quantiles"].append([name, share, *ends])
-    low, high = mean
+    (low, high), ever, functions = forever
+    section["ever"] = [
+        [name, max(lo - allowance, 0.0).hex(), min(hi + allowance, 1.0).hex()]
+        for name, (lo, hi) in ever.items()
+    ]
     if low > 0.0 or math.isfinite(high):
         section["mean"] = [
             max(low * (1.0 - allowance), 0.0).hex(),
             (high * (1.0 + allowance)).hex() if math.isfinite(high) else None,
         ]
-    arrays = {f"within.{k}": np.ascontiguousarray(pair.T) for k, pair in enumerate(claimed.values())}
+    arrays = dict(functions) | {
+        f"within.{k}": np.ascontiguousarray(pair.T) for k, pair in enumerate(claimed.values())
+    }
     for side in range(chain.nodes.first.size - 1):
         arrays[f"edges.{side}"] = chain.nodes.place[chain.nodes.of_side(side)]
     claims = [{"claim": "probabilities", "section": section}]

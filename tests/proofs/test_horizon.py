@@ -1,0 +1,239 @@
+"""Any number of throws: bounds by functions against chains solved in rationals, and in certificates; forgeries."""
+
+import sys
+from fractions import Fraction
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+from limitsets.feeder.scattering import Scattering, Uniform
+from limitsets.proofs.chances.absorption import absorption_brackets
+from tests.proofs import forge
+from tests.proofs.test_probabilities import section_of
+from tests.proofs.test_recheck import checker, verdict
+
+
+def of_checker(name):
+    return sys.modules[f"{checker.__name__}.{name}"]
+
+
+class Chain:
+    """A chain of some states, rows of probabilities, of which the last two absorb: "right" and "exits"."""
+
+    def __init__(self, rows):
+        self.rows, n = np.array(rows, dtype=float), len(rows)
+        self.absorbed = {"right": np.array([n - 2]), "exits": np.array([n - 1])}
+        self.live, self.hard = np.array([], dtype=np.int64), SimpleNamespace(at=np.arange(n - 3))
+
+    def fixed(self, value):
+        return np.concatenate([np.full(len(self.rows) - 2, -np.inf), [value["right"], value["exits"]]])
+
+    def first(self, fixed):
+        return np.maximum(fixed, 0.0)
+
+    def above(self, values, fixed, more=0.0):
+        mean = self.rows @ values + 2.0**-50 * np.abs(values).max() + more
+        return np.maximum(np.where(np.isfinite(fixed), -np.inf, mean), fixed)
+
+
+def start_at_0(count):
+    return of_checker("means").Rows(1, np.array([0]), np.array([0]), np.array([1.0]), 0.0)
+
+
+def of_one(stays):
+    """A state that throws stay in with a probability; `hard` names its node and the next one, which absorbs."""
+    return Chain([[stays, 1.0 - stays, 0.0], [0, 1, 0], [0, 0, 1]])
+
+
+@pytest.mark.usefixtures("precision")
+@pytest.mark.parametrize("stays", [0.1, 0.4, 0.9])
+def test_a_mean_below_the_geometric_one_is_not_proved(stays):
+    horizon, chain, row = of_checker("horizon"), of_one(stays), start_at_0(3)
+    chain.hard.at = np.array([0])
+    chain.above = lambda values, fixed, more=0.0: np.array(
+        [more + stays * values[0] + (1.0 - stays) * values[1], fixed[1], fixed[2]]
+    )
+    mean = 1.0 / (1.0 - stays)  # of a geometric law
+    unproved = of_checker("balls").UnprovedError
+    for share in (0.7, 0.9, 0.999999):
+        with pytest.raises(unproved, match="at most"):
+            horizon.check_mean(chain, row, (0.0, share * mean), (None, None))
+    horizon.check_mean(chain, row, (0.999 * mean, 1.001 * mean), (None, None))
+    with pytest.raises(unproved, match="at least"):
+        horizon.check_mean(chain, row, (1.001 * mean, np.inf), (None, None))
+
+
+def solved(rows, right):
+    """Solve (I - Q) V = right of the states that do not absorb, in rationals."""
+    n = len(rows) - 2
+    table = [[Fraction(i == j) - rows[i][j] for j in range(n)] + [right[i]] for i in range(n)]
+    for k in range(n):
+        best = next(i for i in range(k, n) if table[i][k])
+        table[k], table[best] = table[best], table[k]
+        table[k] = [each / table[k][k] for each in table[k]]
+        for i in range(n):
+            if i != k:
+                table[i] = [a - table[i][k] * b for a, b in zip(table[i], table[k], strict=True)]
+    return [row[-1] for row in table]
+
+
+@pytest.mark.usefixtures("precision")
+def test_functions_bound_random_chains_as_exact_rationals_do():
+    """200 chains of 2 to 6 states: functions a little off the exact solution prove bounds on its side alone."""
+    horizon, unproved = of_checker("horizon"), of_checker("balls").UnprovedError
+    random = np.random.default_rng(8)
+    for _ in range(200):
+        n = int(random.integers(2, 7))
+        counts = random.integers(0, 9, (n, n + 2))
+        counts[:, n:] += 1  # so that throws end
+        rows = [[Fraction(int(c), int(row.sum())) for c in row] for row in counts]
+        rows += [[Fraction(i == j) for j in range(n + 2)] for i in (n, n + 1)]
+        mean, ever = solved(rows, [Fraction(1)] * n), solved(rows, [rows[i][n] for i in range(n)])
+        chain, row = Chain([[float(p) for p in each] for each in rows]), start_at_0(n + 2)
+        m = np.array([*map(float, mean), 0.0, 0.0])
+        v = np.array([*map(float, ever), 1.0, 0.0])
+        upper, lower, least, most = m * (1 + 1e-9), -m * (1 - 1e-9), -v + 1e-9 * m, v + 1e-9 * m
+        horizon.check_mean(chain, row, (m[0] * (1 - 1e-8), m[0] * (1 + 1e-8)), (lower, upper))
+        assert horizon.proves_mean_above(chain, upper)
+        span = v[0] - 1e-7, min(v[0] + 1e-7, 1.0)
+        horizon.check_ever(chain, row, "right", span, (least, most), True)
+        for said in ((float(mean[0]) * (1 + 1e-8), np.inf), (0.0, float(mean[0]) * (1 - 1e-8))):
+            with pytest.raises(unproved, match="is proved"):
+                horizon.check_mean(chain, row, said, (lower, upper))
+        for said in ((min(v[0] + 1e-7, 1.0), 1.0), (0.0, v[0] - 1e-7)):
+            with pytest.raises(unproved, match="is proved"):
+                horizon.check_ever(chain, row, "right", said, (least, most), True)
+        # a function on the wrong side of the solution, at one state, proves nothing
+        k, off = int(random.integers(n)), np.zeros(n + 2)
+        off[k] = 1e-3
+        for functions in ((lower - off, upper), (lower, upper - off)):
+            with pytest.raises(unproved, match="function of the mean is none"):
+                horizon.check_mean(chain, row, (0.1, 1e6), functions)
+        for functions in ((least - off, most), (least, most - off)):
+            with pytest.raises(unproved, match="function is none"):
+                horizon.check_ever(chain, row, "right", (1e-6, 1.0 - 1e-6), functions, True)
+
+
+@pytest.mark.usefixtures("precision")
+def test_where_throws_go_on_for_ever_no_probability_is_proved_from_below():
+    """A closed state off the places: V = 1 there has its inequality, and would prove 1; a mean has any lower bound."""
+    horizon, unproved = of_checker("horizon"), of_checker("balls").UnprovedError
+    chain, row = Chain([[1, 0, 0, 0], [0.5, 0, 0.5, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), start_at_0(4)
+    chain.above = lambda values, fixed, more=0.0: np.where(
+        np.isfinite(fixed), fixed, chain.rows @ values + more
+    )
+    one = np.array([-1.0, -1.0, -1.0, 0.0])
+    assert horizon.worst(chain, one, horizon.fixed_of(chain, "right", -1.0), 0.0) <= 0.0
+    with pytest.raises(unproved, match="that the throws end is not proved"):
+        horizon.check_ever(chain, row, "right", (0.9, 1.0), (one, -one), False)
+    horizon.check_mean(chain, row, (1e6, np.inf), (np.array([-1e6, -5e5, 0.0, 0.0]), None))
+    assert not horizon.proves_mean_above(chain, np.array([1e6, 1e6, 0.0, 0.0]))
+
+
+# ------------------------------------------------------------------------------------------------- certificates
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Brackets of paper-initial, of which P(ever wrong) is 0.691625 (docs/probabilities.md)."""
+    words = {"right": (20.0, 2), "wrong": 20.0, "cells": 250, "throws": 3}
+    return absorption_brackets("paper-initial", Scattering(landing=Uniform(0.1)), **words)
+
+
+@pytest.fixture(scope="module")
+def good(found, tmp_path_factory):
+    path = found.save(tmp_path_factory.mktemp("horizon") / "x.proof.zip", recheck=False)
+    return forge.opened(path)
+
+
+def test_probabilities_of_ever_ending_are_proved_and_rechecked(found, good, tmp_path):
+    for name, known in (("right", 0.308374), ("wrong", 0.691625)):
+        low, high = found.ever[name]
+        assert low <= known + 1e-6
+        assert known - 1e-6 <= high < low + 1e-4
+    low, high = found.mean
+    assert low < 17.425 < high < low + 0.3
+    report = verdict(good.copy(), tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+    assert any(
+        'P(ever ended "wrong"), after any number of throws: between 0.6916' in each
+        for each in report.statement
+    )
+    assert found.to_json()["ever"]["right"]["lo"] == found.ever["right"][0]
+
+
+def said(name, by):
+    """Move both ends of what is said of a name, or of the mean."""
+
+    def change(forged):
+        section = section_of(forged)
+        row = section["mean"] if name == "mean" else next(each for each in section["ever"] if each[0] == name)
+        row[-2:] = [(float.fromhex(end) + by).hex() for end in row[-2:]]
+
+    return change
+
+
+def moved(name, by):
+    def change(forged):
+        forged.arrays[name][200] += by
+
+    return change
+
+
+def without_the_mean(forged):
+    del forged.arrays["mean.upper"]
+    section_of(forged)["mean"][1] = None
+
+
+FALSE = {
+    "is at least": said("right", 1e-4),
+    "is at most": said("wrong", -1e-4),
+    "the mean is at least": said("mean", 0.3),
+    "the mean is at most": said("mean", -0.3),
+    "the lower function is none": moved("ever.1.lower", -1e-4),
+    "the upper function is none": moved("ever.0.upper", -1e-4),
+    "the lower function of the mean is none": moved("mean.lower", -1e-2),
+    "the upper function of the mean is none": moved("mean.upper", -1e-2),
+    "that the throws end is not proved": without_the_mean,
+}
+
+
+@pytest.mark.parametrize("reason", FALSE)
+def test_what_has_become_false_is_not_proved(good, tmp_path, reason):
+    forged = good.copy()
+    FALSE[reason](forged)
+    report = verdict(forged.seal(), tmp_path)
+    assert report.verdict == "failed"
+    assert reason in report.reason
+
+
+ODD = {
+    "a function has not one number for each node": lambda f: f.arrays.update(
+        {"mean.lower": f.arrays["mean.lower"][1:].copy()}
+    ),
+    "array ever.0.lower is missing": lambda f: f.arrays.pop("ever.0.lower"),
+    "ever: the bounds are none": said("right", 1.0),
+    "ever: a name is not that of places": lambda f: section_of(f)["ever"][0].__setitem__(0, "elsewhere"),
+}
+
+
+@pytest.mark.parametrize("reason", ODD)
+def test_what_is_odd_is_refused_in_words(good, tmp_path, reason):
+    forged = good.copy()
+    ODD[reason](forged)
+    report = verdict(forged.seal(), tmp_path)
+    assert report.verdict == "bad file"
+    assert reason in report.reason
+
+
+def test_files_without_functions_of_the_mean_are_read(good, tmp_path):
+    """As version 0.1.0 wrote them: the checker finds functions itself."""
+    forged = good.copy()
+    del forged.arrays["mean.upper"], forged.arrays["mean.lower"]
+    section_of(forged)["mean"] = [(15.0).hex(), (20.0).hex()]
+    del section_of(forged)["ever"]
+    forged.arrays = {name: each for name, each in forged.arrays.items() if not name.startswith("ever")}
+    assert verdict(forged.seal(), tmp_path).verdict == "proved"
