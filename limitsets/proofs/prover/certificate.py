@@ -100,7 +100,6 @@ def require_confirmed(file: Path, kept: Path, verdicts: Mapping[str, str], worke
     return report.seconds
 
 
-@arguments_checked
 def require_checker() -> None:
     """Refuse to go on without the checker's arithmetic."""
     if find_spec("flint") is None:
@@ -112,6 +111,7 @@ def require_checker() -> None:
         )
 
 
+@arguments_checked
 def recheck(
     path: str | Path, *, workers: int | None = 1, progress: Callable[[int, int], None] | None = None
 ) -> Report:
