@@ -165,6 +165,16 @@ def test_probabilities_of_ever_ending_are_proved_and_rechecked(found, good, tmp_
     assert found.to_json()["ever"]["right"]["lo"] == found.ever["right"][0]
 
 
+def test_with_one_place_all_end_there_and_nothing_is_known_of_the_others(tmp_path):
+    """Of exits little is proved from below, so that the bound from above is near 1."""
+    scatter, words = Scattering(landing=Uniform(0.1)), {"right": (20.0, 2), "cells": 600, "throws": 2}
+    brackets = absorption_brackets("paper-designed", scatter, **words)
+    low, high = brackets.ever["right"]
+    assert 0.99 < low <= high <= 1.0
+    report = verdict(forge.opened(brackets.save(tmp_path / "x.proof.zip", recheck=False)), tmp_path)
+    assert (report.verdict, report.reason) == ("proved", "")
+
+
 def said(name, by):
     """Move both ends of what is said of a name, or of the mean."""
 

@@ -110,7 +110,7 @@ def ever_functions(chain: Chain, within: Mapping[str, Array], ends: Array) -> di
         lower[name] = None if last is None else _made_up(chain, last[1], fixed, 0.0, lifted)
     for name, below in lower.items():
         others = [each for other, each in lower.items() if other != name and each is not None]
-        values = np.maximum(1.0 + np.sum(others, axis=0), 0.0)
+        values = np.maximum(sum(others, start=np.ones(len(ends))), 0.0)
         fixed = horizon.fixed_of(chain.steps, name, 1.0)
         both[name] = below, _made_up(chain, values, fixed, 0.0, lifted)
     return both
