@@ -161,7 +161,7 @@ class Links(Landings):
             place = self.around(branch, self.place[cell : cell + 2, j], wide)
             ends.append((at, *self.bent(change, own.x, own.d, h), *place, self.cap(change, own.x, own.d, h)))
         if border.below != border.above:
-            ends += [(at, *row) for row in self.moving(border, over, h)]
+            ends += [(at, *row) for row in self.moving(border, h)]
         if not all(math.isfinite(number) for row in ends + inner for number in row):
             return False
         self.parts.ends.rows += ends
@@ -195,7 +195,7 @@ class Links(Landings):
         """Return the range on which throws end between places."""
         return self.range_of(flips, float(ends.min()) - wide, float(ends.max()) + wide)
 
-    def moving(self, border: Border, over: list[Slopes], h: float) -> list[tuple[float, ...]]:
+    def moving(self, border: Border, h: float) -> list[tuple[float, ...]]:
         """Return the coefficients at the border between the branches, which moves along its chord."""
         low, high = min(border.cut), max(border.cut)
         levels = arb(low).union(arb(high))

@@ -38,10 +38,6 @@ class Nodes:
         """Return the nodes of a side."""
         return slice(int(self.first[side]), int(self.first[side + 1]))
 
-    def side(self) -> Ints:
-        """Return the side of each node."""
-        return np.repeat(np.arange(self.first.size - 1), np.diff(self.first))
-
 
 def extra(graded: float) -> float:
     """Return by how much longer a side is, counted in cells, where those near the joint are narrower."""
