@@ -130,6 +130,11 @@ def test_where_throws_go_on_for_ever_no_probability_is_proved_from_below():
     with pytest.raises(unproved, match="that the throws end is not proved"):
         horizon.check_ever(chain, row, "right", (0.9, 1.0), (one, -one), False)
     horizon.check_mean(chain, row, (1e6, np.inf), (np.array([-1e6, -5e5, 0.0, 0.0]), None))
+    # from above, of the state that ends at the place with probability 1/2: V < 0 on the closed state would prove 0
+    beside = row._replace(column=np.array([1]))
+    horizon.check_ever(chain, beside, "right", (0.0, 0.5), (one, np.array([0.0, 0.5, 1.0, 0.0])), False)
+    with pytest.raises(unproved, match="the upper function is none"):
+        horizon.check_ever(chain, beside, "right", (0.0, 0.1), (one, np.array([-1.0, 0.0, 1.0, 0.0])), False)
     assert not horizon.proves_mean_above(chain, np.array([1e6, 1e6, 0.0, 0.0]))
 
 
