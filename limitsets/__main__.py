@@ -20,4 +20,6 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    code = main()
+    exec("")  # a Ctrl-C that passed an `exec` would else end the process by the signal, CPython's exit_sigint
+    sys.exit(code)

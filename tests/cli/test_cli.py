@@ -3,6 +3,7 @@
 import ctypes
 import io
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
+from numba.core.compiler_lock import global_compiler_lock
 
 import limitsets as ls
 import limitsets.feeder.scene
@@ -298,6 +300,35 @@ def test_ctrl_c_while_the_package_is_imported(module):
     code = IMPORTED.format(module=module)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "limitsets: interrupted\n")
+
+
+def test_ctrl_c_inside_an_exec_ends_the_command_by_its_exit_code(tmp_path):
+    """CPython remembers the interrupt of an `exec` and kills the process that handled it, under `-m` alone."""
+    code = IMPORTED.format(module="limitsets.face.cli.app").split("sys.argv")[0]
+    code = code.replace("signal.raise_signal(signal.SIGINT)", "exec('signal.raise_signal(signal.SIGINT)')")
+    (tmp_path / "sitecustomize.py").write_text(code)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    command = [sys.executable, "-m", "limitsets", "scenes"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "limitsets: interrupted\n")
+
+
+def test_ctrl_c_waits_while_numba_compiles():
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt), output.progress() as tell:
+            with global_compiler_lock:
+                signal.raise_signal(signal.SIGINT)
+                compiled = True
+            tell("next", 0, 1)
+            pytest.fail("the step goes on")
+        assert compiled
+        with pytest.raises(KeyboardInterrupt), output.progress(), global_compiler_lock:
+            signal.raise_signal(signal.SIGINT)
+            with pytest.raises(KeyboardInterrupt):  # the second does not wait
+                signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.sweep

@@ -126,7 +126,8 @@ class _Interrupts:
     """Remember Ctrl-C: an exception raised inside a callback from foreign C code may be lost.
 
     The next step raises it again, so that no file is replaced after it; an error that comes of it is it, and Python's
-    words on what was lost are not shown.
+    words on what was lost are not shown. While numba compiles, the first Ctrl-C waits for the next step: LLVM's
+    objects half built make the process crash.
     """
 
     def __init__(self) -> None:
@@ -139,8 +140,10 @@ class _Interrupts:
             self.told_before(found)
 
     def __call__(self, *_: object) -> None:
-        self.pressed = True
-        raise KeyboardInterrupt
+        again, self.pressed = self.pressed, True
+        compiler = sys.modules.get("numba.core.compiler_lock")
+        if again or compiler is None or not compiler.global_compiler_lock.is_locked():
+            raise KeyboardInterrupt
 
     def check(self) -> None:
         if self.pressed:
