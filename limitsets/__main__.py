@@ -21,5 +21,5 @@ def main() -> int:
 
 if __name__ == "__main__":
     code = main()
-    exec("")  # a Ctrl-C that passed an `exec` would else end the process by the signal, CPython's exit_sigint
+    exec("")  # noqa: S102 - a Ctrl-C that passed an `exec` would else end the process by the signal (CPython's exit_sigint)
     sys.exit(code)

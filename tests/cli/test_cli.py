@@ -316,14 +316,14 @@ def test_ctrl_c_inside_an_exec_ends_the_command_by_its_exit_code(tmp_path):
 def test_ctrl_c_waits_while_numba_compiles():
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with pytest.raises(KeyboardInterrupt), output.progress() as tell:
+        with pytest.raises(KeyboardInterrupt), output.progress() as tell:  # noqa: PT012 - what comes after the interrupt is tested
             with global_compiler_lock:
                 signal.raise_signal(signal.SIGINT)
                 compiled = True
             tell("next", 0, 1)
             pytest.fail("the step goes on")
         assert compiled
-        with pytest.raises(KeyboardInterrupt), output.progress(), global_compiler_lock:
+        with pytest.raises(KeyboardInterrupt), output.progress(), global_compiler_lock:  # noqa: PT012 - likewise
             signal.raise_signal(signal.SIGINT)
             with pytest.raises(KeyboardInterrupt):  # the second does not wait
                 signal.raise_signal(signal.SIGINT)
