@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from limitsets.proofs.prover import certify as certify
     from limitsets.proofs.prover.averaging import average as average
     from limitsets.proofs.prover.certificate import recheck as recheck
+    from limitsets.proofs.prover.entropy import entropy as entropy
     from limitsets.proofs.prover.programs import formulas as formulas
     from limitsets.systems import maps as maps, resilience as resilience
     from limitsets.systems.cells import grid as grid
@@ -72,6 +73,7 @@ _PUBLIC = {
     "atlas": "parameters.atlas:atlas",
     "attractors": "systems.sets:attractors",
     "average": "proofs.prover.averaging:average",
+    "entropy": "proofs.prover.entropy:entropy",
     "audit": "proofs.auditing:audit",
     "basins": "systems.sets:basins",
     "certify": "proofs.prover:certify",
@@ -152,6 +154,7 @@ __all__ = [
     "design",
     "dump",
     "engine",
+    "entropy",
     "explore",
     "feed",
     "feedback",

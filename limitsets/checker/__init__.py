@@ -38,6 +38,8 @@ The files follow docs/certificates.md, and each imports only from those before i
     observable   what is averaged along orbits                                    "Averages"
     orbit_average  its average on a line: one inequality for each cell
     throw_average  what this needs of throws
+    entropy      intervals that images meet and cover                             "Entropy"
+    throw_entropy  the laps of the throw
     claims       the claims of a file, and what each needs
     averages     means over a throw's deviations, in floats                       20, 21
     landings     the throws of one side of a noisy chain, and their branches      18, 19
@@ -49,6 +51,7 @@ The files follow docs/certificates.md, and each imports only from those before i
     map_orbits   lists of all orbits
     map_plane    regions of parameters, and shares of them
     map_average  what averages need of the cells of a map
+    map_entropy  its laps
     map_file     the file of a map
     map_words    what is proved, in sentences
     map_weights  almost every start

@@ -20,6 +20,7 @@ from .cells import (
     tasks_of,
 )
 from .end_points import check_ends, ends_statement, read_ends
+from .entropy import KEYS as OF_ENTROPY, entropy_in_words
 from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
 from .file import Cells, hex_float, plain, read_sections, require, rounded, table
 from .goals import GOALS, check_goal, read_goal_claim, speaks_of_all, statement_of_goal
@@ -35,6 +36,7 @@ from .refutations import (
 )
 from .scene import Scene
 from .throw_average import check_throw_average
+from .throw_entropy import check_throw_entropy
 
 Failed = dict[str, str]  # by claim the reason why it fails
 
@@ -125,6 +127,8 @@ def check_cell_claims(
         failed |= failing(["cycles"], check_orbits, scene, c, claims["cycles"])
     if "average" in claims:
         failed |= failing(["average"], check_throw_average, scene, c, claims["average"]["read"])
+    if "entropy" in claims:
+        failed |= failing(["entropy"], check_throw_entropy, scene, c, claims["entropy"]["read"])
     # the cells with a rank, and those without one that some claims are about too
     wide = {name for name in outside if name != "goal" or speaks_of_all(claims["goal"])}
     for names, mask in ((outside, c.rank >= 0), (wide, c.rank < 0)):
@@ -197,6 +201,11 @@ CLAIMS = {
     "end-points": Kind("images ends pieces", read_ends, ends_statement),
     "cycles": Kind("cycles complete", read_orbits, lambda section, _: orbits_statement(section)),
     "average": Kind(OF_AVERAGES, lambda section, _: section, average_statement),
+    "entropy": Kind(
+        OF_ENTROPY,
+        lambda section, _: section,
+        lambda section, _: f"entropy: {entropy_in_words(section['read'])}",
+    ),
     "refuted": Kind(
         "goal nominal tolerance",
         read_refutation,

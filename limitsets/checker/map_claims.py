@@ -15,6 +15,7 @@ from .claims import Failed, failing
 from .map_average import check_map_average
 from .map_cells import MapCells, map_tasks
 from .map_cycles import Cycle
+from .map_entropy import check_map_entropy
 from .map_file import OF_ORBITS, Goal, MapFile, Part, Regions
 from .map_orbits import check_every
 from .map_weights import check_weights
@@ -39,6 +40,8 @@ def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[Fail
             failed |= failing(["almost-every"], check_weights, the_map, part.cells)
         if part.average is not None and "average" not in failed:
             failed |= failing(["average"], check_map_average, the_map, part.cells, part.average)
+        if part.entropy is not None and "entropy" not in failed:
+            failed |= failing(["entropy"], check_map_entropy, the_map, part.cells, part.entropy)
     return failed, cycles
 
 

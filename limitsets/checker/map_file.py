@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from .any_map import Shape, read_map, read_parameters
 from .balls import Pair
+from .entropy import KEYS as OF_ENTROPY, Entropy, read_entropy
 from .file import (
     Arrays,
     hex_float,
@@ -39,6 +40,7 @@ CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "escapes": "",
     "almost-every": "",
     "average": OF_AVERAGES,
+    "entropy": OF_ENTROPY,
     "refuted": "",
 }
 OF_ORBITS = (
@@ -72,6 +74,7 @@ class Part(NamedTuple):
     least: float  # the slope of `expanding`, 0 where that is not claimed
     cells: MapCells | None
     average: Average | None
+    entropy: Entropy | None
 
 
 class MapFile(NamedTuple):
@@ -156,12 +159,15 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     cells = MapCells(arrays, box["prefix"], shape, **labels) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
     numbers = read_numbers(known, shape, where)
-    average = None
+    for name in {"average", "entropy"} & set(known):
+        require("converges" not in known, f"{where}: {name} does not stand beside converges")
+        require(shape.dimension == 1, f"{where}: {name} is of one axis")
+    average, entropy = None, None
     if "average" in known:
-        require("converges" not in known, f"{where}: average does not stand beside converges")
-        require(shape.dimension == 1, f"{where}: average is of one axis")
         allowed = Allowed(shape.sides, shape.branches, shape.names)
         average = read_average(known["average"], arrays, box["prefix"], allowed, where)
+    if "entropy" in known:
+        entropy = read_entropy(known["entropy"], arrays, box["prefix"], shape.sides, where)
     return Part(
         parameters,
         known,
@@ -173,6 +179,7 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
         **numbers,
         cells=cells,
         average=average,
+        entropy=entropy,
     )
 
 

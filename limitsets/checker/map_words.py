@@ -9,6 +9,7 @@ import numpy as np
 from .any_map import Shape, parameter_in_words
 from .balls import Array, Pair
 from .claims import entropy_of
+from .entropy import entropy_in_words
 from .file import plain
 from .map_cells import MapCells
 from .map_cycles import Cycle, interval_in_words
@@ -50,7 +51,7 @@ def holds_for(part: Part) -> str:
     wide = [named(name) for name, (lo, hi) in part.parameters.items() if lo != hi]
     names = [name for name in CLAIMS_OF_MAP if name in part.claims]
     # who ends in the ball of a cycle tends to it, and stays, for one value only
-    fixed = {*OF_ORBITS, "average", *(("attracts-all", "ends-in") if part.drawn else ())}
+    fixed = {*OF_ORBITS, "average", "entropy", *(("attracts-all", "ends-in") if part.drawn else ())}
     groups = (
         ("fixed in time", [name for name in names if name in fixed]),
         ("changed at every step too", [name for name in names if name not in fixed]),
@@ -164,6 +165,11 @@ class Proved:
         names = {k: component_in_words(self.cells, k) for k in average.components()}
         return average_in_words(average, names, ["take branch 0", "take branch 1"])
 
+    def entropic(self) -> str:
+        """Say what the entropy is."""
+        assert self.part.entropy is not None
+        return entropy_in_words(self.part.entropy)
+
 
 SENTENCES: dict[str, Callable[[Proved], str]] = {
     "cycles": Proved.cycle_list,
@@ -180,6 +186,7 @@ SENTENCES: dict[str, Callable[[Proved], str]] = {
     "escapes": Proved.leaving,
     "almost-every": Proved.almost,
     "average": Proved.averaged,
+    "entropy": Proved.entropic,
     "refuted": lambda proved: (
         f"an open set of starts, around a point of a cycle, violates: {proved.of_goal()}"
     ),

@@ -19,6 +19,7 @@ from .balls import PRECISION, reason_of
 from .brackets import UNIFORM, Chances, bounds_of_laws, chances_in_words, check_chances, read_chances
 from .cells import Crew, Progress, extents, scene_of_box
 from .claims import CLAIMS, check_box_claims, failing, read_claims
+from .entropy import read_entropy
 from .feeding import verdict_of_feeds
 from .file import (
     KINDS,
@@ -209,6 +210,10 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
         allowed = Allowed(n_sides, 2, [])
         average = read_average(claims["average"], arrays, boxes[0]["prefix"], allowed, "section of average")
         claims["average"] = {"read": average, "cells": cells[0]}
+    if "entropy" in claims:
+        claims["entropy"] = {
+            "read": read_entropy(claims["entropy"], arrays, boxes[0]["prefix"], n_sides, "section of entropy")
+        }
     arrays.require_no_others()
     return Certificate(
         raw,
@@ -418,8 +423,9 @@ def failed_at_once(file: Certificate, gap: str, own: dict[str, Any] | None) -> d
     if "feeds" in claims and (file.tolerance is not None or len(file.scenes) > 1):
         failed["feeds"] = "it is about one scene: not with a tolerance"
     single = file.noise is None and file.tolerance is None and len(file.scenes) == 1
-    if "average" in claims and not (single and is_exact(file.raw[0])):
-        failed["average"] = "it is about one scene: not with noise, nor with a tolerance or an interval"
+    for name in {"average", "entropy"} & set(claims):
+        if not (single and is_exact(file.raw[0])):
+            failed[name] = "it is about one scene: not with noise, nor with a tolerance or an interval"
     for name in {"goal", "refuted"} & set(claims):
         goal = claims[name].get("goal", claims[name])
         if own is not None and content_of_goal(goal) != content_of_goal(own):

@@ -42,13 +42,18 @@ AROUND = arb(2) ** -40  # the relative width of balls in which an angle is looke
 def check_throw_average(scene: Scene, c: Cells, average: Average) -> None:
     """Check the bounds of all components that have them, for one scene without noise."""
     functions = observed(average, functools.partial(Program, dimension=1, values={}, wide=[]), [])
+    require_on_arm(scene, c, average.components())
+    check_line(c, c.edges, average, lambda own: enclosed_throws(scene, c, functions, own))
+
+
+def require_on_arm(scene: Scene, c: Cells, components: list[int]) -> None:
+    """Require that the cells of components end before the arm does."""
     for i, edges in enumerate(c.edges):
-        own = np.flatnonzero(np.isin(c.component[c.start[i] : c.start[i + 1]], average.components()))
+        own = np.flatnonzero(np.isin(c.component[c.start[i] : c.start[i + 1]], components))
         on_arm = scene.end is None or not len(own) or Fraction(float(edges[own[-1] + 1])) <= scene.end
         prove(
             on_arm, f"side {i}: the cells reach beyond the end of the arm, where parts fall into the cavity"
         )
-    check_line(c, c.edges, average, lambda own: enclosed_throws(scene, c, functions, own))
 
 
 def enclosed_throws(scene: Scene, c: Cells, functions: list[Observed], own: Array) -> Iterator[Step]:

@@ -13,7 +13,7 @@ from limitsets.systems.cells import Domain, as_domain
 from limitsets.systems.maps import INWARD
 from limitsets.systems.sets import invariant_measures, limit_set_of
 from limitsets.systems.sets.attracting import _visits
-from limitsets.systems.sets.measure import topological_entropy
+from limitsets.systems.sets.entropy import topological_entropy
 from tests.maps_of_tests import Baker, Linear2, with_middles
 from tests.sets.part import Part
 from tests.test_paper import LIMIT_SETS

@@ -18,7 +18,7 @@ from limitsets.systems.cells import Domain
 from limitsets.systems.maps import advance
 from limitsets.systems.maps.pieces import chosen, point_of
 from limitsets.systems.sets.end_points import IntervalMap
-from limitsets.systems.sets.measure import topological_entropy
+from limitsets.systems.sets.entropy import topological_entropy
 from limitsets.systems.sets.topology import DOUBTS, Topologies, topologies
 from limitsets.systems.sets.topology.work import (
     BANDS_JOIN,

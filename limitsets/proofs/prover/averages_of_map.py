@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -17,7 +18,7 @@ from limitsets.proofs.prover.observables import Asked, Subject, asked_for
 from limitsets.proofs.prover.proof import Claim, undecided
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.systems.cells import Grid
-from limitsets.systems.maps import images, kind_of
+from limitsets.systems.maps import images, kind_of, turning_points
 from limitsets.systems.maps.contract import between
 from limitsets.systems.maps.critical import margins
 from limitsets.systems.maps.derived import branch_boxes
@@ -25,19 +26,31 @@ from limitsets.systems.maps.derived import branch_boxes
 # Half the width of a cell that holds a change, as a share of its side, and beyond what a range of parameters makes it;
 # steps that find it.
 TINY, MORE, BISECTIONS = 2.0**-40, 2.0**-20, 60
+# A cell that holds a change is smaller than this share of its side; how much larger each cell beside it is.
+SMALL, GRADE = 2.0**-30, 4.0
 
 
 # ---------------------------------------------------------------- cells that hold a change of branch
 
 
-def cut_at_changes(lower: Any, upper: Any, grid: Grid, jumps: Sequence[tuple[int, float]]) -> Grid:
-    """Cut the cells of a line at jumps of what is averaged, and so that changes of branch lie in very small ones."""
+def cut_at_changes(
+    lower: Any, upper: Any, grid: Grid, jumps: Sequence[tuple[int, float]] = (), *, turns: bool = False
+) -> Grid:
+    """Cut the cells of a line at jumps of what is averaged, and so that changes of branch lie in very small ones.
+
+    With `turns` those places too where the map turns; towards both cells become smaller.
+    """
     edges = []
     for side, (borders,) in enumerate(grid.edges):
         tiny = TINY * (borders[-1] - borders[0])
         for end in [end for s, end in jumps if s == side and borders[0] + tiny < end < borders[-1] - tiny]:
             borders = np.sort(np.append(borders[np.abs(borders - end) > tiny], end))
         first, last = (_changes_at(params, grid, side) for params in (lower, upper))
+        if turns:
+            first, last = (
+                np.union1d(at, [point.x for point in turning_points(params, grid.domain)[side]])
+                for at, params in ((first, lower), (last, upper))
+            )
         if len(first) != len(last):  # changes come and go between the corners
             edges.append((borders,))
             continue
@@ -50,8 +63,18 @@ def cut_at_changes(lower: Any, upper: Any, grid: Grid, jumps: Sequence[tuple[int
                 kept = (borders < lo - apart) | (borders > hi + apart)
                 kept[[0, -1]] = True
                 borders = np.sort(np.concatenate([borders[kept], [lo, hi]]))
-        edges.append((borders,))
+        edges.append((graded(borders) if turns else borders,))
     return Grid(grid.domain, tuple(edges))
+
+
+def graded(edges: Array) -> Array:
+    """Cut the neighbours of very small cells, each time GRADE times larger."""
+    widths, more = np.diff(edges), []
+    for k in np.flatnonzero(widths < SMALL * (edges[-1] - edges[0])).tolist():
+        steps = widths[k] * GRADE ** np.arange(math.log(1.0 / widths[k], GRADE) + 1.0)
+        below, above = edges[k] - steps, edges[k + 1] + steps
+        more += [below[below > edges[max(k - 1, 0)]], above[above < edges[min(k + 2, edges.size - 1)]]]
+    return np.unique(np.concatenate([edges, *more]))
 
 
 def _changes_at(params: Any, grid: Grid, side: int) -> Array:

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import functools
-import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from limitsets.base import Progress, silent
-from limitsets.base.arrays import Array, Mask
+from limitsets.base.arrays import Mask
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.units import convert, parse
 from limitsets.proofs.prover.attraction import Attraction, attraction, no_cells
 from limitsets.proofs.prover.average_search import NO_WEIGHTS
 from limitsets.proofs.prover.average_steps import Branch, bends_of, values_of
 from limitsets.proofs.prover.averages import Average, confirmed
-from limitsets.proofs.prover.averages_of_map import cut_at_changes, ways_of
+from limitsets.proofs.prover.averages_of_map import cut_at_changes, graded, ways_of
 from limitsets.proofs.prover.cover import cover, cover_on, targets
 from limitsets.proofs.prover.observables import FLIP, JOG, OF_THROWS, Asked, Subject, asked_for
 from limitsets.proofs.prover.parameters import ParameterBox, parameter_box, scattered
@@ -31,16 +30,14 @@ FIRST = (2048, 8192, 32768)
 CELLS = (8192, 32768, 131072)
 # What the checker knows of ends of images, as a share of their size.
 KNOWN = 2.0**-48
-# A cell that holds a change is smaller than this share of its side; how much larger each cell beside it is.
-SMALL, GRADE = 2.0**-30, 4.0
 
 
 class Nothing(NamedTuple):
     """The parameters of a function that is averaged over throws: none."""
 
 
-def fine_cells(attractors: Attraction, cells: int, asked: Asked) -> Grid:
-    """Cut the attracting cells evenly, into so many; around them the cells stay as they are.
+def fine_cells(attractors: Attraction, cells: int, jumps: Sequence[tuple[int, float]] = ()) -> Grid:
+    """Cut the attracting cells evenly, into so many, and at jumps, a side and x; around them they stay as they are.
 
     Towards a change of branch cells become smaller: over a cell the decision is known to a share of its width.
     """
@@ -53,18 +50,8 @@ def fine_cells(attractors: Attraction, cells: int, asked: Asked) -> Grid:
             edges = np.union1d(edges[(edges <= lo) | (hi <= edges)], evenly)
         sides.append((edges,))
     box = attractors.cover.box
-    cut = cut_at_changes(*box.bare, Grid(grid.domain, tuple(sides)), asked.jumps)
-    return Grid(grid.domain, tuple((_graded(edges),) for (edges,) in cut.edges))
-
-
-def _graded(edges: Array) -> Array:
-    """Cut the neighbours of very small cells, each time GRADE times larger."""
-    widths, more = np.diff(edges), []
-    for k in np.flatnonzero(widths < SMALL * (edges[-1] - edges[0])).tolist():
-        steps = widths[k] * GRADE ** np.arange(math.log(1.0 / widths[k], GRADE) + 1.0)
-        below, above = edges[k] - steps, edges[k + 1] + steps
-        more += [below[below > edges[max(k - 1, 0)]], above[above < edges[min(k + 2, edges.size - 1)]]]
-    return np.unique(np.concatenate([edges, *more]))
+    cut = cut_at_changes(*box.bare, Grid(grid.domain, tuple(sides)), jumps)
+    return Grid(grid.domain, tuple((graded(edges),) for (edges,) in cut.edges))
 
 
 def branches_of(
@@ -98,7 +85,7 @@ def branches_of(
         )  # fmt: skip
 
 
-def _attracting(box: ParameterBox, tell: Progress) -> Attraction:
+def attracting(box: ParameterBox, tell: Progress) -> Attraction:
     """Find cells that attract, on finer cells where there are none."""
     for step, cells in enumerate(FIRST):
         tell(f"attracting cells, {cells} a side", step, len(FIRST))
@@ -106,6 +93,18 @@ def _attracting(box: ParameterBox, tell: Progress) -> Attraction:
         if not no_cells(attractors.component):
             break
     return attractors
+
+
+def unfit(scene: Scene, attractors: Attraction, what: str) -> str:
+    """Say why what averages take cannot be proved of a scene; "" where it can."""
+    if attractors.cover.box.effects or scattered(scene):
+        beyond, by = "a spread", "noise_statistics"
+        if attractors.cover.box.effects:
+            beyond, by = "effects beyond the minimal model", "analyse"
+        return f"{what} with {beyond} cannot be proved in this version; limitsets.{by} samples them"
+    if no_cells(attractors.component):
+        return f"{no_cells(attractors.component)}; `limitsets check` says what is unusual of a scene"
+    return ""
 
 
 def _averages(attractors: Attraction, asked: Asked, answer: Callable[[Average], Proof]) -> Average | str:
@@ -132,7 +131,7 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
     """Prove between which numbers averages of a scene lie, as the checker confirms them; the claim `average`."""
     begin, tell = time.perf_counter(), progress or silent
     box = parameter_box(scene)
-    attractors = _attracting(box, tell)
+    attractors = attracting(box, tell)
 
     def left(reason: str) -> Proof:
         claims = (undecided("average", reason, final=True),)
@@ -143,17 +142,12 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
     rests = np.flatnonzero(box.rests).tolist()
     places = {side: (float(box.lo.a[side]), scene.arm_length) for side in rests}
     asked = asked_for(words, Subject(Nothing(), places, functools.partial(_length, scene), sides or rests))
-    if box.effects or scattered(scene):
-        beyond, by = "a spread", "noise_statistics"
-        if box.effects:
-            beyond, by = "effects beyond the minimal model", "analyse"
-        return left(f"averages with {beyond} cannot be proved in this version; limitsets.{by} samples them")
-    if no_cells(attractors.component):
-        return left(f"{no_cells(attractors.component)}; `limitsets check` says what is unusual of a scene")
+    if reason := unfit(scene, attractors, "averages"):
+        return left(reason)
     ladder, reason = (cells,) if cells else CELLS, NO_WEIGHTS
     for step, count in enumerate(ladder):
         tell(f"{count} cells", step, len(ladder))
-        cut = attraction(cover_on(box, fine_cells(attractors, count, asked)))
+        cut = attraction(cover_on(box, fine_cells(attractors, count, asked.jumps)))
         answer = functools.partial(_with_averages, scene, cut, begin)
         average = _averages(cut, asked, answer)
         if isinstance(average, Average):

@@ -258,7 +258,7 @@ def _section(claim: str, arrays: Arrays, known: Mapping[str, Any]) -> dict[str, 
         return {"max_rank": int(arrays["rank"].max())}
     if claim == "expanding":
         return {"least": (float.fromhex(known["least_slope"]) * (1.0 - LESS)).hex()}
-    return dict(known) if claim in ("average", "cycles", "all-cycles", "converges") else {}
+    return dict(known) if claim in ("average", "entropy", "cycles", "all-cycles", "converges") else {}
 
 
 class Part(NamedTuple):

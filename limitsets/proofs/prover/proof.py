@@ -19,6 +19,7 @@ from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.averages import Average, rows_of
 from limitsets.proofs.prover.certificate import Saved, require_proved, write
 from limitsets.proofs.prover.end_points import union_of
+from limitsets.proofs.prover.entropies import Entropy
 from limitsets.proofs.prover.goals import State, hexed, rechecked
 from limitsets.proofs.prover.parameters import whole
 
@@ -260,6 +261,8 @@ class Proof(Saved):
         Time it took.
     average : Average or None
         If `limitsets.average` was asked: the bounds, and the numbers that prove them.
+    entropy : Entropy or None
+        If `limitsets.entropy` was asked: likewise, and the sampled number.
     """
 
     scene: Scene
@@ -269,6 +272,7 @@ class Proof(Saved):
     claims: tuple[Claim, ...]
     seconds: float
     average: Average | None = None
+    entropy: Entropy | None = None
 
     def __repr__(self) -> str:
         """Name its scene, and each claim with its verdict."""
@@ -321,8 +325,11 @@ class Proof(Saved):
             return (claims,)
         columns = ("side", Column("x", self.scene.unit, ".6f", ends=True))
         kept = bands_of(self.outer_extents())
-        averages = () if self.average is None else (self.average.table(),)
-        return *averages, claims, Table(columns, kept, "Attracting cells", "proved: no throw leads out")
+        return (
+            *(each.table() for each in self._numbers()),
+            claims,
+            Table(columns, kept, "Attracting cells", "proved: no throw leads out"),
+        )
 
     def to_json(self) -> list[dict[str, Any]]:
         """Give it as plain tables for JSON, one per claim, in the words of docs/certificates.md."""
@@ -346,6 +353,7 @@ class Proof(Saved):
             entropy=math.log(slope) if slope is not None and not self.noise else None,
             section=claim.section or None,
             averages=rows_of(self.average) if claim.claim == "average" else None,
+            bounds=self.entropy.to_json() if self.entropy and claim.claim == "entropy" else None,
             model=self.model,
             cells=sum(each.cover.grid.n_cells for each in attractions),
             undecided=sum(_undecided(each) for each in attractions),
@@ -444,14 +452,21 @@ class Proof(Saved):
             good,
             noise=self.noise,
             tolerance=self.tolerance,
-            arrays={} if self.average is None else self.average.arrays,
+            arrays={name: array for each in self._numbers() for name, array in each.arrays.items()},
             **how,
         )
 
+    def _numbers(self) -> list[Average | Entropy]:
+        return [each for each in (self.average, self.entropy) if each is not None]
+
     def denied(self, claims: Mapping[str, str]) -> Proof:
         """Return the proof where the checker denies some claims: these are undecided."""
-        average = None if "average" in claims else self.average
-        return replace(self, claims=left_of(self.claims, claims), average=average)
+        return replace(self, claims=left_of(self.claims, claims), **without(self, claims))
+
+
+def without(proof: Any, denied: Mapping[str, str]) -> dict[str, Any]:
+    """Give the numbers of a proof, None for those that the checker denies."""
+    return {word: None if word in denied else getattr(proof, word) for word in ("average", "entropy")}
 
 
 def left_of(claims: Sequence[Claim], denied: Mapping[str, str]) -> tuple[Claim, ...]:

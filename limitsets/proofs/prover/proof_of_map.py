@@ -33,18 +33,19 @@ from limitsets.proofs.prover.certificate_of_map import (
     write_map,
 )
 from limitsets.proofs.prover.converging import attracting_frames
+from limitsets.proofs.prover.entropies import Entropy
 from limitsets.proofs.prover.goal_of_map import GoalOfMap
 from limitsets.proofs.prover.leaving_of_map import exits_of, targets_beyond, weights_of
 from limitsets.proofs.prover.orbits_of_map import CycleOfMap, is_unstable_in_file, slopes_of, slopes_on
 from limitsets.proofs.prover.programs import begins_of
-from limitsets.proofs.prover.proof import Claim, left_of
+from limitsets.proofs.prover.proof import Claim, left_of, without
 from limitsets.systems.cells import CellSet
 from limitsets.systems.graph import TransitionGraph
 from limitsets.systems.maps import kind_of
 from limitsets.systems.sets.basin import passing
 
 # Claims about slopes: slopes are derived automatically even where the map gives its own boxes.
-OF_SLOPES = ("all-cycles", "almost-every", "average", "converges", "cycles", "expanding")
+OF_SLOPES = ("all-cycles", "almost-every", "average", "converges", "cycles", "entropy", "expanding")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,8 @@ class ProofOfMap(Saved):
         and so on, -1 elsewhere.
     average : Average or None
         If `limitsets.average` was asked: the bounds, and the numbers that prove them.
+    entropy : Entropy or None
+        If `limitsets.entropy` was asked: likewise, and the sampled number.
     """
 
     map: Any
@@ -84,6 +87,7 @@ class ProofOfMap(Saved):
     goal: GoalOfMap | None = None
     final: NDArray[np.int32] | None = None
     average: Average | None = None
+    entropy: Entropy | None = None
 
     @property
     def proved(self) -> bool:
@@ -141,8 +145,7 @@ class ProofOfMap(Saved):
     def denied(self, claims: Mapping[str, str]) -> ProofOfMap:
         """Return the proof where the checker denies some claims: these are undecided."""
         cycles = () if "cycles" in claims else self.cycles
-        average = None if "average" in claims else self.average
-        return replace(self, claims=left_of(self.claims, claims), cycles=cycles, average=average)
+        return replace(self, claims=left_of(self.claims, claims), cycles=cycles, **without(self, claims))
 
     def part(self) -> Part:
         """Give what a certificate holds of this box of parameters; a refuted goal stands by itself."""
@@ -165,8 +168,9 @@ class ProofOfMap(Saved):
             arrays = (
                 arrays | {"weight": np.asarray(self.weights)} | targets_beyond(arrays, self._images, thin)
             )
-        if "average" in claims and self.average is not None:
-            arrays = arrays | self.average.arrays
+        for word, numbers in (("average", self.average), ("entropy", self.entropy)):
+            if word in claims and numbers is not None:
+                arrays = arrays | numbers.arrays
         return Part((self.map, self.upper), claims, arrays)
 
     def functions(self, claim: str) -> str:
@@ -190,6 +194,7 @@ class ProofOfMap(Saved):
                 attracting=len(self.cells),
                 section=claim.section or None,
                 averages=rows_of(self.average) if claim.claim == "average" else None,
+                bounds=self.entropy.to_json() if self.entropy and claim.claim == "entropy" else None,
                 cycles=self.cycles if claim.claim in ("all-cycles", "cycles", "converges") else None,
                 timings={"certify": self.seconds},
             )
@@ -212,8 +217,7 @@ class ProofOfMap(Saved):
                 share = f"{math.floor(1000 * each.section['share']) / 10} % of it"
                 out = CellSet(self.graph.grid, self.exits >= 0)
                 tables.append(_region(out, "Leaving cells", f"{within}; {share}"))
-        if self.average is not None:
-            tables.append(self.average.table())
+        tables += [each.table() for each in (self.average, self.entropy) if each is not None]
         if not len(self.cells):
             return tuple(tables)
         kind = "no image leads out" if self.final is None else "no image leads out, or orbits tend to a cycle"

@@ -1,0 +1,79 @@
+"""Laps of a map of a line: what `entropy` needs of its cells.
+
+Along an axis that closes a lap ends where the image passes the seam too: images are turned to the first period.
+"""
+
+import functools
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+from flint import arb
+
+from .any_map import Map
+from .balls import ZERO, Arb, about, prove
+from .entropy import Entropy, Lap, Row, Runs, check_entropy, laps_of
+from .map_average import way_of
+from .map_cells import MapCells
+from .program import Program
+
+
+def check_map_entropy(the_map: Map, c: MapCells, claim: Entropy) -> None:
+    """Check the entropy of a map."""
+    check_entropy(list(laps_of_map(the_map, c)), Runs(c, [axes[0] for axes in c.edges]), claim)
+
+
+def laps_of_map(the_map: Map, c: MapCells) -> Iterator[Lap]:
+    """Find the laps of the attracting cells, by side, branch and turn."""
+    possible = [to[:, 0] != -2 for to in c.target]
+    both, sides = np.sum(possible, axis=0) > 1, c.side_of(np.arange(len(c.rank)))
+    ranges = the_map.piece([]).balls
+    for side, branch in itertools.product(range(len(c.edges)), range(len(possible))):
+        cells, to = (
+            np.flatnonzero((c.component >= 0) & possible[branch] & (sides == side)),
+            c.to[branch][side],
+        )
+        program, period = the_map.image[side, branch], c.periods[to][0]
+        prove(period is None or len(possible) == 1, "an axis closes, of a map of two branches")
+        rows = list[Row]()
+        for cell, ends in zip(cells.tolist(), c.ends(cells, side).tolist(), strict=True):
+            with about(c.name(cell)):
+                place = way_of(the_map, (side, branch), ends) if both[cell] else -1
+            x = [arb(ends[0]).union(arb(ends[1])), *ranges]
+            slope, second = program.gradients(x)[0][0], program.bend(x)[2]
+            rows.append(Row(cell, (ends[0], ends[1]), slope, second, program.at(x)[0], place))
+
+        image = functools.partial(image_of, program, ranges)
+        if period is None:
+            yield from laps_of(side, to, rows, functools.partial(image, ZERO))
+            continue
+        first = arb(float(c.edges[to][0][0]))
+        by_turn: dict[int, list[Row]] = {}
+        for row in rows:
+            for turn, place in turns_of(row, [image(ZERO, end) for end in row.ends], (first, period)):
+                turned = row._replace(image=row.image - turn * period, place=place)
+                by_turn.setdefault(turn, []).append(turned)
+        for turn, own in by_turn.items():
+            yield from laps_of(side, to, own, functools.partial(image, turn * period))
+
+
+def image_of(program: Program, ranges: list[Arb], by: Arb, x: float) -> Arb:
+    """Enclose the image of a place, less the turns of an axis that closes."""
+    return program.at([arb(x), *ranges])[0] - by
+
+
+def turns_of(row: Row, images: list[Arb], axis: tuple[Arb, Arb]) -> list[tuple[int, int]]:
+    """Find in which turns of a closed axis the image of a cell lies, and where on the cell, as `Row` has it."""
+    first, period = axis
+    prove(row.sign != 0, f"cell {row.cell}: an axis closes, and the sign of the slope is not proved")
+    prove(all(image.is_finite() for image in images), f"cell {row.cell}: an image is not bounded")
+    low, high = images if row.sign > 0 else images[::-1]
+    least, most = ((low - first) / period).mid().floor(), ((high - first) / period).mid().ceil() - 1
+    least, most = int(float(least)), int(float(most))
+    least -= 0 if low >= first + least * period else 1
+    most += 0 if high <= first + (most + 1) * period else 1
+    inside = low >= first + least * period and high <= first + (most + 1) * period
+    prove(bool(inside) and least <= most <= least + 1, f"cell {row.cell}: its image is as long as the axis")
+    if least == most:
+        return [(least, -1)]
+    return [(least, 0 if row.sign > 0 else 1), (most, 1 if row.sign > 0 else 0)]
