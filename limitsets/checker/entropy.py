@@ -1,11 +1,11 @@
 """Entropy of a piecewise monotone map on a line, from both sides: by intervals that images meet, and that they cover.
 
 docs/certificates.md, "Entropy": the claim `entropy`.  N are the attracting cells.  A *lap* is a largest interval of N
-on which one branch is taken and f is continuous and rises, or falls.  The *entropy* is the limit of (ln W)/n, W the
-number of words of n laps that the orbits of starts in N follow, where an end that two laps share belongs to both; for a
-continuous map this is the topological entropy (Misiurewicz and Szlenk, "Entropy of piecewise monotone mappings", Studia
-Mathematica 67, 1980).  Laps may be cut at finitely many more places, E: on the starts of a word f, .., f^n are monotone
-and come to each of these once at most, so that it becomes 1 + n E words at most, and the limit stays.
+on which one branch is taken and f is continuous and rises, or falls.  A *word* is a sequence of laps that all starts of
+some interval, longer than 0, follow, and the *entropy* is the limit of (ln W)/n, W the number of words of n laps.  For
+a continuous map this is the topological entropy (Misiurewicz and Szlenk, "Entropy of piecewise monotone mappings",
+Studia Mathematica 67, 1980).  Laps may be cut at finitely many more places, E: on the starts of a word f, .., f^n are
+monotone and come to each of these once at most, so that it becomes 1 + n E words at most, and the limit stays.
 
 Ends of laps that are known to a *bracket* only lie in cells where two branches are possible, and the slope of the
 margin has a sign, or where the sign of f' is not known, and that of f'' is: so a bracket holds one end at most.
@@ -109,7 +109,7 @@ class Lap(NamedTuple):
     def outward(self, lo: float, hi: float) -> Pair | None:
         """Return floats around the images of the part of an interval in the lap; None where there is none."""
         lo, hi = max(lo, self.outer[0]), min(hi, self.outer[1])
-        if lo > hi:
+        if lo >= hi:
             return None
         first, last = self.inner or (math.inf, -math.inf)
         inside = max(lo, first), min(hi, last)

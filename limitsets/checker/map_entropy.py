@@ -5,13 +5,14 @@ Along an axis that closes a lap ends where the image passes the seam too: images
 
 import functools
 import itertools
+import math
 from collections.abc import Iterator
 
 import numpy as np
 from flint import arb
 
 from .any_map import Map
-from .balls import ZERO, Arb, about, prove
+from .balls import ZERO, Arb, Pair, about, floats_around, prove
 from .entropy import Entropy, Lap, Row, Runs, check_entropy, laps_of
 from .map_average import way_of
 from .map_cells import MapCells
@@ -39,10 +40,10 @@ def laps_of_map(the_map: Map, c: MapCells) -> Iterator[Lap]:
         for cell, ends in zip(cells.tolist(), c.ends(cells, side).tolist(), strict=True):
             with about(c.name(cell)):
                 place = way_of(the_map, (side, branch), ends) if both[cell] else -1
-            x = [arb(ends[0]).union(arb(ends[1])), *ranges]
-            slope, second = program.gradients(x)[0][0], program.bend(x)[2]
-            rows.append(Row(cell, (ends[0], ends[1]), slope, second, program.at(x)[0], place))
-
+            rows.append(row_of(program, ranges, cell, (ends[0], ends[1]), place))
+        own_period = c.periods[side][0]
+        if own_period is not None and rows and rows[-1].cell == c.start[side + 1] - 1:
+            rows[-1:] = without_seam(rows[-1], arb(rows[0].ends[0]) + own_period, program, ranges)
         image = functools.partial(image_of, program, ranges)
         if period is None:
             yield from laps_of(side, to, rows, functools.partial(image, ZERO))
@@ -51,10 +52,24 @@ def laps_of_map(the_map: Map, c: MapCells) -> Iterator[Lap]:
         by_turn: dict[int, list[Row]] = {}
         for row in rows:
             for turn, place in turns_of(row, [image(ZERO, end) for end in row.ends], (first, period)):
-                turned = row._replace(image=row.image - turn * period, place=place)
+                turned = row._replace(image=row.image - turn * period, place=max(place, row.place))
                 by_turn.setdefault(turn, []).append(turned)
         for turn, own in by_turn.items():
             yield from laps_of(side, to, own, functools.partial(image, turn * period))
+
+
+def row_of(program: Program, ranges: list[Arb], cell: int, ends: Pair, place: int) -> Row:
+    """Enclose the map and its slopes on a cell."""
+    x = [arb(ends[0]).union(arb(ends[1])), *ranges]
+    return Row(cell, ends, program.gradients(x)[0][0], program.bend(x)[2], program.at(x)[0], place)
+
+
+def without_seam(row: Row, seam: Arb, program: Program, ranges: list[Arb]) -> list[Row]:
+    """Cut the last cell of an axis that closes: it ends before the seam, to which an edge in doubles is not exact."""
+    end = math.nextafter(floats_around(seam)[0], -math.inf)
+    prove(row.ends[0] < end, f"cell {row.cell}: it is too short")
+    pieces = (row.cell, (row.ends[0], end), row.place), (row.cell + 1, (end, row.ends[1]), max(row.place, 0))
+    return [row_of(program, ranges, *piece) for piece in pieces]
 
 
 def image_of(program: Program, ranges: list[Arb], by: Arb, x: float) -> Arb:

@@ -300,6 +300,7 @@ def require_none(given: Mapping[str, Any], function: str, beside: str) -> None:
                 "certify": "a scene has tolerance=, a map upper=",
                 "margin": "a scene has goal=, a map ends=",
                 "average": "a scene has cells=, a map grid=",
+                "entropy": "a scene has cells=, a map grid= and upper=",
             }
             remedy = f"leave it out; {own[function]}"
             raise AnswerError(f"the argument {name} of {function}", shown(value), f"none {beside}", remedy)

@@ -144,8 +144,9 @@ def entropy(
 ) -> Proof | ProofOfMap:
     """Prove between which numbers the topological entropy on the attracting cells of a scene or a map of a line lies.
 
-    The entropy is the growth per step of the number of words of laps that orbits follow; for a continuous map the
-    topological entropy.  A lap is an interval on which one branch is taken, and the map rises or falls.
+    A lap is an interval on which one branch is taken, and the map rises or falls; the entropy is the growth per step
+    of the number of words of laps that intervals of starts follow.  For a continuous map this is the topological
+    entropy.
 
     Parameters
     ----------

@@ -197,7 +197,8 @@ def growth_of_curve(params: Any, domain: Domain) -> float:
     Returns
     -------
     float
-        0 where the curve stays shorter than the domain; nan where all of it leaves, no start stays in the domain, an axis closes, or the map has more sides.
+        0 where the curve stays shorter than the domain; nan where all of it leaves, no start stays in the domain, an
+        axis closes, or the map has more sides.
 
     Examples
     --------
