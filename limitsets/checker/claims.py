@@ -20,7 +20,7 @@ from .cells import (
     tasks_of,
 )
 from .end_points import check_ends, ends_statement, read_ends
-from .entropy import KEYS as OF_ENTROPY, entropy_in_words
+from .entropy import ENTROPY_KEYS, entropy_in_words
 from .feeding import FEEDS_KEYS, check_feeds, feeds_statement, read_feeds
 from .file import Cells, hex_float, plain, read_sections, require, rounded, table
 from .goals import GOALS, check_goal, read_goal_claim, speaks_of_all, statement_of_goal
@@ -202,7 +202,7 @@ CLAIMS = {
     "cycles": Kind("cycles complete", read_orbits, lambda section, _: orbits_statement(section)),
     "average": Kind(OF_AVERAGES, lambda section, _: section, average_statement),
     "entropy": Kind(
-        OF_ENTROPY,
+        ENTROPY_KEYS,
         lambda section, _: section,
         lambda section, _: f"entropy: {entropy_in_words(section['read'])}",
     ),

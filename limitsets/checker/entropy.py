@@ -31,10 +31,10 @@ from .balls import Arb, Array, Pair, floats_around, prove
 from .file import Arrays, hex_float, require, rounded
 from .labels import Labelled
 
-KEYS = "lower upper"
+ENTROPY_KEYS = "lower upper"
 MOST_INTERVALS, MOST_LAPS = 20_000, 1_000
-SMALLEST, LARGEST = 2.0**-200, 2.0**200  # of numbers of intervals
-ROOM = 2.0**-40  # sums of the parts of an interval, in floats, are right to less, as a share
+LEAST_NUMBER, MOST_NUMBER = 2.0**-200, 2.0**200  # of numbers of intervals
+TO_SPARE = 2.0**-40  # sums of the parts of an interval, in floats, are right to less, as a share
 LEAST_WIDTH = 2.0**-1000  # no interval of the lower end is shorter
 
 
@@ -51,14 +51,14 @@ def read_entropy(
     section: dict[str, Any], arrays: Arrays, prefix: str, sides: int, where: str = "section of entropy"
 ) -> Entropy:
     """Read the claim `entropy`."""
-    lower, upper = (hex_float(section[key], f"{where}: {key}") for key in KEYS.split())
-    require(1.0 <= lower <= upper <= LARGEST, f"{where}: the two ends do not ascend from 1")
+    lower, upper = (hex_float(section[key], f"{where}: {key}") for key in ENTROPY_KEYS.split())
+    require(1.0 <= lower <= upper <= MOST_NUMBER, f"{where}: the two ends do not ascend from 1")
     both = [arrays.read(f"{prefix}entropy.{word}", "<f8", 4) for word in ("covered", "met")]
     for one in both:
         require(len(one) <= MOST_INTERVALS, f"{where}: there are more than {MOST_INTERVALS} intervals")
         fits = np.isin(one[:, 0], range(sides)) & np.isfinite(one).all(axis=1) & (one[:, 1] <= one[:, 2])
         require(bool(fits.all()), f"{where}: a row is no interval of a side")
-        fits = (one[:, 3] >= SMALLEST) & (one[:, 3] <= LARGEST)
+        fits = (one[:, 3] >= LEAST_NUMBER) & (one[:, 3] <= MOST_NUMBER)
         require(bool(fits.all()), f"{where}: the number of an interval is not between 2^-200 and 2^200")
     proper = both[0][:, 2] - both[0][:, 1] >= LEAST_WIDTH
     require(bool(proper.all()), f"{where}: an interval of the lower end has no length")
@@ -68,7 +68,7 @@ def read_entropy(
 def entropy_in_words(claim: Entropy) -> str:
     """Put the claim in words."""
     # the logarithm of Python is off by less than this share of 1
-    lo, hi = math.log(claim.lower) - ROOM, math.log(claim.upper) + ROOM
+    lo, hi = math.log(claim.lower) - TO_SPARE, math.log(claim.upper) + TO_SPARE
     ends = rounded(max(lo, 0.0), up=False), rounded(hi, up=True)
     return f"the entropy (growth of the words of laps) of the attracting cells is between {ends[0]} and {ends[1]}"
 
@@ -153,7 +153,7 @@ def laps_of(side: int, to: int, rows: Iterable[Row], at: Callable[[float], Arb])
         # a turn next to the end of N may have a lap between, of which no more is known
         for other in (k - 1, k + 1):
             if run[0].sign == 0 and not _is_beside(runs, k, other):
-                yield Lap(side, to, (run[0].ends[0], run[-1].ends[1]), None, (hull(run), None), at)
+                yield Lap(side, to, (run[0].ends[0], run[-1].ends[1]), None, (image_hull(run), None), at)
 
 
 def _is_beside(runs: list[list[Row]], k: int, other: int) -> bool:
@@ -185,10 +185,10 @@ def lap_of(side: int, to: int, run: list[Row], beside: list[list[Row]], at: Call
     inner = (run[begin].ends[0], run[end - 1].ends[1]) if begin < end else None
     below, above = beside[0] + run[:begin], run[end:] + beside[1]
     outer = (below or run)[0].ends[0], (above or run)[-1].ends[1]
-    return Lap(side, to, outer, inner, (hull(below), hull(above)), at)
+    return Lap(side, to, outer, inner, (image_hull(below), image_hull(above)), at)
 
 
-def hull(rows: list[Row]) -> Arb | None:
+def image_hull(rows: list[Row]) -> Arb | None:
     """Enclose what f takes on cells."""
     whole = None
     for row in rows:
@@ -227,7 +227,7 @@ def check_entropy(laps: list[Lap], runs: Runs, claim: Entropy) -> None:
     if claim.lower > 1.0:
         prove(len(claim.covered) > 0, "there are no intervals for the lower end")
         sums = covered_sums(laps, claim.covered)
-        wanting = sums < claim.lower * claim.covered[:, 3] * (1.0 + ROOM)
+        wanting = sums < claim.lower * claim.covered[:, 3] * (1.0 + TO_SPARE)
         prove(not wanting.any(), _of_interval(claim.covered, wanting, "images cover too little"))
     whole = [
         any(s == side and lo <= first and last <= hi for s, lo, hi, _ in claim.met.tolist())
@@ -236,7 +236,7 @@ def check_entropy(laps: list[Lap], runs: Runs, claim: Entropy) -> None:
     ]
     prove(all(whole), "the intervals of the upper end do not hold the attracting cells")
     sums = met_sums(laps, runs, claim.met)
-    wanting = ~(sums * (1.0 + ROOM) <= claim.upper * claim.met[:, 3])
+    wanting = ~(sums * (1.0 + TO_SPARE) <= claim.upper * claim.met[:, 3])
     prove(not wanting.any(), _of_interval(claim.met, wanting, "images meet too much"))
 
 

@@ -40,7 +40,7 @@ def laps_of_map(the_map: Map, c: MapCells) -> Iterator[Lap]:
         for cell, ends in zip(cells.tolist(), c.ends(cells, side).tolist(), strict=True):
             with about(c.name(cell)):
                 place = way_of(the_map, (side, branch), ends) if both[cell] else -1
-            rows.append(row_of(program, ranges, cell, (ends[0], ends[1]), place))
+            rows.append(map_row(program, ranges, cell, (ends[0], ends[1]), place))
         own_period = c.periods[side][0]
         if own_period is not None and rows and rows[-1].cell == c.start[side + 1] - 1:
             rows[-1:] = without_seam(rows[-1], arb(rows[0].ends[0]) + own_period, program, ranges)
@@ -58,7 +58,7 @@ def laps_of_map(the_map: Map, c: MapCells) -> Iterator[Lap]:
             yield from laps_of(side, to, own, functools.partial(image, turn * period))
 
 
-def row_of(program: Program, ranges: list[Arb], cell: int, ends: Pair, place: int) -> Row:
+def map_row(program: Program, ranges: list[Arb], cell: int, ends: Pair, place: int) -> Row:
     """Enclose the map and its slopes on a cell."""
     x = [arb(ends[0]).union(arb(ends[1])), *ranges]
     return Row(cell, ends, program.gradients(x)[0][0], program.bend(x)[2], program.at(x)[0], place)
@@ -69,7 +69,7 @@ def without_seam(row: Row, seam: Arb, program: Program, ranges: list[Arb]) -> li
     end = math.nextafter(floats_around(seam)[0], -math.inf)
     prove(row.ends[0] < end, f"cell {row.cell}: it is too short")
     pieces = (row.cell, (row.ends[0], end), row.place), (row.cell + 1, (end, row.ends[1]), max(row.place, 0))
-    return [row_of(program, ranges, *piece) for piece in pieces]
+    return [map_row(program, ranges, *piece) for piece in pieces]
 
 
 def image_of(program: Program, ranges: list[Arb], by: Arb, x: float) -> Arb:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from .any_map import Shape, read_map, read_parameters
 from .balls import Pair
-from .entropy import KEYS as OF_ENTROPY, Entropy, read_entropy
+from .entropy import ENTROPY_KEYS, Entropy, read_entropy
 from .file import (
     Arrays,
     hex_float,
@@ -40,7 +40,7 @@ CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "escapes": "",
     "almost-every": "",
     "average": OF_AVERAGES,
-    "entropy": OF_ENTROPY,
+    "entropy": ENTROPY_KEYS,
     "refuted": "",
 }
 OF_ORBITS = (

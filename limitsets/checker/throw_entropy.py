@@ -34,12 +34,12 @@ def laps_of_throws(scene: Scene, c: Cells) -> Iterator[Lap]:
             for cell, lo, hi in zip(cells.tolist(), edges[k].tolist(), edges[k + 1].tolist(), strict=True):
                 with about(c.name(cell)):
                     place = throws.way(branch, (lo, hi)) if c.branch[cell] == 2 else -1
-                    rows.append(row_of(throws, cell, branch, (lo, hi), place))
+                    rows.append(throw_row(throws, cell, branch, (lo, hi), place))
             image = functools.partial(throws.image, branch=branch)
             yield from laps_of(side, (side + branch) % len(c.edges), rows, image)
 
 
-def row_of(throws: ThrowsOfSide, cell: int, branch: int, ends: tuple[float, float], place: int) -> Row:
+def throw_row(throws: ThrowsOfSide, cell: int, branch: int, ends: tuple[float, float], place: int) -> Row:
     """Enclose a throw and its slopes on a cell."""
     angles = throws.angles(ends)
     slope, second = throws.slopes(angles)

@@ -92,14 +92,9 @@ class Average:
         """Show all numbers, rounded outward to the digits that are known; the component where there are several."""
         rows = []
         for row in rows_of(self) or ():
-            width = row["hi"] - row["lo"]
-            last = Decimal(1).scaleb(math.floor(math.log10(width)) - 1) if width > 0.0 else Decimal("1e-15")
-            ends = (
-                float(Decimal(row[end]).quantize(last, way))
-                for end, way in (("lo", ROUND_FLOOR), ("hi", ROUND_CEILING))
-            )
             component = (row["component"],) if len(self.bounds) > 1 else ()
-            rows.append((row["name"].replace("_", " "), *component, *ends, width))
+            ends = outward(row["lo"], row["hi"])
+            rows.append((row["name"].replace("_", " "), *component, *ends, row["hi"] - row["lo"]))
         numbers = (Column("lo", show=".12g"), Column("hi", show=".12g"), Column("width", show=".2g"))
         heads = ("average", *(("component",) if len(self.bounds) > 1 else ()), *numbers)
         said = "proved: from almost every start (all but length 0) the average over ever more steps tends to a number"
@@ -115,6 +110,12 @@ def rows_of(average: Average | None) -> list[dict[str, Any]] | None:
         for name, by_component in average.numbers.items()
         for component, (lo, hi) in by_component.items()
     ]
+
+
+def outward(lo: float, hi: float) -> tuple[float, float]:
+    """Round two ends outward to the digits that are known."""
+    last = Decimal(1).scaleb(math.floor(math.log10(hi - lo)) - 1) if hi > lo else Decimal("1e-15")
+    return float(Decimal(lo).quantize(last, ROUND_FLOOR)), float(Decimal(hi).quantize(last, ROUND_CEILING))
 
 
 def _quotient(above: tuple[float, float], below: tuple[float, float]) -> tuple[float, float]:

@@ -98,10 +98,8 @@ def attracting(box: ParameterBox, tell: Progress) -> Attraction:
 def unfit(scene: Scene, attractors: Attraction, what: str) -> str:
     """Say why what averages take cannot be proved of a scene; "" where it can."""
     if attractors.cover.box.effects or scattered(scene):
-        beyond, by = "a spread", "noise_statistics"
-        if attractors.cover.box.effects:
-            beyond, by = "effects beyond the minimal model", "analyse"
-        return f"{what} with {beyond} cannot be proved in this version; limitsets.{by} samples them"
+        beyond = "effects beyond the minimal model" if attractors.cover.box.effects else "a spread"
+        return f"{what} with {beyond} cannot be proved in this version"
     if no_cells(attractors.component):
         return f"{no_cells(attractors.component)}; `limitsets check` says what is unusual of a scene"
     return ""
@@ -143,7 +141,8 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
     places = {side: (float(box.lo.a[side]), scene.arm_length) for side in rests}
     asked = asked_for(words, Subject(Nothing(), places, functools.partial(_length, scene), sides or rests))
     if reason := unfit(scene, attractors, "averages"):
-        return left(reason)
+        by = "analyse" if box.effects else "noise_statistics" if scattered(scene) else ""
+        return left(f"{reason}; limitsets.{by} samples them" if by else reason)
     ladder, reason = (cells,) if cells else CELLS, NO_WEIGHTS
     for step, count in enumerate(ladder):
         tell(f"{count} cells", step, len(ladder))

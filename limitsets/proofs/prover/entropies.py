@@ -18,6 +18,7 @@ import numpy as np
 
 from limitsets.base import Column, Progress, Table, silent
 from limitsets.base.arrays import Array, Arrays, Ints
+from limitsets.proofs.prover.averages import outward
 from limitsets.systems.sets.entropy import perron
 
 if TYPE_CHECKING:
@@ -54,14 +55,10 @@ class Entropy:
 
     def table(self) -> Table:
         """Show both ends and the sampled number."""
-        heads = [Column(word, show=".10g") for word in ("lo", "hi", "sampled")]
-        said = "growth of the words of laps that orbits in the attracting cells follow; "
+        heads = [Column(word, show=".12g") for word in ("lo", "hi", "sampled")]
+        said = "growth of the words of laps in the attracting cells; "
         said += "proved: between lo and hi" if self.arrays else "nothing is proved"
-        ends = (
-            (math.floor(self.lo * 1e10) / 1e10, math.ceil(self.hi * 1e10) / 1e10)
-            if self.arrays
-            else (None, None)
-        )
+        ends = outward(self.lo, self.hi) if self.arrays else (None, None)
         rows = [(*ends, None if math.isnan(self.sampled) else self.sampled)]
         return Table(heads, rows, "Topological entropy per step [natural logarithm]", said)
 
