@@ -45,6 +45,7 @@ The files follow docs/certificates.md, and each imports only from those before i
     landings     the throws of one side of a noisy chain, and their branches      18, 19
     links        what a step needs of every cell, and the chain of it             20, 21
     brackets     a claim of probabilities, and its brackets                       22, "Probabilities"
+    long_run     averages of a noisy chain over ever more throws                  "Long-run averages"
     any_map      the map of a file, and one cell of it
     map_cells    the cells, their labels
     map_cycles   periodic orbits, and balls around them

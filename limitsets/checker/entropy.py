@@ -172,12 +172,18 @@ def require_one_turn(run: list[Row]) -> None:
     whole = all(row.place < 0 for row in run)
     prove(whole, f"cell {run[0].cell}: a change of branch, and a slope whose sign is not proved")
     one_sign = all(row.second > 0 for row in run) or all(row.second < 0 for row in run)
-    prove(one_sign, f"cell {run[0].cell}: that f turns once at most, where its slope may be 0, is not proved")
+    why = "that f turns once at most, where its slope may be 0, is not proved (a corner, or a flat piece?)"
+    prove(one_sign, f"cell {run[0].cell}: {why}")
 
 
 def lap_of(side: int, to: int, run: list[Row], beside: list[list[Row]], at: Callable[[float], Arb]) -> Lap:
     """Make a lap of cells with slopes of one sign, and the turns beside it."""
     places = [row.place for row in run]
+    # beside a cell with this branch on all of it the branch is taken at the border, hence up to there from the change
+    for k in reversed(range(len(run) - 1)):
+        places[k] = -1 if places[k] == 0 and places[k + 1] < 0 else places[k]
+    for k in range(1, len(run)):
+        places[k] = -1 if places[k] == 1 and places[k - 1] < 0 else places[k]
     begin = next((k for k, place in enumerate(places) if place != 1), len(run))
     end = len(run) - next((k for k, place in enumerate(reversed(places)) if place != 0), len(run))
     whole = all(place < 0 for place in places[begin:end])
@@ -213,6 +219,8 @@ class Runs:
     def widened(self, side: int, lo: Array, hi: Array) -> tuple[Array, Array]:
         """Widen intervals that end where a run does up to the next run: what lies beyond is not in N."""
         runs = self.by_side[side]
+        if not runs:
+            return lo, hi
         before = [-math.inf, *(np.nextafter(last, math.inf) for _, last in runs[:-1])]
         after = [*(np.nextafter(first, -math.inf) for first, _ in runs[1:]), math.inf]
         for (first, last), below, above in zip(runs, before, after, strict=True):
@@ -220,10 +228,15 @@ class Runs:
         return lo, hi
 
 
-def check_entropy(laps: list[Lap], runs: Runs, claim: Entropy) -> None:
-    """Check both ends."""
+def require_few(laps: list[Lap]) -> None:
+    """Require that there are laps, and not too many."""
     prove(len(laps) > 0, "there are no attracting cells")
     prove(len(laps) <= MOST_LAPS, f"there are more than {MOST_LAPS} laps")
+
+
+def check_entropy(laps: list[Lap], runs: Runs, claim: Entropy) -> None:
+    """Check both ends."""
+    require_few(laps)
     if claim.lower > 1.0:
         prove(len(claim.covered) > 0, "there are no intervals for the lower end")
         sums = covered_sums(laps, claim.covered)

@@ -18,6 +18,8 @@ from .map_average import way_of
 from .map_cells import MapCells
 from .program import Program
 
+MOST_TURNS = 10**6
+
 
 def check_map_entropy(the_map: Map, c: MapCells, claim: Entropy) -> None:
     """Check the entropy of a map."""
@@ -43,7 +45,7 @@ def laps_of_map(the_map: Map, c: MapCells) -> Iterator[Lap]:
             rows.append(map_row(program, ranges, cell, (ends[0], ends[1]), place))
         own_period = c.periods[side][0]
         if own_period is not None and rows and rows[-1].cell == c.start[side + 1] - 1:
-            rows[-1:] = without_seam(rows[-1], arb(rows[0].ends[0]) + own_period, program, ranges)
+            rows[-1:] = without_seam(rows[-1], arb(float(c.edges[side][0][0])) + own_period, program, ranges)
         image = functools.partial(image_of, program, ranges)
         if period is None:
             yield from laps_of(side, to, rows, functools.partial(image, ZERO))
@@ -80,8 +82,12 @@ def image_of(program: Program, ranges: list[Arb], by: Arb, x: float) -> Arb:
 def turns_of(row: Row, images: list[Arb], axis: tuple[Arb, Arb]) -> list[tuple[int, int]]:
     """Find in which turns of a closed axis the image of a cell lies, and where on the cell, as `Row` has it."""
     first, period = axis
-    prove(row.sign != 0, f"cell {row.cell}: an axis closes, and the sign of the slope is not proved")
-    prove(all(image.is_finite() for image in images), f"cell {row.cell}: an image is not bounded")
+    prove(
+        row.sign != 0,
+        f"cell {row.cell}: the axis closes, and where the slope may be 0 no laps are known then",
+    )
+    near = all(abs(image) < MOST_TURNS * period for image in images)
+    prove(near, f"cell {row.cell}: an image is not bounded by {MOST_TURNS} turns of the axis")
     low, high = images if row.sign > 0 else images[::-1]
     least, most = ((low - first) / period).mid().floor(), ((high - first) / period).mid().ceil() - 1
     least, most = int(float(least)), int(float(most))

@@ -38,6 +38,7 @@ from .file import (
     table,
 )
 from .goals import content_of_goal, goal_of_scene
+from .long_run import LongRun, check_long_run, long_run_in_words, read_long_run
 from .map_cells import check_map_task, map_of_box
 from .map_claims import check_parts, work_of_maps
 from .map_file import MapFile, read_map_file
@@ -356,14 +357,25 @@ def recheck_plane(plane: Plane, workers: int, progress: Progress, report: Report
 
 def recheck_chances(c: Chances, _: int, progress: Progress, report: Report) -> None:
     """Check probabilities, and fill in the report."""
+    describe_chain(c, report, chances_in_words(c))
+    check_chances(c, progress)
+
+
+def recheck_long_run(c: LongRun, _: int, progress: Progress, report: Report) -> None:
+    """Check long-run averages, and fill in the report."""
+    describe_chain(c, report, long_run_in_words(c))
+    check_long_run(c, progress)
+
+
+def describe_chain(c: Chances | LongRun, report: Report, statement: list[str]) -> None:
+    """Say what is claimed of a noisy chain, and its laws."""
     for name, (word, text) in c.setting.laws.items():
         said = "uniform, within" if word == UNIFORM else "normal, with a standard deviation of"
         report.parameters[f"law of {name}"] = f"{said} {quantity(text, KINDS, name)}"
     report.cells = sum(len(e) - 1 for e in c.edges)
-    report.statement = chances_in_words(c)
+    report.statement = statement
     if goal_of_scene(c.raw, len(c.setting.scene.sides)) is not None:
         report.statement.append(NO_GOAL)
-    check_chances(c, progress)
 
 
 def recheck_policy(policy: Policy, workers: int, progress: Progress, report: Report) -> None:
@@ -382,6 +394,7 @@ ALONE: dict[str, tuple[Callable[..., Any], Callable[..., None], Callable[[Any], 
     "region": (read_plane, recheck_plane, lambda _: None),
     "policy": (read_policy, recheck_policy, lambda policy: policy.noise),
     "probabilities": (read_chances, recheck_chances, lambda chances: bounds_of_laws(chances.setting.laws)),
+    "long-run": (read_long_run, recheck_long_run, lambda claim: bounds_of_laws(claim.setting.laws)),
 }
 """The claims that stand alone in a file: how each is read and checked, and the noise that it has."""
 

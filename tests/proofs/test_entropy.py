@@ -1,10 +1,12 @@
 """Topological entropy from both sides: known answers, other algorithms, forged files, maps without an answer."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from flint import arb
+from limitsets.cells import Domain
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
@@ -215,6 +217,64 @@ def test_growth_of_paths():
     assert perron(sparse.csr_matrix(np.roll(np.eye(3), 1, axis=0)))[0] == 0.0
 
 
+def test_awkward_maps_have_an_answer():
+    """What a hostile reader found: laps that are brackets alone, an attractor at the seam, a side without cells."""
+    lo, hi = ends(ls.entropy(ls.map(logistic, r=2.0), line()))  # the turning point is the attractor
+    assert (lo, hi < math.log(2.0) + 1e-9) == (0.0, True)
+
+    def near(x, c):
+        return c + 0.1 * np.sin(4.0 * (x - c))
+
+    lo, hi = ends(ls.entropy(ls.map(near, c=0.995), circle()))
+    assert (lo, hi < 1e-8) == (0.0, True)
+    lo, hi = ends(
+        ls.entropy(TwoSides(3.9), ls.grid(Domain([[0.001], [0.001]], [[0.999], [0.999]]), cells=400))
+    )
+    assert lo - 1e-4 < kneading_entropy(3.9) < hi + 1e-4
+
+
+class TwoSides(NamedTuple):
+    r: float
+
+
+def to_side_0(p, x, side):
+    return p.r * x * (1.0 - x), 0, 0
+
+
+ls.register(TwoSides, image=to_side_0)
+
+
+def test_a_map_of_which_numbers_grow_apart():
+    """Components of one growth behind each other: the numbers of the intervals have to stay within bounds."""
+
+    def one(x, a, s):
+        return a * x * x - 0.16993306085344084 * x + 0.3
+
+    def other(x, a, s):
+        return -0.29821512845611764 * x * x + 1.5701069199944482 * x - 0.2
+
+    def change(x, a, s):
+        return x - s
+
+    def at(more):
+        return ls.map(
+            pieces=(one, other), margin=change, a=-2.837198492313565 + more, s=0.14798732939184123 + more
+        )
+
+    proof = ls.entropy(at(0.0), line(-1.5, 1.5, 16), upper=at(1e-9))
+    assert proof.claims[-1].verdict == "proved" or "hexadecimal" not in proof.claims[-1].reason
+    assert "number of an interval" not in proof.claims[-1].reason
+
+
+def test_two_directions_that_stretch_are_said_to_be_more():
+    def both(x, y, r):
+        return r * x * (1.0 - x), r * y * (1.0 - y)
+
+    found = ls.entropy(ls.map(both, r=3.9), ls.grid([(0.001, 0.999), (0.001, 0.999)], cells=16))
+    assert found.entropy.sampled < 2.0 * kneading_entropy(3.9)
+    assert "at most the entropy" in found.claims[-1].reason
+
+
 # ---------------------------------------------------------------- laps
 
 
@@ -235,6 +295,9 @@ def test_cells_become_laps():
     hidden = list(laps_of(0, 0, rows(turn, down), arb))  # a lap may begin and end within the turn
     assert [(lap.outer, lap.inner) for lap in hidden] == [((0, 1), None), ((0, 2), (1, 2))]
     assert [lap.inner for lap in laps_of(0, 0, rows((1, 0, 0)), arb)] == [None]
+    # an undecided cell below one that is decided takes the branch up to the border
+    (whole,) = laps_of(0, 0, rows(up, (1, 0, 0), up, (1, 0, 1), up), arb)
+    assert whole.inner == (0, 5)
 
 
 @pytest.mark.parametrize(
@@ -242,7 +305,7 @@ def test_cells_become_laps():
     [
         ([(1, 0, -1), (0, 0, -1), (-1, 0, -1)], "turns once at most"),
         ([(1, 0, -1), (0, -1, 0)], "a slope whose sign is not proved"),
-        ([(1, 0, -1), (1, 0, 0), (1, 0, -1)], "one interval"),
+        ([(1, 0, -1), (1, 0, 0), (1, 0, 0), (1, 0, 1), (1, 0, -1)], "one interval"),
         ([(1, 0, 0), (1, 0, 1)], "one interval"),
         ([(0, -1, -1), (0, 1, -1)], "turns once at most"),
     ],

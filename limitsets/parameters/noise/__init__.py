@@ -12,11 +12,13 @@ from limitsets.parameters.noise.absorbing import absorption, classes
 from limitsets.parameters.noise.statistics import NoiseStatistics, noise_levels, noise_statistics
 from limitsets.parameters.noise.ulam import transfer
 from limitsets.proofs.chances.absorption import AbsorptionBrackets, absorption_brackets
+from limitsets.proofs.chances.long_run import LongRunAverages, long_run_averages
 
 __all__ = [
     "AbsorptionBrackets",
     "Gaussian",
     "Given",
+    "LongRunAverages",
     "Margin",
     "NoiseStatistics",
     "Samples",
@@ -25,6 +27,7 @@ __all__ = [
     "absorption",
     "absorption_brackets",
     "classes",
+    "long_run_averages",
     "margin",
     "noise_levels",
     "noise_statistics",

@@ -1,9 +1,7 @@
-"""Probabilities with proof: brackets of a noisy chain's absorption, by functions affine on cells.
+"""Probabilities with proof: brackets of a noisy chain's absorption, and of its long-run averages.
 
-With (K V)(x) the mean of V after one throw from x, two functions that are continuous and affine on each cell are kept
-on both sides of the true one, V- <= v <= V+, and (K V+)(x) <= V+_new(x) is proved for every place x of every cell, as
-is the reverse.  `averages` holds the cells of these functions and makes that step.  `landings` encloses where throws
-land and flip.  `deficits` holds the laws of the noise and bounds how far a mean lies above its chord; `throws` builds
-the average over the speed.  `chain` joins the averages of one throw and writes the certificate.  `absorption` bounds
-the probabilities.
+Functions that are affine on cells are kept on both sides of the true ones.  What one throw makes of such a function is
+proved by the checker's own code (`limitsets/checker/steps.py`), here and when a certificate is rechecked.  `nodes` and
+`chain` make the cells and the certificate; `absorption` bounds probabilities of ending at places, `forever` those after
+any number of throws, `long_run` averages over ever more throws.
 """

@@ -103,8 +103,8 @@ def chain_of(
         "scene": tidy({word: each for word, each in scene.text.items() if word not in _LEFT_OUT})
         | {"model": {"flight": scene.flight, "flip": scene.flip}},
         "laws": _laws(scatter, scene.unit),
-        "starts": _in_words(starts, scene.unit),
-        "absorbing": {name: _in_words(each, scene.unit) for name, each in absorbing.items()},
+        "starts": in_words(starts, scene.unit),
+        "absorbing": {name: in_words(each, scene.unit) for name, each in absorbing.items()},
         "strata": STRATA,
     }
     with flint.ctx.workprec(PRECISION):
@@ -256,11 +256,16 @@ def write(
     arrays = dict(functions) | {
         f"within.{k}": np.ascontiguousarray(pair.T) for k, pair in enumerate(claimed.values())
     }
-    for side in range(chain.nodes.first.size - 1):
-        arrays[f"edges.{side}"] = chain.nodes.place[chain.nodes.of_side(side)]
+    arrays |= edges_of(chain)
     claims = [{"claim": "probabilities", "section": section}]
     pack(path, section["scene"]["model"], claims, arrays, recheck=recheck)
     return Path(path)
+
+
+def edges_of(chain: Chain) -> dict[str, Array]:
+    """Give the nodes of each side as a certificate has them."""
+    nodes = chain.nodes
+    return {f"edges.{side}": nodes.place[nodes.of_side(side)] for side in range(nodes.first.size - 1)}
 
 
 _LEFT_OUT = ("effects", "model", "cavity", "feedback", "tray")
@@ -286,7 +291,8 @@ def _plain(number: float, places: int = 0) -> str:
     return f"{Decimal(repr(float(number))).scaleb(places):f}"
 
 
-def _in_words(places: Sequence[Place], unit: str) -> list[list[Any]]:
+def in_words(places: Sequence[Place], unit: str) -> list[list[Any]]:
+    """Write places as a certificate has them."""
     return [
         [side, f"{_plain(lo)} {unit}", f"{_plain(hi)} {unit}" if math.isfinite(hi) else None]
         for side, lo, hi in places

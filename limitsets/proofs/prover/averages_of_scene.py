@@ -141,8 +141,10 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
     places = {side: (float(box.lo.a[side]), scene.arm_length) for side in rests}
     asked = asked_for(words, Subject(Nothing(), places, functools.partial(_length, scene), sides or rests))
     if reason := unfit(scene, attractors, "averages"):
-        by = "analyse" if box.effects else "noise_statistics" if scattered(scene) else ""
-        return left(f"{reason}; limitsets.{by} samples them" if by else reason)
+        instead = "limitsets.robust.long_run_averages proves flips and shares of sides where laws are uniform"
+        if box.effects:
+            instead = "limitsets.analyse samples them"
+        return left(reason if no_cells(attractors.component) else f"{reason}; {instead}")
     ladder, reason = (cells,) if cells else CELLS, NO_WEIGHTS
     for step, count in enumerate(ladder):
         tell(f"{count} cells", step, len(ladder))

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 # Intervals at first and at most, and between which ends they are enough.
 FIRST, MOST, CLOSE = 250, 4000, 1e-8
+# The largest eigenvalue is exceeded by the least of these shares with which numbers stay within a ratio.
+SHARES, MOST_RATIO = (1e-10, 1e-8, 1e-6, 1e-4, 1e-2), 2.0**150
 # By how much an inequality is asked to hold more than floats give, and a logarithm is off at most.
 ROOM = 2.0**-36
 
@@ -56,7 +58,7 @@ class Entropy:
     def table(self) -> Table:
         """Show both ends and the sampled number."""
         heads = [Column(word, show=".12g") for word in ("lo", "hi", "sampled")]
-        said = "growth of the words of laps in the attracting cells; "
+        said = "growth of the words of laps in the attracting cells alone; "
         said += "proved: between lo and hi" if self.arrays else "nothing is proved"
         ends = outward(self.lo, self.hi) if self.arrays else (None, None)
         rows = [(*ends, None if math.isnan(self.sampled) else self.sampled)]
@@ -134,16 +136,21 @@ def met_intervals(laps: list[Lap], runs: Runs, most: int) -> Array:
         return numbers, hi[numbers] - lo[numbers]
 
     matrix = _matrix(intervals, images, fitting)
-    factor = math.exp(perron(matrix)[0]) * (1.0 + 1e-10)
-    # (factor - matrix) x = 1 has x > 0, hence matrix x < factor x
-    shifted = sparse.identity(len(intervals), format="csc") * factor - matrix.tocsc()
-    x = spsolve(shifted, np.ones(len(intervals)))
-    return np.column_stack([side, lo, hi, x / x.max()])
+    for share in SHARES:
+        # (factor - matrix) x = 1 has x > 0, hence matrix x < factor x
+        factor = math.exp(perron(matrix)[0]) * (1.0 + share)
+        shifted = sparse.identity(len(intervals), format="csc") * factor - matrix.tocsc()
+        x = spsolve(shifted, np.ones(len(intervals)))
+        if np.isfinite(x).all() and x.min() > x.max() / MOST_RATIO > 0.0:
+            return np.column_stack([side, lo, hi, x / x.max()])
+    return np.zeros((0, 4))
 
 
 def covered_intervals(laps: list[Lap], most: int) -> Array:
     """Find intervals for the lower end: rows as the file has them; none where their words do not grow."""
     starts = [(lap.side, *lap.inner) for lap in laps if lap.inner is not None]
+    if not starts:
+        return np.zeros((0, 4))
 
     def image(lap: Lap, lo: float, hi: float) -> Pair | None:
         ends = lap.inward(lo, hi)
@@ -163,16 +170,19 @@ def covered_intervals(laps: list[Lap], most: int) -> Array:
 
 def found(laps: list[Lap], runs: Runs, tell: Progress = silent) -> tuple[dict[str, str], Arrays]:
     """Find the claim: its section and arrays, with ever more intervals until both ends are near."""
-    from limitsets.checker.entropy import covered_sums, met_sums
+    from limitsets.checker.balls import prove
+    from limitsets.checker.entropy import covered_sums, met_sums, require_few
 
+    require_few(laps)
     most, lower, upper = FIRST, 1.0, math.inf
     covered, met = np.zeros((0, 4)), np.zeros((0, 4))
     while most <= MOST:
         tell(f"{most} intervals", int(math.log2(most / FIRST)), 1 + int(math.log2(MOST / FIRST)))
         rows = met_intervals(laps, runs, most)
-        factor = float((met_sums(laps, runs, rows) / rows[:, 3]).max()) * (1.0 + ROOM)
-        if factor < upper:
-            met, upper = rows, max(factor, 1.0)
+        if len(rows):
+            factor = float((met_sums(laps, runs, rows) / rows[:, 3]).max()) * (1.0 + ROOM)
+            if factor < upper:
+                met, upper = rows, max(factor, 1.0)
         rows = covered_intervals(laps, most)
         if len(rows):
             factor = float((covered_sums(laps, rows) / rows[:, 3]).min()) * (1.0 - ROOM)
@@ -181,4 +191,5 @@ def found(laps: list[Lap], runs: Runs, tell: Progress = silent) -> tuple[dict[st
         if math.log(upper / lower) < CLOSE:
             break
         most *= 2
+    prove(math.isfinite(upper), "no intervals were found for the upper end")
     return {"lower": lower.hex(), "upper": upper.hex()}, {"entropy.covered": covered, "entropy.met": met}

@@ -114,11 +114,11 @@ def _of_map(map: Any, grid: Grid, upper: Any, tell: Progress) -> ProofOfMap:  # 
     corners = coerce(map), coerce(map if upper is None else upper)
     if grid.dimension > 1:
         proof = certify_map(map, grid, ["invariant"], upper=upper, progress=tell)
-        why = "it is proved of a line alone; the sampled number is the growth of a curve"
+        why = "it is proved of a line alone; sampled is the growth of a curve, at most the entropy"
         return _left(proof, growth_of_curve(corners[0], grid.domain), why)
     cut = cut_at_changes(*corners, grid, turns=True)
     proof = certify_map(map, cut, ["invariant"], upper=upper, progress=tell)
-    if not len(proof.cells):
+    if not (proof.arrays["component"] >= 0).any():
         why = "there are no attracting cells: images may leave the domain; widen it, or close it (periodic)"
         return replace(proof, claims=(undecided("entropy", why),))
     return _with_entropy(proof, _sampled(corners[0], proof.cells), tell)
@@ -146,13 +146,14 @@ def entropy(
 
     A lap is an interval on which one branch is taken, and the map rises or falls; the entropy is the growth per step
     of the number of words of laps that intervals of starts follow.  For a continuous map this is the topological
-    entropy.
+    entropy.  Chaos beside the attracting cells, as in a window of periods, does not count.
 
     Parameters
     ----------
     map : Scene, str, Path or NamedTuple
         A scene, what `limitsets.load` takes; or a map, or the lower corner of a box of its parameters.  Of a map of
-        more coordinates nothing is proved: the sampled number is the growth of the length of a curve.
+        more coordinates nothing is proved: the sampled number is the growth of the length of a curve, which is at most
+        the entropy, and less where areas grow.
     grid : Grid
         Of a map alone: the cells on which attracting cells and laps are found.
     upper : NamedTuple, optional

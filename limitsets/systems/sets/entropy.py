@@ -5,9 +5,9 @@ of paths is the topological entropy; a diagram cut off after n images is off by 
 Source: Hofbauer, "On intrinsic ergodicity of piecewise monotonic transformations with positive entropy", Israel J.
 Math. 34, 1979; Milnor and Thurston, "On iterated maps of the interval", 1988.
 
-The length of a curve grows as exp(n entropy) at most where the map is infinitely often differentiable, and for some
-curves so: Yomdin, "Volume growth and entropy", Israel J. Math. 57, 1987; Newhouse, "Entropy and volume", Ergodic Theory
-and Dynamical Systems 8, 1988.
+The length of a curve grows as exp(n entropy) at most where the map is infinitely often differentiable, and in the plane
+for some curves so where the map is one to one: Yomdin, "Volume growth and entropy", Israel J. Math. 57, 1987; Newhouse,
+"Entropy and volume", Ergodic Theory and Dynamical Systems 8, 1988.  Where areas grow the entropy is larger.
 """
 
 from __future__ import annotations

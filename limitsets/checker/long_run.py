@@ -1,0 +1,184 @@
+"""The claim `long-run`: averages of a noisy chain over ever more throws, from every start in some places.
+
+docs/certificates.md, "Long-run averages".  Noise is bounded.  N are cells from which no throw leads to others, K V(x)
+the mean of V after a throw from x, g(x) the mean of what a throw from x counts.  The file has a function u, affine
+between neighbouring nodes, and c, and checked is at every node of N, on the cells at both sides,
+
+    g + K u - u <= c,
+
+by the same step as for probabilities (`steps`), which bounds K u from above by what is affine on each cell too.  Then
+along an orbit X_0, X_1, .. what is counted up to the n-th throw is at most n c + u(X_0) - u(X_n) and a sum of
+differences of a martingale, each bounded: divided by n these tend to 0 almost surely (strong law of large numbers for
+martingales).  So from every start in N, almost surely, the upper limit of the average is at most c; and so is the mean
+of g over every stationary law on N (integrate).  For the lower end -g is counted, with a function of its own.
+
+Flips lead from each side to the next, around the part: those from the last side to side 0, counted once for each side,
+are all flips up to a constant.  A flip from the last side counts where it lands: K(u + count) on that side.
+"""
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .balls import Array, Pair, prove
+from .brackets import Setting, chain_on, places_in_words, read_setting, require_edges
+from .cells import Progress
+from .file import Arrays, hex_float, read_side, require, rounded, rows, section_alone, table
+from .means import Mesh
+from .steps import Chain
+
+FLIPS, SIDE = "flips", "side"
+
+
+class Counted(NamedTuple):
+    """What is averaged: flips, or throws from a side; between which numbers; functions u of both ends."""
+
+    side: int | None
+    bounds: Pair
+    functions: tuple[Array, Array]
+
+
+class LongRun(NamedTuple):
+    """What is claimed: read, and not yet believed."""
+
+    setting: Setting
+    edges: list[Array]
+    counted: list[Counted]
+
+    @property
+    def raw(self) -> dict[str, Any]:
+        """The scene as the file has it."""
+        return self.setting.scene.raw
+
+
+def read_long_run(header: dict[str, Any], entries: dict[str, memoryview]) -> LongRun:
+    """Read a file; raises BadFileError."""
+    nothing = "a file of long-run averages has no boxes, no other noise and no tolerance"
+    keys = "scene laws starts absorbing strata averages"
+    section = section_alone(header, "long-run", "long-run averages", keys, nothing)
+    setting = read_setting(section)
+    sides = len(setting.scene.sides)
+    arrays = Arrays(header["arrays"], entries)
+    edges = [arrays.read(f"edges.{i}", "<f8") for i in range(sides)]
+    require_edges(edges, setting)
+    counted = []
+    for k, one in enumerate(rows(section["averages"], "averages", 1, 100)):
+        known = table(one, "an average", "of lower upper")
+        side = None if known["of"] == FLIPS else read_side(table(known["of"], "of", SIDE)[SIDE], sides)
+        lo, hi = (hex_float(known[key], f"average {k}: {key}") for key in ("lower", "upper"))
+        require(lo <= hi, f"average {k}: the ends do not ascend")
+        pair = arrays.read(f"{k}.lower", "<f8"), arrays.read(f"{k}.upper", "<f8")
+        alike = all(len(u) == sum(len(each) + 2 for each in edges) for u in pair)
+        require(alike, "a function has not one number for each node")
+        counted.append(Counted(side, (lo, hi), pair))
+    arrays.require_no_others()
+    return LongRun(setting, edges, counted)
+
+
+def long_run_in_words(c: LongRun) -> list[str]:
+    """Put the claim in words, from the numbers that were checked."""
+    starts = places_in_words(c.setting.starts, c.setting.scene.unit)
+    lines = [
+        "long-run: averages over n throws, as n grows, from every start below almost surely; and every stationary law",
+        "    all deviations are independent of each other",
+        f"    starts, in cells that no throw leaves: {starts}",
+    ]
+    for one in c.counted:
+        what = "flips per throw" if one.side is None else f"share of throws from side {one.side}"
+        ends = rounded(one.bounds[0], up=False), rounded(one.bounds[1], up=True)
+        lines.append(f"    {what}: between {ends[0]} and {ends[1]}")
+    return lines
+
+
+# ----------------------------------------------------------------
+# The cells that no throw leaves.
+
+
+def kept_cells(c: Setting, chain: Chain) -> Array:
+    """Mark the most cells, by their left nodes, from which no throw leads to others."""
+    mesh, goal, live = chain.mesh, chain.goal, chain.cells.at
+    kept, alone = np.zeros(len(mesh.place), dtype=bool), np.ones(len(mesh.place), dtype=bool)
+    alone[np.concatenate([chain.hard.at, chain.hard.at + 1])] = False
+    kept[live] = alone[live] & alone[live + 1]
+    reach, met = float(np.nextafter(float(c.noisy.landing.reach), np.inf)), []
+    for span in (chain.cells.one, chain.cells.two):
+        side = np.searchsorted(goal.first, span.first, side="right") - 1
+        met.append(mesh.within(side, goal.place[span.first] - reach, goal.place[span.last + 1] + reach))
+    while True:
+        outside = np.concatenate([[0], np.cumsum(~kept)])
+        stays = np.ones(len(live), dtype=bool)
+        for ranges in met:
+            stays &= outside[ranges.last + 1] == outside[ranges.first]
+        left = live[~stays & kept[live]]
+        if not len(left):
+            return kept
+        kept[left] = False
+
+
+def check_starts(c: Setting, mesh: Mesh, kept: Array) -> None:
+    """Check that cells that throws do not leave hold all starts."""
+    for side, lo, hi in c.starts:
+        for cell in range(int(mesh.first[side]), int(mesh.first[side + 1]) - 1):
+            a, b = Fraction(float(mesh.place[cell])), Fraction(float(mesh.place[cell + 1]))
+            where = f"side {side}, x in [{float(a)!r}, {float(b)!r}]: "
+            prove(
+                bool(kept[cell]) or not (a < hi and lo < b), f"{where}that no throw leads out is not proved"
+            )
+
+
+# ----------------------------------------------------------------
+# The inequality.
+
+
+def most_gain(
+    chain: Chain, kept: Array, side: int | None, sign: float
+) -> Callable[[Array], tuple[Array, Array]]:
+    """Give a function that bounds sign g + K u at the nodes of the cells that are kept; and lists these nodes."""
+    mesh = chain.mesh
+    sides = len(mesh.first) - 1
+    own = np.searchsorted(mesh.first, np.arange(len(mesh.place)), side="right") - 1
+    nodes = np.unique(np.concatenate([np.flatnonzero(kept), np.flatnonzero(kept) + 1]))
+    free = np.full(len(mesh.place), -np.inf)
+
+    def gain(u: Array) -> tuple[Array, Array]:
+        above = chain.above(u, free)
+        if side is not None:
+            return nodes, (above + sign * (own == side))[nodes]
+        flipped = chain.above(u + sign * sides * (own == 0), free)
+        return nodes, np.where(own == sides - 1, flipped, above)[nodes]
+
+    return gain
+
+
+def check_long_run(c: LongRun, progress: Progress) -> None:
+    """Check everything that is claimed."""
+    work, done = sum(len(each) for each in c.edges), 0
+
+    def advance(more: int) -> None:
+        nonlocal done
+        done = min(done + more, work - 1)
+        if progress is not None:
+            progress(done, work)
+
+    chain, _ = chain_on(c.setting, c.edges, advance)
+    prove(
+        chain.beyond == 0.0 and bool(c.setting.noisy.landing.beyond == 0),
+        "noise without a bound may lead out",
+    )
+    kept = kept_cells(c.setting, chain)
+    check_starts(c.setting, chain.mesh, kept)
+    for k, one in enumerate(c.counted):
+        for sign, u, bound in (
+            (-1.0, one.functions[0], -one.bounds[0]),
+            (1.0, one.functions[1], one.bounds[1]),
+        ):
+            prove(bool(np.isfinite(u).all()), f"average {k}: a function is not finite")
+            nodes, gained = most_gain(chain, kept, one.side, sign)(u)
+            excess = float((gained - u[nodes]).max()) + 2.0**-48 * (float(np.abs(u).max()) + 4.0)
+            end = "upper" if sign > 0 else "lower"
+            only = f"only {rounded(sign * excess, up=sign > 0)} is proved"
+            prove(excess <= bound, f"average {k}: the {end} end is {sign * bound!r}: {only}")
+    if progress is not None:
+        progress(work, work)

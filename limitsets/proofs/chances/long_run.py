@@ -1,0 +1,317 @@
+"""Averages of a scene over ever more throws that scatter: between which numbers they lie from every start, proved.
+
+The checker proves one inequality for each number (`limitsets/checker/long_run.py`); how its function is found does not
+matter: u gains what one throw counts, less a constant, until it stays (relative value iteration; Puterman, "Markov
+Decision Processes", 1994, section 8.5).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Progress,
+    Table,
+    Tabled,
+    as_table,
+    picked,
+    shown_in_notebooks,
+    silent,
+)
+from limitsets.base.arrays import Array
+from limitsets.feeder.scattering import Scattering, Uniform, scattering_of
+from limitsets.feeder.scene import Scene, load
+from limitsets.numbers.interval import guard
+from limitsets.proofs.chances.chain import Chain, Place, chain_of, edges_of, in_words
+from limitsets.proofs.prover import certify
+from limitsets.proofs.prover.certificate import pack
+
+if TYPE_CHECKING:
+    from limitsets.checker.steps import Chain as Steps
+
+CELLS = 4000
+# Attracting cells are looked for with landings that scatter by these shares of the arm more, in turn.
+ROOM = (2.0**-8, 2.0**-10, 0.0)
+# Beyond the starts cells go on by this share of the arm, so that no throw leads out of all of them.
+BESIDE = 2.0**-13
+# Steps at most, and by how much the gain of a throw may still differ between nodes.
+MOST_STEPS, STILL = 3000, 1e-6
+# They end too where so many steps bring the bound nearer by less than this share of that difference.
+PATIENCE, SOON = 100, 1e-3
+# A step goes so far towards what a throw gains, so that nothing swings.
+DAMPED = 0.8
+# A certificate claims bounds that are wider by this, for the roundings of another machine's sums.
+ALLOWANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class LongRunAverages(Tabled):
+    """Proved bounds of averages over ever more throws, from every start in some places, almost surely.
+
+    Attributes
+    ----------
+    scene, unit : str
+        Name of the scene, unit of lengths.
+    scatter : Scattering
+        The laws of what differs at every throw.
+    starts : tuple of (int, float, float)
+        Side, from x, to x: from these no throw leads out [length].
+    numbers : dict of str to (float, float)
+        Between which numbers they lie: "flips_per_throw", "share_of_side_0" and so on, "jogs_per_visit_of_side_0" and
+        so on where flips are proved.
+    chain : Chain
+        The chain on its cells.
+    averages : list of dict
+        As a certificate has them: "of", "lower", "upper".
+    functions : dict of str to ndarray
+        The functions at the nodes that prove them.
+    seconds : float
+        Time it took.
+    how : str
+        "proved".
+    """
+
+    scene: str
+    unit: str
+    scatter: Scattering
+    starts: tuple[Place, ...]
+    numbers: dict[str, tuple[float, float]]
+    chain: Chain
+    averages: list[dict[str, Any]]
+    functions: dict[str, Array]
+    seconds: float
+    how: str = "proved"
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [(name.replace("_", " "), (lo, hi), hi - lo) for name, (lo, hi) in self.numbers.items()]
+        heads = ("average", Column("between", show=".6f", ends=True), Column("width", show=".2g"))
+        said = f"{self.how}: from every start in these places, almost surely, as throws go on for ever"
+        places = [(side, (lo, hi)) for side, lo, hi in self.starts]
+        starts = Table(
+            ("side", Column("x", self.unit, ".6f", ends=True)), places, "Starts", "no throw leads out"
+        )
+        return Table(heads, rows, f"{self.scene}: long-run averages", said), starts
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the bounds as JSON takes them."""
+        return as_table(
+            **picked(self, "scene", "unit", "how", "starts", "seconds"),
+            scatter=self.scatter.words(),
+            cells=self.chain.nodes.place.size - self.chain.nodes.first.size + 1,
+            averages={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.numbers.items()},
+        )
+
+    def save(self, path: str | Path, *, recheck: bool = True) -> Path:
+        """Write the bounds as a certificate, which gets its name once the checker has confirmed it.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, NAME.proof.zip; an older one is replaced whole.
+        recheck : bool
+            Whether to check it first.
+
+        Raises
+        ------
+        DeniedError
+            The checker does not confirm it; the file is kept as NAME.denied.zip.
+        """
+        section = self.chain.section | {"averages": self.averages}
+        claims = [{"claim": "long-run", "section": section}]
+        arrays = self.functions | edges_of(self.chain)
+        pack(path, section["scene"]["model"], claims, arrays, recheck=recheck)
+        return Path(path)
+
+
+@shown_in_notebooks
+def long_run_averages(
+    scene: Scene | str,
+    scatter: Scattering | None = None,
+    *,
+    starts: Sequence[Place] | None = None,
+    cells: int = CELLS,
+    progress: Progress | None = None,
+) -> LongRunAverages:
+    """Prove between which numbers averages over ever more throws lie, from every start, where throws scatter.
+
+    Flips per throw, the share of throws from each side, and jogs per visit of each side.
+
+    Parameters
+    ----------
+    scene : Scene or str
+        A scene in the minimal model, or the name of one.
+    scatter : Scattering, optional
+        Uniform deviations of speed and landing place, independent of each other and of other throws; by default that
+        of the scene.  Without scatter of the landing bounds are wide, since it is what makes functions smooth.
+    starts : sequence of (int, float, float), optional
+        Side, from x, to x: places that no throw leaves; by default the attracting cells that `limitsets.certify` proves
+        under this noise [length].
+    cells : int
+        Cells per side; the bounds narrow with their square.
+    progress : callable, optional
+        Told (stage, done, all).
+
+    Raises
+    ------
+    AnswerError
+        A law or an effect of which nothing is proved, no attracting cells, or starts that throws leave.
+
+    Examples
+    --------
+    >>> from limitsets.robust import Scattering, Uniform, long_run_averages
+    >>> noise = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
+    >>> lo, hi = long_run_averages("paper-designed", noise, cells=500).numbers["flips_per_throw"]
+    >>> lo < 0.3176 < hi < lo + 0.04
+    True
+    """
+    begun, tell = time.perf_counter(), progress or silent
+    guard()
+    read = load(scene)
+    noise = scattering_of(read) if scatter is None else scatter
+    for name, law in (("the speed", noise.speed), ("the landing place", noise.landing)):
+        if not isinstance(law, Uniform | None):
+            raise AnswerError(
+                f"the law of {name}", law, "Uniform", "a law without bound leads everywhere: bound it"
+            )
+    begin = list(_around(read, noise) if starts is None else starts)
+    nodes, total = 0, len(read.sides) * cells
+
+    def told(more: int) -> None:
+        nonlocal nodes
+        nodes += more
+        tell("cells", min(nodes, total), total)
+
+    chain = chain_of(read, noise, begin, {"elsewhere": _elsewhere(read, begin)}, cells, told)
+    from limitsets.checker.balls import UnprovedError, prove
+    from limitsets.checker.brackets import read_setting
+    from limitsets.checker.long_run import FLIPS, SIDE, check_starts, kept_cells
+
+    setting = read_setting(chain.section)
+    kept = kept_cells(setting, chain.steps)
+    if starts is None:
+        begin = _starts_in(read, chain.steps, kept)
+        chain = replace(chain, section=chain.section | {"starts": in_words(begin, read.unit)})
+    try:
+        prove(bool(begin), "from every cell some throw may lead out")
+        check_starts(read_setting(chain.section), chain.steps.mesh, kept)
+    except UnprovedError as error:
+        remedy = f"take more cells, or other starts: {error}"
+        raise AnswerError("the starts", begin, "places that no throw leaves", remedy) from None
+    names = {"flips_per_throw": None} | {f"share_of_side_{k}": k for k in range(len(read.sides))}
+    averages, functions, numbers = (
+        list[dict[str, Any]](),
+        dict[str, Array](),
+        dict[str, tuple[float, float]](),
+    )
+    for number, (name, side) in enumerate(names.items()):
+        ends = []
+        for k, (sign, word) in enumerate(((-1.0, "lower"), (1.0, "upper"))):
+            tell(name, 2 * number + k, 2 * len(names))
+            bound, functions[f"{number}.{word}"] = _settled(chain, kept, side, sign)
+            ends.append(sign * bound + (2 * k - 1) * ALLOWANCE)
+        averages.append(
+            {"of": FLIPS if side is None else {SIDE: side}, "lower": ends[0].hex(), "upper": ends[1].hex()}
+        )
+        numbers[name] = max(ends[0], 0.0), min(ends[1], 1.0)
+    return LongRunAverages(
+        read.name, read.unit, noise, tuple(begin), numbers | _jogs(numbers, len(read.sides)),
+        chain=chain, averages=averages, functions=functions, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def _around(scene: Scene, noise: Scattering) -> list[Place]:
+    """Find the attracting cells under noise, if possible with landings that scatter by more, so that there is room."""
+    laws_of = ("speed", noise.speed), ("landing", noise.landing)
+    bound = {name: law.bound for name, law in laws_of if isinstance(law, Uniform)}
+    reason = ""
+    for share in ROOM:
+        more = bound.get("landing", 0.0) + share * scene.arm_length
+        laws = {"landing.x": f"{more!r} {scene.unit}"} if more > 0.0 else {}
+        if bound.get("speed", 0.0) > 0.0:
+            laws["throw.speed"] = f"{100.0 * bound['speed']!r} %"
+        proof = certify(scene, ["invariant"], noise=laws or None)
+        if proof.proved:
+            return [(side, lo, hi) for side, bands in proof.outer_extents().items() for lo, hi in bands]
+        reason = proof.claims[0].reason
+    raise AnswerError("the noise", noise.words(), "such that some cells attract", f"lower it: {reason}")
+
+
+def _starts_in(scene: Scene, steps: Steps, kept: Array) -> list[Place]:
+    """List the places of cells, rounded inward; none where there are none."""
+    digit, places = 10.0 ** (math.floor(math.log10(scene.arm_length)) - 7), list[Place]()
+    for side, (first, end) in enumerate(itertools.pairwise(steps.mesh.first.tolist())):
+        borders = first + np.flatnonzero(np.diff(kept[first:end].astype(np.int8), prepend=0, append=0))
+        for lo, hi in steps.mesh.place[borders].reshape(-1, 2).tolist():
+            lo, hi = math.ceil(lo / digit) * digit, math.floor(hi / digit) * digit
+            if lo < hi:
+                places.append((side, round(lo, 12), round(hi, 12)))
+    return places
+
+
+def _elsewhere(scene: Scene, starts: Sequence[Place]) -> list[Place]:
+    """List the places that are not near the starts."""
+    gap, places = BESIDE * scene.arm_length, list[Place]()
+    for side, a in enumerate(scene.sides.a.tolist()):
+        begin = a + gap
+        for _, lo, hi in sorted(place for place in starts if place[0] == side):
+            if begin < lo - gap:
+                places.append((side, begin, lo - gap))
+            begin = max(begin, hi + gap)
+        if begin < scene.arm_length:
+            places.append((side, begin, math.inf))
+    return places
+
+
+def _settled(chain: Chain, kept: Array, side: int | None, sign: float) -> tuple[float, Array]:
+    """Find a function that gains about as much everywhere; with the most that it gains."""
+    from limitsets.checker.long_run import most_gain
+
+    gain, place = most_gain(chain.steps, kept, side, sign), chain.steps.mesh.place
+    u = np.zeros(place.size)
+    nodes, gained = gain(u)
+    own = np.searchsorted(chain.steps.mesh.first, np.arange(place.size), side="right")
+    # beyond the cells u goes on as at the nearest of their nodes; on sides without cells it is 0
+    near = np.arange(place.size)
+    for number in np.unique(own[nodes]):
+        mine, some = np.flatnonzero(own == number), nodes[own[nodes] == number]
+        near[mine] = some[np.abs(place[mine, None] - place[some]).argmin(axis=1)] if some.size else mine
+    best, every = (math.inf, u), list[float]()
+    for _ in range(MOST_STEPS):
+        more = gained - u[nodes]
+        lowest, highest = float(more.min()), float(more.max())
+        best = min(best, (highest, u), key=lambda each: each[0])
+        every.append(best[0])
+        before = every[-PATIENCE] if len(every) > PATIENCE else math.inf
+        if highest - lowest < STILL or before - best[0] < SOON * (highest - lowest):
+            break
+        u = u.copy()
+        u[nodes] += DAMPED * (more - 0.5 * (lowest + highest))
+        u = u[near]
+        nodes, gained = gain(u)
+    return best
+
+
+def _jogs(numbers: Mapping[str, tuple[float, float]], sides: int) -> dict[str, tuple[float, float]]:
+    """Bound the jogs of a visit: the throws from the side by the flips from there, which are as many on each side."""
+    few, many = (flips / sides for flips in numbers["flips_per_throw"])
+    if not few > 0.0:
+        return {}
+    shares = [numbers[f"share_of_side_{k}"] for k in range(sides)]
+    return {
+        f"jogs_per_visit_of_side_{k}": (
+            max(lo / many * (1.0 - 1e-15) - 1.0, 0.0),
+            hi / few * (1.0 + 1e-15) - 1.0,
+        )
+        for k, (lo, hi) in enumerate(shares)
+    }

@@ -1,0 +1,272 @@
+"""Averages over ever more throws that scatter: against throws in floats, chains in rationals, and forged files."""
+
+import math
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+from limitsets.robust import Gaussian, Scattering, Uniform, long_run_averages
+
+import limitsets as ls
+from limitsets.base.errors import AnswerError
+from limitsets.checker.long_run import kept_cells, most_gain
+from limitsets.checker.means import Mesh
+from tests.proofs.forge import Plain, opened, scene
+
+NOISE = Scattering(speed=Uniform(0.003), landing=Uniform(0.02))
+
+
+@pytest.fixture(scope="module")
+def designed():
+    return long_run_averages("paper-designed", NOISE, cells=500)
+
+
+@pytest.fixture(scope="module")
+def honest(designed, tmp_path_factory):
+    return designed.save(tmp_path_factory.mktemp("long-run") / "designed.proof.zip")
+
+
+def thrown(model, speed, landing, parts=20_000, throws=400, seed=1):
+    """Flips per throw and shares of the sides, of throws in plain floats, from one part at 10 in on side 2 each."""
+    rng, m = np.random.default_rng(seed), Plain(scene(model))
+    x, side = np.full(parts, 10.0), np.full(parts, 2)
+    flips, shares, counted = 0, np.zeros(3), 0
+    for n in range(throws):
+        kappa = m.kappa / (1.0 + speed * rng.uniform(-1.0, 1.0, parts)) ** 2
+        after, to = np.empty(parts), side.copy()
+        for i in range(3):
+            own = side == i
+            turns = m.decision(i, x[own], kappa[own]) > 0.0
+            after[own] = np.where(turns, m.flip(i, x[own], kappa[own]), m.jog(i, x[own], kappa[own]))
+            to[own] = np.where(turns, (i + 1) % 3, i)
+        if n >= 100:  # none of which remembers where it began
+            flips, counted = flips + int((to != side).sum()), counted + parts
+            shares += np.bincount(side, minlength=3)
+        x, side = after + landing * rng.uniform(-1.0, 1.0, parts), to
+    return flips / counted, shares / counted
+
+
+def test_throws_lie_between_the_bounds(designed):
+    flips, shares = thrown("designed", 0.003, 0.02)
+    error = 5.0 / math.sqrt(20_000 * 300)  # of counts that depend on each other little
+    sampled = {"flips_per_throw": flips} | {
+        f"share_of_side_{k}": share for k, share in enumerate(shares.tolist())
+    }
+    sampled["jogs_per_visit_of_side_2"] = 3.0 * shares[2] / flips - 1.0
+    for name, number in sampled.items():
+        lo, hi = designed.numbers[name]
+        room = error * (100.0 if name.startswith("jogs") else 1.0)
+        assert lo - room < number < hi + room, name
+        assert hi - lo < (0.06 if name == "flips_per_throw" else 0.04 if name.startswith("share") else 2.0)
+
+
+def test_more_cells_bring_the_bounds_nearer(designed):
+    finer = long_run_averages("paper-designed", NOISE, cells=1000).numbers
+    for name, (lo, hi) in designed.numbers.items():
+        least, most = finer[name]
+        assert lo - 1e-9 <= least <= most <= hi + 1e-9, name
+    wide, narrow = (
+        pair[1] - pair[0] for pair in (designed.numbers["flips_per_throw"], finer["flips_per_throw"])
+    )
+    assert narrow < wide / 3.0  # second order
+
+
+def test_a_recheck_says_what_is_proved(designed, honest):
+    report = ls.recheck(honest)
+    assert report.verdict == "proved"
+    text = "\n".join(report.statement)
+    assert "from every start below almost surely" in text
+    printed = re.search(r"flips per throw: between (\S+) and (\S+)", text)
+    assert [float(each) for each in printed.groups()] == pytest.approx(
+        designed.numbers["flips_per_throw"], abs=2e-9
+    )
+
+
+def test_landing_noise_alone_and_speed_alone():
+    """Without noise 0.3192 (docs/averages.md); either noise moves flips by less than the width."""
+    for noise, width in ((Scattering(landing=Uniform(0.05)), 0.02), (Scattering(speed=Uniform(0.003)), 1.0)):
+        lo, hi = long_run_averages("paper-designed", noise, cells=400).numbers["flips_per_throw"]
+        assert lo < 0.3185 < hi < lo + width
+
+
+def test_what_has_none_is_refused():
+    with pytest.raises(AnswerError, match="a law without bound"):
+        long_run_averages("paper-designed", Scattering(landing=Gaussian(0.02)), cells=300)
+    with pytest.raises(AnswerError, match="some cells attract"):
+        long_run_averages("paper-designed", Scattering(speed=Uniform(0.2)), cells=300)
+    with pytest.raises(AnswerError, match="places that no throw leaves"):
+        long_run_averages("paper-designed", NOISE, starts=[(2, 10.0, 12.0)], cells=300)
+
+
+# ---------------------------------------------------------------- chains of states
+
+
+class States:
+    """A chain of some states, one a side: cells whose means are those of rows of probabilities."""
+
+    def __init__(self, rows):
+        self.rows, n = np.array(rows, dtype=float), len(rows)
+        place = np.concatenate([[-9.0, 0.0, 1.0, 9.0] for _ in range(n)])
+        self.mesh = Mesh(place, 4 * np.arange(n + 1))
+        self.kept = np.zeros(4 * n, dtype=bool)
+        self.kept[1::4] = True
+
+    def above(self, values, fixed, more=0.0):
+        bounds = fixed.copy()
+        mean = self.rows @ values[1::4] + 2.0**-50 * np.abs(values).max() + more
+        bounds[1::4] = bounds[2::4] = mean
+        return bounds
+
+
+def stationary(rows):
+    n = len(rows)
+    equations = np.vstack([np.array(rows).T - np.eye(n), np.ones(n)])
+    return np.linalg.lstsq(equations, np.concatenate([np.zeros(n), [1.0]]), rcond=None)[0]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_functions_bound_random_chains_as_their_stationary_laws_do(seed):
+    """States in a ring, each going on to the next or staying: flips and shares by the law, bounds on its side alone."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 7))
+    on = rng.uniform(0.05, 1.0, n)
+    rows = [[(1.0 - on[i]) * (j == i) + on[i] * (j == (i + 1) % n) for j in range(n)] for i in range(n)]
+    chain, law = States(rows), stationary(rows)
+    for side, exact in [(None, float(law @ on)), *((k, float(law[k])) for k in range(n))]:
+        for sign in (-1.0, 1.0):
+            gain = most_gain(chain, chain.kept, side, sign)
+            # u of the exact solution of g + K u - u = c
+            nodes, g = gain(np.zeros(4 * n))
+            states = np.linalg.lstsq(np.array(rows) - np.eye(n), sign * exact - g[::2], rcond=None)[0]
+            u = np.repeat(states, 4)
+            _, gained = gain(u)
+            assert float((gained - u[nodes]).max()) == pytest.approx(sign * exact, abs=1e-9)
+            worse = u + np.repeat(rng.uniform(0.01, 0.1, n) * (np.arange(n) == rng.integers(n)), 4)
+            _, gained = gain(worse)
+            assert float((gained - worse[nodes]).max()) > sign * exact
+
+
+def test_cells_that_throws_leave_are_not_kept():
+    """Cells 1 to 6 of one side; cell 3 leads to cell 6, which is hard, and cell 2 to cell 3."""
+    mesh = Mesh(np.array([-99.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 99.0]), np.array([0, 9]))
+    live = np.array([1, 2, 3, 4, 5])
+    to = {1: (1, 1), 2: (3, 3), 3: (5, 6), 4: (4, 4), 5: (4, 5)}
+    span = SimpleNamespace(first=np.array([to[k][0] for k in live]), last=np.array([to[k][1] for k in live]))
+    inner = SimpleNamespace(at=live, one=span, two=span)
+    chain = SimpleNamespace(mesh=mesh, goal=mesh, cells=inner, hard=SimpleNamespace(at=np.array([6])))
+
+    def kept(reach):
+        law = SimpleNamespace(landing=SimpleNamespace(reach=reach))
+        return np.flatnonzero(kept_cells(SimpleNamespace(noisy=law), chain)).tolist()
+
+    # each image meets its neighbours too, for roundings at its ends: 5 is beside the hard cell
+    assert kept(0.0) == []
+    to |= {1: (2, 2), 2: (2, 2), 4: (2, 2)}
+    span.first, span.last = (np.array([to[k][i] for k in live]) for i in (0, 1))
+    assert kept(0.0) == []  # 2 and its neighbours, of which 3 leads out
+    to |= {3: (2, 2)}
+    span.first, span.last = (np.array([to[k][i] for k in live]) for i in (0, 1))
+    assert kept(0.0) == [1, 2, 3, 4]
+    assert kept(0.5) == [1, 2, 3, 4]
+    assert kept(1.5) == []
+
+
+# ---------------------------------------------------------------- forged
+
+
+def section(f):
+    return f.header["claims"][0]["section"]
+
+
+def narrower(k, key, by):
+    def change(f):
+        one = section(f)["averages"][k]
+        lo, hi = (float.fromhex(one[end]) for end in ("lower", "upper"))
+        one[key] = (float.fromhex(one[key]) + by * (hi - lo)).hex()
+
+    return change
+
+
+def with_functions(k, change):
+    def forged(f):
+        for word in ("lower", "upper"):
+            f.arrays[f"{k}.{word}"] = np.ascontiguousarray(change(f.arrays[f"{k}.{word}"]))
+
+    return forged
+
+
+def exchanged(f):
+    one, other = section(f)["averages"][1], section(f)["averages"][3]
+    one["of"], other["of"] = other["of"], one["of"]
+
+
+FORGED = {
+    "a narrower upper end": (narrower(0, "upper", -0.1), "the upper end"),
+    "a narrower lower end": (narrower(1, "lower", 0.1), "the lower end"),
+    "no function": (with_functions(0, lambda u: 0.0 * u), "is proved"),
+    "another function": (with_functions(2, lambda u: -u), "is proved"),
+    "another side": (exchanged, "is proved"),
+    "starts farther out": (lambda f: section(f).update(starts=[[2, "6 in", "20 in"]]), "no throw leads out"),
+    "starts on other places": (
+        lambda f: section(f).update(starts=[[0, "10 in", "11 in"]]),
+        "no throw leads out",
+    ),
+    "a normal law": (
+        lambda f: section(f)["laws"].update({"landing.x": {"gaussian": "0.003 in"}}),
+        "without a bound",
+    ),
+    "more noise": (
+        lambda f: section(f)["laws"].update({"landing.x": {"uniform": "0.4 in"}}),
+        "is not proved",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_a_forged_average_is_denied(name, honest, tmp_path):
+    forged = opened(honest)
+    change, why = FORGED[name]
+    change(forged)
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    assert (report.verdict, why in report.reason) == ("failed", True), report.reason
+
+
+BAD = {
+    "ends exchanged": lambda f: section(f)["averages"][0].update(lower=(2.0).hex()),
+    "another word": lambda f: section(f)["averages"][0].update(of="jogs"),
+    "another side": lambda f: section(f)["averages"][1].update(of={"side": 3}),
+    "a key too many": lambda f: section(f)["averages"][1].update(more=1),
+    "too few numbers": with_functions(0, lambda u: u[1:]),
+    "none": lambda f: section(f).update(averages=[]),
+    "a function that is not finite": with_functions(0, lambda u: u * np.inf),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_file_that_is_none_is_told(name, honest, tmp_path):
+    forged = opened(honest)
+    BAD[name](forged)
+    assert ls.recheck(forged.seal().write(tmp_path / "bad.zip")).verdict == "bad file"
+
+
+def test_another_function_that_holds_is_as_good(honest, tmp_path):
+    forged = opened(honest)
+    with_functions(0, lambda u: u + 5.0)(forged)
+    narrower(0, "upper", 0.1)(forged)
+    assert ls.recheck(forged.seal().write(tmp_path / "other.zip")).verdict == "proved"
+
+
+def test_without_a_function_flips_are_at_most_what_one_counts(designed):
+    """u = 0: a flip from the last side counts 3, and none from the others."""
+    from limitsets.checker.brackets import read_setting
+
+    steps = designed.chain.steps
+    kept = kept_cells(read_setting(designed.chain.section), steps)
+    nodes, gained = most_gain(steps, kept, None, 1.0)(np.zeros(kept.size))
+    last = nodes >= steps.mesh.first[2]
+    assert 0.0 <= gained[~last].max() < 1e-9
+    assert 3.0 <= gained[last].max() < 3.1
