@@ -117,7 +117,7 @@ def kept_cells(c: Setting, chain: Chain) -> Array:
         kept[left] = False
 
 
-def check_starts(c: Setting, mesh: Mesh, kept: Array) -> None:
+def check_starts_stay(c: Setting, mesh: Mesh, kept: Array) -> None:
     """Check that cells that throws do not leave hold all starts."""
     for side, lo, hi in c.starts:
         for cell in range(int(mesh.first[side]), int(mesh.first[side + 1]) - 1):
@@ -168,7 +168,7 @@ def check_long_run(c: LongRun, progress: Progress) -> None:
         "noise without a bound may lead out",
     )
     kept = kept_cells(c.setting, chain)
-    check_starts(c.setting, chain.mesh, kept)
+    check_starts_stay(c.setting, chain.mesh, kept)
     for k, one in enumerate(c.counted):
         for sign, u, bound in (
             (-1.0, one.functions[0], -one.bounds[0]),

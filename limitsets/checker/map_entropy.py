@@ -18,7 +18,7 @@ from .map_average import way_of
 from .map_cells import MapCells
 from .program import Program
 
-MOST_TURNS = 10**6
+MOST_ROUNDS = 10**6
 
 
 def check_map_entropy(the_map: Map, c: MapCells, claim: Entropy) -> None:
@@ -86,8 +86,8 @@ def turns_of(row: Row, images: list[Arb], axis: tuple[Arb, Arb]) -> list[tuple[i
         row.sign != 0,
         f"cell {row.cell}: the axis closes, and where the slope may be 0 no laps are known then",
     )
-    near = all(abs(image) < MOST_TURNS * period for image in images)
-    prove(near, f"cell {row.cell}: an image is not bounded by {MOST_TURNS} turns of the axis")
+    near = all(abs(image) < MOST_ROUNDS * period for image in images)
+    prove(near, f"cell {row.cell}: an image is not bounded by {MOST_ROUNDS} turns of the axis")
     low, high = images if row.sign > 0 else images[::-1]
     least, most = ((low - first) / period).mid().floor(), ((high - first) / period).mid().ceil() - 1
     least, most = int(float(least)), int(float(most))

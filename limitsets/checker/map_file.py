@@ -159,15 +159,7 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     cells = MapCells(arrays, box["prefix"], shape, **labels) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
     numbers = read_numbers(known, shape, where)
-    for name in {"average", "entropy"} & set(known):
-        require("converges" not in known, f"{where}: {name} does not stand beside converges")
-        require(shape.dimension == 1, f"{where}: {name} is of one axis")
-    average, entropy = None, None
-    if "average" in known:
-        allowed = Allowed(shape.sides, shape.branches, shape.names)
-        average = read_average(known["average"], arrays, box["prefix"], allowed, where)
-    if "entropy" in known:
-        entropy = read_entropy(known["entropy"], arrays, box["prefix"], shape.sides, where)
+    average, entropy = read_on_a_line(known, shape, arrays, box["prefix"], where)
     return Part(
         parameters,
         known,
@@ -181,6 +173,22 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
         average=average,
         entropy=entropy,
     )
+
+
+def read_on_a_line(
+    known: dict[str, Any], shape: Shape, arrays: Arrays, prefix: str, where: str
+) -> tuple[Average | None, Entropy | None]:
+    """Read `average` and `entropy`, None where these are not claimed."""
+    for name in {"average", "entropy"} & set(known):
+        require("converges" not in known, f"{where}: {name} does not stand beside converges")
+        require(shape.dimension == 1, f"{where}: {name} is of one axis")
+    average, entropy = None, None
+    if "average" in known:
+        allowed = Allowed(shape.sides, shape.branches, shape.names)
+        average = read_average(known["average"], arrays, prefix, allowed, where)
+    if "entropy" in known:
+        entropy = read_entropy(known["entropy"], arrays, prefix, shape.sides, where)
+    return average, entropy
 
 
 def read_numbers(known: dict[str, Any], shape: Shape, where: str) -> dict[str, Any]:

@@ -195,7 +195,7 @@ def long_run_averages(
     chain = chain_of(read, noise, begin, {"elsewhere": _elsewhere(read, begin)}, cells, told)
     from limitsets.checker.balls import UnprovedError, prove
     from limitsets.checker.brackets import read_setting
-    from limitsets.checker.long_run import FLIPS, SIDE, check_starts, kept_cells
+    from limitsets.checker.long_run import FLIPS, SIDE, check_starts_stay, kept_cells
 
     setting = read_setting(chain.section)
     kept = kept_cells(setting, chain.steps)
@@ -204,10 +204,12 @@ def long_run_averages(
         chain = replace(chain, section=chain.section | {"starts": in_words(begin, read.unit)})
     try:
         prove(bool(begin), "from every cell some throw may lead out")
-        check_starts(read_setting(chain.section), chain.steps.mesh, kept)
+        check_starts_stay(read_setting(chain.section), chain.steps.mesh, kept)
     except UnprovedError as error:
         remedy = f"take more cells, or other starts: {error}"
-        raise AnswerError("the starts", begin, "places that no throw leaves", remedy) from None
+        raise AnswerError(
+            "the starts", begin or "none found", "places that no throw leaves", remedy
+        ) from None
     names = {"flips_per_throw": None} | {f"share_of_side_{k}": k for k in range(len(read.sides))}
     averages, functions, numbers = (
         list[dict[str, Any]](),

@@ -168,7 +168,7 @@ def covered_intervals(laps: list[Lap], most: int) -> Array:
     return np.column_stack([side, lo, hi, x])[kept] if growth > 0.0 else np.zeros((0, 4))
 
 
-def found(laps: list[Lap], runs: Runs, tell: Progress = silent) -> tuple[dict[str, str], Arrays]:
+def both_ends(laps: list[Lap], runs: Runs, tell: Progress = silent) -> tuple[dict[str, str], Arrays]:
     """Find the claim: its section and arrays, with ever more intervals until both ends are near."""
     from limitsets.checker.balls import prove
     from limitsets.checker.entropy import covered_sums, met_sums, require_few

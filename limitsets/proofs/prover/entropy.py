@@ -17,7 +17,7 @@ from limitsets.proofs.prover.averages_of_scene import attracting, fine_cells, un
 from limitsets.proofs.prover.certificate import DeniedError, require_checker
 from limitsets.proofs.prover.certifying import require_none
 from limitsets.proofs.prover.cover import cover_on
-from limitsets.proofs.prover.entropies import ROOM, Entropy, found
+from limitsets.proofs.prover.entropies import ROOM, Entropy, both_ends
 from limitsets.proofs.prover.of_map import certify_map
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.proofs.prover.proof import Claim, Proof, undecided
@@ -76,7 +76,7 @@ def _with_entropy(proof: P, sampled: float, tell: Progress) -> P:
         file = Path(folder) / "entropy.proof.zip"
         try:
             proof.save(file, recheck=False)
-            section, arrays = found(*_laps_in(file), tell)
+            section, arrays = both_ends(*_laps_in(file), tell)
             lo, hi = (math.log(float.fromhex(section[word])) for word in ("lower", "upper"))
             own = Entropy(max(lo - ROOM, 0.0), hi + ROOM, sampled, section, arrays)
             claims = *proof.claims, Claim("entropy", "proved", "", section)
