@@ -87,7 +87,8 @@ def long_run_in_words(c: LongRun) -> list[str]:
     ]
     for one in c.counted:
         what = "flips per throw" if one.side is None else f"share of throws from side {one.side}"
-        ends = rounded(one.bounds[0], up=False), rounded(one.bounds[1], up=True)
+        # averages of what is 0 or 1 at each throw
+        ends = rounded(max(one.bounds[0], 0.0), up=False), rounded(min(one.bounds[1], 1.0), up=True)
         lines.append(f"    {what}: between {ends[0]} and {ends[1]}")
     return lines
 
@@ -176,6 +177,7 @@ def check_long_run(c: LongRun, progress: Progress) -> None:
         ):
             prove(bool(np.isfinite(u).all()), f"average {k}: a function is not finite")
             nodes, gained = most_gain(chain, kept, one.side, sign)(u)
+            prove(bool(np.isfinite(gained).all()), f"average {k}: a function is too large")
             excess = float((gained - u[nodes]).max()) + 2.0**-48 * (float(np.abs(u).max()) + 4.0)
             end = "upper" if sign > 0 else "lower"
             only = f"only {rounded(sign * excess, up=sign > 0)} is proved"

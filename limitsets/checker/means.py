@@ -82,6 +82,7 @@ class Graph:
         width = np.diff(mesh.place, append=np.inf)
         width[mesh.first[1:] - 1] = np.inf
         fall = np.maximum(self.slopes[:-1] - self.slopes[1:], 0.0)
+        fall += 2.0**-50 * (np.abs(self.slopes[:-1]) + np.abs(self.slopes[1:]))  # both are rounded
         self.falls = np.append(
             fall * 2.0 / (width[:-1] + width[1:]), 0.0
         )  # per length, at the node after each cell

@@ -26,6 +26,7 @@ class Collected:
         return np.array([row[at] for row in self.rows], dtype=kind)
 
 
+MOST_VALUE = 2.0**500
 LANDING = ("at", "much", "side", "lo", "hi", "side2", "lo2", "hi2")
 BEND = ("at", "least", "most", "side", "lo", "hi")
 
@@ -143,7 +144,12 @@ class Chain:
         return bounds
 
     def above(self, values: Array, fixed: Array, more: float = 0.0) -> Array:
-        """Bound `more` and the mean of V after a throw from above; on places that absorb V is fixed."""
+        """Bound `more` and the mean of V after a throw from above; on places that absorb V is fixed.
+
+        Where sums of V could overflow, nothing is bounded: all are nan.
+        """
+        if not float(np.abs(values).max()) <= MOST_VALUE:
+            return np.full(len(values), np.nan)
         g = Graph(self.mesh, values)
         if self.scatter is not None:
             g = Graph(self.goal, self.scatter.above(g))

@@ -11,7 +11,10 @@ from limitsets.cells import Domain
 import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.checker.balls import UnprovedError
-from limitsets.checker.entropy import Row, laps_of
+from limitsets.checker.entropy import Lap, Row, laps_of
+from limitsets.checker.file import open_certificate
+from limitsets.checker.report import read_certificate
+from limitsets.proofs.prover.entropy import _laps_in
 from limitsets.systems.sets.entropy import growth_of_curve, perron
 from tests.proofs.forge import opened
 
@@ -315,7 +318,71 @@ def test_cells_that_may_hold_more_ends_of_laps_are_refused(given, why):
         list(laps_of(0, 0, rows(*given), arb))
 
 
+def test_images_of_parts_of_a_lap():
+    """f(x) = x known to 0.1; -5 on the bracket from 0 to 1, 9 on that from 3 to 4."""
+    lap = Lap(0, 0, (0.0, 4.0), (1.0, 3.0), (arb(-5), arb(9)), lambda x: arb(x, 0.1))
+    for part, outer, inner in (
+        ((0.0, 4.0), (-5.0, 9.0), (1.1, 2.9)),
+        ((1.5, 2.5), (1.4, 2.6), (1.6, 2.4)),
+        ((0.5, 2.0), (-5.0, 2.1), (1.1, 1.9)),
+        ((2.0, 3.5), (1.9, 9.0), (2.1, 2.9)),
+        ((3.5, 5.0), (9.0, 9.0), None),
+        ((1.0, 1.1), (0.9, 1.2), None),
+        ((4.0, 5.0), None, None),
+    ):
+        for found, known, way in ((lap.outward(*part), outer, 1.0), (lap.inward(*part), inner, -1.0)):
+            assert (found is None) == (known is None), part
+            if known is not None:  # rounded to the safe side
+                off = (known[0] - found[0]) * way, (found[1] - known[1]) * way
+                assert all(-1e-12 < each < 1e-8 for each in off), (part, found)
+
+
+def test_laps_leave_out_what_is_not_known(tmp_path):
+    """A cell with two branches is in no lap but as a bracket; the last cell of a closed axis ends before the seam."""
+    ls.average("paper-designed", of="flips_per_throw", cells=300).save(tmp_path / "scene.zip")
+    laps, runs = _laps_in(tmp_path / "scene.zip")
+    header, entries = open_certificate(tmp_path / "scene.zip")
+    (cells,) = read_certificate(header, entries).cells
+    open_cells = np.flatnonzero((cells.branch == 2) & (cells.component >= 0))
+    assert open_cells.size >= 1
+    for k in open_cells.tolist():
+        side = int(cells.side[k])
+        lo, hi = cells.edges[side][k - cells.start[side] + np.arange(2)]
+        beside = [lap for lap in laps if lap.side == side and lap.outer[0] < hi and lo < lap.outer[1]]
+        assert len(beside) == 2
+        assert sum(lap.inner[1] <= lo and lap.brackets[1] is not None for lap in beside) == 1
+        assert sum(lap.inner[0] >= hi and lap.brackets[0] is not None for lap in beside) == 1
+    axis = ls.grid([(0.1, 0.4)], cells=90, periodic=True)
+    ls.average(ls.map(stretched, b=3.0), axis).save(tmp_path / "circle.zip")
+    laps, runs = _laps_in(tmp_path / "circle.zip")
+    ((_, seam),) = runs.by_side[0]
+    assert max(lap.inner[1] for lap in laps) < seam <= max(lap.outer[1] for lap in laps)
+
+
 # ---------------------------------------------------------------- forged
+
+
+def test_cells_beyond_the_end_of_the_arm_are_denied(tmp_path):
+    ls.entropy("paper-designed").save(tmp_path / "honest.zip")
+    forged = opened(tmp_path / "honest.zip")
+    forged.header["boxes"][0]["scene"]["cavity"] = {
+        "position": "22 in", "width": "9 in", "depth": "9 in", "angle": "20 deg"
+    }  # fmt: skip
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    assert report.verdict == "failed"
+    assert any("beyond the end of the arm" in why for _, _, why in report.claims), report.claims
+
+
+def test_each_run_of_cells_has_to_be_held(tmp_path):
+    ls.entropy(tent(1.2), line()).save(tmp_path / "honest.zip")
+    forged = opened(tmp_path / "honest.zip")
+    runs = forged.arrays["0.entropy.met"][:2]
+    assert runs[0, 2] < runs[1, 1]  # of two bands
+    forged.arrays["0.entropy.met"] = np.ascontiguousarray(
+        np.delete(forged.arrays["0.entropy.met"], 1, axis=0)
+    )
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    assert "do not hold the attracting cells" in report.reason, report.reason
 
 
 @pytest.fixture(scope="module")

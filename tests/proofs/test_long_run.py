@@ -13,6 +13,7 @@ from limitsets.robust import Gaussian, Scattering, Uniform, long_run_averages
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
+from limitsets.checker.horizon import nothing, worst
 from limitsets.checker.long_run import kept_cells, most_gain
 from limitsets.checker.means import Mesh
 from tests.proofs.forge import Plain, opened, scene
@@ -96,11 +97,32 @@ def test_landing_noise_alone_and_speed_alone():
     assert rough.numbers["flips_per_throw"] == (0.0, 1.0)
 
 
+def test_the_scatter_of_the_scene_itself(designed):
+    text = ls.load("paper-designed").as_dict()
+    own = text | {
+        "world": {"scatter": {"speed": "0.3 %", "landing": "0.02 in"}},
+        "effects": {"spread": "bounded"},
+    }
+    found = long_run_averages(ls.load(own), cells=500)
+    assert found.numbers == designed.numbers
+    assert "long_run_averages proves" in ls.average(ls.load(own)).claims[-1].reason
+
+
+CAVITY = {"position": "22 in", "width": "9 in", "depth": "3 in", "angle": "20 deg"}
+
+
 def test_what_has_none_is_refused():
     with pytest.raises(AnswerError, match="a law without bound"):
         long_run_averages("paper-designed", Scattering(landing=Gaussian(0.02)), cells=300)
     with pytest.raises(AnswerError, match="some cells attract"):
         long_run_averages("paper-designed", Scattering(landing=Uniform(8.0)), cells=300)
+    with pytest.raises(AnswerError, match="without a cavity"):
+        long_run_averages(ls.load("paper-designed").as_dict() | {"cavity": CAVITY}, NOISE, cells=300)
+    with pytest.raises(AnswerError, match="1 or more"):
+        long_run_averages("paper-designed", NOISE, cells=0)
+    for starts in ([(2, 12.0, 10.0)], [(3, 10.0, 12.0)], [(2, 10.0, 99.0)], []):
+        with pytest.raises(AnswerError, match="a start"):
+            long_run_averages("paper-designed", NOISE, starts=starts, cells=300)
     with pytest.raises(AnswerError, match="places that no throw leaves"):
         long_run_averages("paper-designed", NOISE, starts=[(2, 10.0, 12.0)], cells=300)
 
@@ -159,7 +181,8 @@ def test_cells_that_throws_leave_are_not_kept():
     live = np.array([1, 2, 3, 4, 5])
     to = {1: (1, 1), 2: (3, 3), 3: (5, 6), 4: (4, 4), 5: (4, 5)}
     span = SimpleNamespace(first=np.array([to[k][0] for k in live]), last=np.array([to[k][1] for k in live]))
-    inner = SimpleNamespace(at=live, one=span, two=span)
+    other = SimpleNamespace(first=span.first.copy(), last=span.last.copy())
+    inner = SimpleNamespace(at=live, one=span, two=other)
     chain = SimpleNamespace(mesh=mesh, goal=mesh, cells=inner, hard=SimpleNamespace(at=np.array([6])))
 
     def kept(reach):
@@ -170,12 +193,18 @@ def test_cells_that_throws_leave_are_not_kept():
     assert kept(0.0) == []
     to |= {1: (2, 2), 2: (2, 2), 4: (2, 2)}
     span.first, span.last = (np.array([to[k][i] for k in live]) for i in (0, 1))
+    other.first = other.last = np.full(live.size, 2)
     assert kept(0.0) == []  # 2 and its neighbours, of which 3 leads out
     to |= {3: (2, 2)}
     span.first, span.last = (np.array([to[k][i] for k in live]) for i in (0, 1))
     assert kept(0.0) == [1, 2, 3, 4]
     assert kept(0.5) == [1, 2, 3, 4]
     assert kept(1.5) == []
+    assert kept(0.0) == [1, 2, 3, 4]
+    other.last = np.array(
+        [2, 6, 2, 2, 5]
+    )  # on the other branch cell 2 leads to the hard cell, and 5 to itself
+    assert kept(0.0) == []
 
 
 # ---------------------------------------------------------------- forged
@@ -211,6 +240,7 @@ FORGED = {
     "a narrower upper end": (narrower(0, "upper", -0.1), "the upper end"),
     "a narrower lower end": (narrower(1, "lower", 0.1), "the lower end"),
     "no function": (with_functions(0, lambda u: 0.0 * u), "is proved"),
+    "a function that overflows": (with_functions(0, lambda u: 0.0 * u - 1.7e308), "too large"),
     "another function": (with_functions(2, lambda u: -u), "is proved"),
     "another side": (exchanged, "is proved"),
     "starts farther out": (lambda f: section(f).update(starts=[[2, "6 in", "20 in"]]), "no throw leads out"),
@@ -236,6 +266,18 @@ def test_a_forged_average_is_denied(name, honest, tmp_path):
     change(forged)
     report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
     assert (report.verdict, why in report.reason) == ("failed", True), report.reason
+
+
+def test_a_function_so_large_that_sums_overflow_proves_nothing(designed):
+    """A hostile reader's file: u = -1.8e308 made sums -inf, below any bound."""
+    from limitsets.checker.brackets import read_setting
+
+    steps = designed.chain.steps
+    kept = kept_cells(read_setting(designed.chain.section), steps)
+    for size in (-1.797e308, 1.797e308, 1e200, np.nan):
+        _, gained = most_gain(steps, kept, None, 1.0)(np.full(kept.size, size))
+        assert np.isnan(gained).all()
+    assert np.isnan(worst(steps, np.full(kept.size, -1e300), nothing(steps), 0.0))
 
 
 BAD = {

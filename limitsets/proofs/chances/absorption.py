@@ -20,7 +20,7 @@ from limitsets.base import AnswerError, Column, Table, Tabled, as_table, picked,
 from limitsets.base.arrays import Array
 from limitsets.feeder.scattering import Scattering, scattering_of, starts_from
 from limitsets.numbers.interval import guard
-from limitsets.proofs.chances.chain import EXITS, Chain, Place, chain_of, write
+from limitsets.proofs.chances.chain import EXITS, Chain, Place, chain_of, require_places, write
 from limitsets.proofs.chances.forever import forever
 
 if TYPE_CHECKING:
@@ -231,7 +231,7 @@ def absorption_brackets(
     noise = scattering_of(read) if scatter is None else scatter
     places = _places(read, right, wrong, absorbing)
     begin = tuple(_default_starts(read, right) if starts is None else starts)
-    _require(read, "a start", begin)
+    require_places(read, "a start", begin)
     tell = progress or (lambda stage, done, total: None)
     from limitsets.checker.brackets import brackets_of
 
@@ -295,20 +295,8 @@ def _places(
             raise AnswerError("the name of absorbing places", name, "one that is not taken", "choose another")
         absorbers[name] = [(int(side), float(lo), float(hi)) for side, lo, hi in places]
     for name, each in absorbers.items():
-        _require(scene, f'a place that is "{name}"', each)
+        require_places(scene, f'a place that is "{name}"', each)
     return absorbers
-
-
-def _require(scene: Scene, thing: str, places: Sequence[Place]) -> None:
-    for place in places:
-        side, lo, hi = place
-        if not (
-            side in range(len(scene.sides)) and float(scene.sides.a[side]) < lo < min(hi, scene.arm_length)
-        ):
-            allowed = "(side, from x, to x) with the first x on the arm and below the second"
-            raise AnswerError(thing, place, allowed, "correct it")
-    if not places:
-        raise AnswerError(thing, "none", "(side, from x, to x)", "give one")
 
 
 def _default_starts(scene: Scene, right: tuple[float, int] | None) -> list[Place]:

@@ -117,6 +117,19 @@ def chain_of(
     return Chain(section, nodes, steps, row)
 
 
+def require_places(scene: Scene, thing: str, places: Sequence[Place]) -> None:
+    """Require places of the arm, one at least."""
+    for place in places:
+        side, lo, hi = place
+        if not (
+            side in range(len(scene.sides)) and float(scene.sides.a[side]) < lo < min(hi, scene.arm_length)
+        ):
+            allowed = "(side, from x, to x) with the first x on the arm and below the second"
+            raise AnswerError(thing, place, allowed, "correct it")
+    if not places:
+        raise AnswerError(thing, "none", "(side, from x, to x)", "give one")
+
+
 def _require_known(scene: Scene, scatter: Scattering) -> None:
     """Refuse what nothing is proved of."""
     box = parameter_box(scene)

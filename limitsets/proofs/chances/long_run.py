@@ -23,6 +23,7 @@ from limitsets.base import (
     Progress,
     Table,
     Tabled,
+    arguments_checked,
     as_table,
     picked,
     shown_in_notebooks,
@@ -32,7 +33,7 @@ from limitsets.base.arrays import Array
 from limitsets.feeder.scattering import Scattering, Uniform, scattering_of
 from limitsets.feeder.scene import Scene, load
 from limitsets.numbers.interval import guard
-from limitsets.proofs.chances.chain import Chain, Place, chain_of, edges_of, in_words
+from limitsets.proofs.chances.chain import Chain, Place, chain_of, edges_of, in_words, require_places
 from limitsets.proofs.prover import certify
 from limitsets.proofs.prover.certificate import pack
 
@@ -135,6 +136,7 @@ class LongRunAverages(Tabled):
 
 
 @shown_in_notebooks
+@arguments_checked
 def long_run_averages(
     scene: Scene | str,
     scatter: Scattering | None = None,
@@ -184,7 +186,13 @@ def long_run_averages(
             raise AnswerError(
                 f"the law of {name}", law, "Uniform", "a law without bound leads everywhere: bound it"
             )
+    if "cavity" in read.text:
+        remedy = "leave [cavity] out: parts that fall into it make no more throws"
+        raise AnswerError("the scene", read.name, "one without a cavity", remedy)
+    if cells < 1:
+        raise AnswerError("the cells per side", cells, "1 or more", f"leave it out: {CELLS}")
     begin = list(_around(read, noise) if starts is None else starts)
+    require_places(read, "a start", begin)
     nodes, total = 0, len(read.sides) * cells
 
     def told(more: int) -> None:
@@ -206,7 +214,7 @@ def long_run_averages(
         prove(bool(begin), "from every cell some throw may lead out")
         check_starts_stay(read_setting(chain.section), chain.steps.mesh, kept)
     except UnprovedError as error:
-        remedy = f"take more cells, or other starts: {error}"
+        remedy = f"leave starts out, take more cells, or all of a place that no throw leaves: {error}"
         raise AnswerError(
             "the starts", begin or "none found", "places that no throw leaves", remedy
         ) from None
@@ -235,6 +243,7 @@ def long_run_averages(
 def _around(scene: Scene, noise: Scattering) -> list[Place]:
     """Find the attracting cells under noise, if possible with landings that scatter by more, so that there is room."""
     laws_of = ("speed", noise.speed), ("landing", noise.landing)
+    own = _without_scatter(scene)
     bound = {name: law.bound for name, law in laws_of if isinstance(law, Uniform)}
     reason = ""
     for share in ROOM:
@@ -242,11 +251,19 @@ def _around(scene: Scene, noise: Scattering) -> list[Place]:
         laws = {"landing.x": f"{more!r} {scene.unit}"} if more > 0.0 else {}
         if bound.get("speed", 0.0) > 0.0:
             laws["throw.speed"] = f"{100.0 * bound['speed']!r} %"
-        proof = certify(scene, ["invariant"], noise=laws or None)
+        proof = certify(own, ["invariant"], noise=laws or None)
         if proof.proved:
             return [(side, lo, hi) for side, bands in proof.outer_extents().items() for lo, hi in bands]
         reason = proof.claims[0].reason
     raise AnswerError("the noise", noise.words(), "such that some cells attract", f"lower it: {reason}")
+
+
+def _without_scatter(scene: Scene) -> Scene:
+    """Read a scene without the scatter that it has of its own."""
+    text = {key: value for key, value in scene.as_dict().items() if key != "effects"}
+    if "world" in text:
+        text["world"] = {key: value for key, value in text["world"].items() if key != "scatter"}
+    return load(text)
 
 
 def _starts_in(scene: Scene, steps: Steps, kept: Array) -> list[Place]:
