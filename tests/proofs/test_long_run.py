@@ -121,7 +121,7 @@ def test_what_has_none_is_refused():
     with pytest.raises(AnswerError, match="1 or more"):
         long_run_averages("paper-designed", NOISE, cells=0)
     for starts in ([(2, 12.0, 10.0)], [(3, 10.0, 12.0)], [(2, 10.0, 99.0)], []):
-        with pytest.raises(AnswerError, match="a start"):
+        with pytest.raises(AnswerError, match="start"):
             long_run_averages("paper-designed", NOISE, starts=starts, cells=300)
     with pytest.raises(AnswerError, match="places that no throw leaves"):
         long_run_averages("paper-designed", NOISE, starts=[(2, 10.0, 12.0)], cells=300)
