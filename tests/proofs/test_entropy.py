@@ -14,7 +14,7 @@ from limitsets.checker.balls import UnprovedError
 from limitsets.checker.entropy import Lap, Row, laps_of
 from limitsets.checker.file import open_certificate
 from limitsets.checker.report import read_certificate
-from limitsets.proofs.prover.entropy import _laps_in
+from limitsets.proofs.prover.entropy import laps_in
 from limitsets.systems.sets.entropy import growth_of_curve, perron
 from tests.proofs.forge import opened
 
@@ -340,7 +340,7 @@ def test_images_of_parts_of_a_lap():
 def test_laps_leave_out_what_is_not_known(tmp_path):
     """A cell with two branches is in no lap but as a bracket; the last cell of a closed axis ends before the seam."""
     ls.average("paper-designed", of="flips_per_throw", cells=300).save(tmp_path / "scene.zip")
-    laps, runs = _laps_in(tmp_path / "scene.zip")
+    laps, runs = laps_in(tmp_path / "scene.zip")
     header, entries = open_certificate(tmp_path / "scene.zip")
     (cells,) = read_certificate(header, entries).cells
     open_cells = np.flatnonzero((cells.branch == 2) & (cells.component >= 0))
@@ -354,7 +354,7 @@ def test_laps_leave_out_what_is_not_known(tmp_path):
         assert sum(lap.inner[0] >= hi and lap.brackets[0] is not None for lap in beside) == 1
     axis = ls.grid([(0.1, 0.4)], cells=90, periodic=True)
     ls.average(ls.map(stretched, b=3.0), axis).save(tmp_path / "circle.zip")
-    laps, runs = _laps_in(tmp_path / "circle.zip")
+    laps, runs = laps_in(tmp_path / "circle.zip")
     ((_, seam),) = runs.by_side[0]
     assert max(lap.inner[1] for lap in laps) < seam <= max(lap.outer[1] for lap in laps)
 

@@ -203,7 +203,7 @@ def long_run_averages(
     chain = chain_of(read, noise, begin, {"elsewhere": _elsewhere(read, begin)}, cells, told)
     from limitsets.checker.balls import UnprovedError, prove
     from limitsets.checker.brackets import read_setting
-    from limitsets.checker.long_run import FLIPS, SIDE, check_starts_stay, kept_cells
+    from limitsets.checker.long_run import check_starts_stay, kept_cells
 
     setting = read_setting(chain.section)
     kept = kept_cells(setting, chain.steps)
@@ -218,26 +218,32 @@ def long_run_averages(
         raise AnswerError(
             "the starts", begin or "none found", "places that no throw leaves", remedy
         ) from None
-    names = {"flips_per_throw": None} | {f"share_of_side_{k}": k for k in range(len(read.sides))}
-    averages, functions, numbers = (
-        list[dict[str, Any]](),
-        dict[str, Array](),
-        dict[str, tuple[float, float]](),
-    )
+    averages, functions = _bounded(chain, kept, len(read.sides), tell)
+    numbers = {
+        name: (max(float.fromhex(one["lower"]), 0.0), min(float.fromhex(one["upper"]), 1.0))
+        for name, one in averages.items()
+    }
+    return LongRunAverages(
+        read.name, read.unit, noise, tuple(begin), numbers | _jogs(numbers, len(read.sides)), chain=chain,
+        averages=[*averages.values()], functions=functions, seconds=time.perf_counter() - begun,
+    )  # fmt: skip
+
+
+def _bounded(
+    chain: Chain, kept: Array, sides: int, tell: Progress
+) -> tuple[dict[str, dict[str, Any]], dict[str, Array]]:
+    """Bound flips and the shares of all sides: by name as a certificate has them, and the functions."""
+    from limitsets.checker.long_run import FLIPS, SIDE
+
+    names = {"flips_per_throw": None} | {f"share_of_side_{k}": k for k in range(sides)}
+    averages, functions = dict[str, dict[str, Any]](), dict[str, Array]()
     for number, (name, side) in enumerate(names.items()):
-        ends = []
+        averages[name] = {"of": FLIPS if side is None else {SIDE: side}}
         for k, (sign, word) in enumerate(((-1.0, "lower"), (1.0, "upper"))):
             tell(name, 2 * number + k, 2 * len(names))
             bound, functions[f"{number}.{word}"] = _settled(chain, kept, side, sign)
-            ends.append(sign * bound + (2 * k - 1) * ALLOWANCE)
-        averages.append(
-            {"of": FLIPS if side is None else {SIDE: side}, "lower": ends[0].hex(), "upper": ends[1].hex()}
-        )
-        numbers[name] = max(ends[0], 0.0), min(ends[1], 1.0)
-    return LongRunAverages(
-        read.name, read.unit, noise, tuple(begin), numbers | _jogs(numbers, len(read.sides)),
-        chain=chain, averages=averages, functions=functions, seconds=time.perf_counter() - begun,
-    )  # fmt: skip
+            averages[name][word] = (sign * (bound + ALLOWANCE)).hex()
+    return averages, functions
 
 
 def _around(scene: Scene, noise: Scattering) -> list[Place]:

@@ -35,7 +35,7 @@ P = TypeVar("P", Proof, ProofOfMap)
 CELLS = 1024
 
 
-def _laps_in(file: Path) -> tuple[list[Lap], Runs]:
+def laps_in(file: Path) -> tuple[list[Lap], Runs]:
     """Find laps and runs of the attracting cells in a certificate, as the checker does."""
     import flint
 
@@ -76,7 +76,7 @@ def _with_entropy(proof: P, sampled: float, tell: Progress) -> P:
         file = Path(folder) / "entropy.proof.zip"
         try:
             proof.save(file, recheck=False)
-            section, arrays = both_ends(*_laps_in(file), tell)
+            section, arrays = both_ends(*laps_in(file), tell)
             lo, hi = (math.log(float.fromhex(section[word])) for word in ("lower", "upper"))
             own = Entropy(max(lo - ROOM, 0.0), hi + ROOM, sampled, section, arrays)
             claims = *proof.claims, Claim("entropy", "proved", "", section)
@@ -110,14 +110,14 @@ def _of_scene(scene: Scene, cells: int, tell: Progress) -> Proof:
     return _with_entropy(proof, _sampled(box.lo, attractors.cells), tell)
 
 
-def _of_map(map: Any, grid: Grid, upper: Any, tell: Progress) -> ProofOfMap:  # noqa: A002
-    corners = coerce(map), coerce(map if upper is None else upper)
+def _of_map(lower: Any, grid: Grid, upper: Any, tell: Progress) -> ProofOfMap:
+    corners = coerce(lower), coerce(lower if upper is None else upper)
     if grid.dimension > 1:
-        proof = certify_map(map, grid, ["invariant"], upper=upper, progress=tell)
+        proof = certify_map(lower, grid, ["invariant"], upper=upper, progress=tell)
         why = "it is proved of a line alone; sampled is the growth of a curve, at most the entropy"
         return _left(proof, growth_of_curve(corners[0], grid.domain), why)
     cut = cut_at_changes(*corners, grid, turns=True)
-    proof = certify_map(map, cut, ["invariant"], upper=upper, progress=tell)
+    proof = certify_map(lower, cut, ["invariant"], upper=upper, progress=tell)
     if not (proof.arrays["component"] >= 0).any():
         why = "there are no attracting cells: images may leave the domain; widen it, or close it (periodic)"
         return replace(proof, claims=(undecided("entropy", why),))
