@@ -25,8 +25,10 @@ The files follow docs/certificates.md, and each imports only from those before i
     model        the formulas of a throw
     cells        structure and ranks; decision, landing and images of every cell  1 to 5
     near_hinge   starts before the first cell                                     6, "The surface above the joint"
+    near_foot    the same with noise of the landing place                         "For which starts"
     starts       the starts for which a goal holds                                7, 8, "For which starts"
-    two_throws   two throws with the same parameters                              9
+    moving_ends  chains of throws, all with the same parameters                   9
+    bands        bands of attracting cells under such throws                      9
     goals        the goals                                                        "Goals"
     end_points   end points of the limit set                                      10 to 12
     refutations  periodic orbits, and orbits that refute a goal                   13, "Refutations"

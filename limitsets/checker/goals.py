@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .balls import float_of, prove
+from .bands import MOST_THROWS, throws_below
 from .cells import grown, leading_into, targets_of
 from .file import LENGTHS, Cells, one_length, require, rows, table, whole_number
 from .near_hinge import check_everywhere, check_thinning, near_landing, not_arriving
@@ -22,7 +23,6 @@ from .starts import (
     read_starts,
     starts_in_words,
 )
-from .two_throws import check_two_throws
 
 GOAL_KEYS = "x side every_orbit throws order jogs from_anywhere"
 GOALS = {  # the kinds that are known, and the keys of their sections; from_anywhere may come with each
@@ -57,10 +57,8 @@ def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
         x = one_length(section["x"], "goal.x")
         goal |= {"x": x, "text": str(x), "side": count(section["side"], n_sides, "side")}
     if kind == "oriented_beyond":
-        goal["throws"] = count(section.get("throws", 0), 3, "throws")
-        require(
-            goal["throws"] in (0, 2) and not (anywhere and goal["throws"]), "goal.throws is neither 0 nor 2"
-        )
+        goal["throws"] = count(section.get("throws", 0), MOST_THROWS + 1, "throws")
+        require(not (anywhere and goal["throws"]), "goal.throws are counted of attracting cells alone")
     if kind == "reaches":
         require(isinstance(section["every_orbit"], bool), "goal.every_orbit is neither true nor false")
         goal |= {
@@ -132,7 +130,7 @@ def check_oriented(c: Cells, scene: Scene, goal: dict[str, Any]) -> None:
     if not goal["anywhere"]:
         wrong &= c.component >= 0
         if goal["throws"] and wrong.any():
-            check_two_throws(c, scene, wrong, x)
+            throws_below(c, scene, wrong, x, goal["throws"])
             return
         c.prove_all(~wrong, f"an attracting cell of another side reaches beyond x = {float(beyond)!r}")
         return
@@ -205,7 +203,8 @@ def statement_of_goal(goal: dict[str, Any], noisy: bool) -> str:
         into = ""
     here = place if goal["anywhere"] else f"every start in {those}"
     if goal["kind"] == "oriented_beyond":
-        cells = "after two throws with the same parameters in" if goal["throws"] else "in"
+        same = f"after {goal['throws']} throw{'s' * (goal['throws'] > 1)} with the same parameters in"
+        cells = same if goal["throws"] else "in"
         after = "after every throw of an orbit from" if is_laid(goal) else "after a throw from"
         where = f"{after} {place}" if goal["anywhere"] else f"{cells} {those}"
         words = f"{where}, x > {goal['text']} implies side {goal['side']}{into}"

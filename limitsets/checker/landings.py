@@ -12,10 +12,10 @@ from flint import arb
 from .balls import HALF, Arb, Array, exact, float_above
 from .laws import Column, Law
 from .means import INFLATE
+from .model import deciding
 from .noisy_throw import (
     Hit,
     decides,
-    deciding,
     deciding_slopes,
     guess_angle,
     guess_border,

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from flint import arb
 
-from .balls import HALF, ONE, ZERO, Arb, Rising, sine_cosine
+from .balls import HALF, ONE, ZERO, Arb, Rising, signed_square, sine_cosine
 from .scene import Side
 
 FORMULAS = {
@@ -81,7 +81,7 @@ def over_angles(s: Side, phi: Arb, R: Arb, kappa: Arb) -> tuple[int, Arb, Arb]:
 
 def excess(s: Side, spin: Any, V: Any) -> Any:
     """Return what is positive where the part flips: sgn(om) K - V in the signed criterion, else K - V."""
-    return spin * (abs(spin) if s.signed else spin) * s.over_2m - V
+    return (signed_square(spin) if s.signed else spin * spin) * s.over_2m - V
 
 
 def decide_exact(s: Side, spin: Arb, X: Arb, H: Arb, kappa: Arb) -> int:
@@ -103,10 +103,24 @@ def barrier(ell: Any, X: Any, H: Any, signed: bool) -> Any:
         below_it = -below_it if -X > 0 else None  # the sign is not known
     if not top > 0:
         return arb("nan") if below_it is None else below_it
-    above_it = X * (abs(X) if signed else X) / top
+    above_it = (signed_square(X) if signed else X * X) / top
     if below_it is None or H > 0 or isinstance(above_it, Rising):
         return above_it if below_it is None or H > 0 else below_it
     return above_it.intersection(below_it)
+
+
+def deciding(s: Side, phi: Any, x: Any, kappa: Any) -> Any:
+    """Evaluate the number that is positive where the part flips, in any arithmetic."""
+    if s.exact:
+        sin, cos = phi.sin_cos()
+        X, H = cos * s.a - sin * s.d, sin * s.a + cos * s.d
+        spin = s.rho2 + X * (x - kappa * phi) + H * s.hd
+        # where X < 0 the criterion of energy flips, and the sum is positive
+        V = kappa * barrier(s.ell, X, H, signed=True)
+    else:
+        spin = s.rho2 - s.a * x + 2 * s.a * s.a + s.d * s.d + s.d * s.h
+        V = kappa * (s.ell - s.d) - 2 * s.a * (x - s.a)
+    return excess(s, spin, V)
 
 
 class Ratios(NamedTuple):

@@ -5,7 +5,7 @@ kappa_0/(1 + delta)^2.  The impact angle p of a start x solves x = P(p), P(p) = 
 T = x + D(p); with kappa > ell there is one solution, which rises with x and with delta.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from flint import arb
@@ -15,7 +15,7 @@ from .model import (
     FULL_TURN,
     SLACKS,
     at_angle,
-    barrier,
+    deciding,
     flight,
     guess_root,
     over_angles,
@@ -141,27 +141,6 @@ def slopes_over(s: Side, phi: Arb, kappa: Arb, factor: Arb) -> Slopes:
         phi_x=one,
         phi_k=phi_k,
     )
-
-
-def signed_square(z: Any) -> Any:
-    """Evaluate z |z|, whose derivative 2 |z| is narrower than that of a product."""
-    if isinstance(z, Rising):
-        return Rising(z.x * abs(z.x), [2 * abs(z.x) * d for d in z.by])
-    return z * abs(z)
-
-
-def deciding(s: Side, phi: Any, x: Any, kappa: Any) -> Any:
-    """Evaluate the number that is positive where the part flips, in any arithmetic."""
-    if s.exact:
-        sin, cos = phi.sin_cos()
-        X, H = s.a * cos - s.d * sin, s.a * sin + s.d * cos
-        spin = s.rho2 + X * (x - kappa * phi) + H * s.hd
-        over = s.ell + H
-        V = kappa * (signed_square(X) / over if s.signed and H > 0 else barrier(s.ell, X, H, s.signed))
-    else:
-        spin = s.rho2 - s.a * x + 2 * s.a * s.a + s.d * s.d + s.d * s.h
-        V = kappa * (s.ell - s.d) - 2 * s.a * (x - s.a)
-    return (signed_square(spin) if s.signed else spin * spin) * s.over_2m - V
 
 
 def deciding_slopes(s: Side, phi: Arb, x: Arb, kappa: Arb, factor: Arb) -> tuple[Arb, Arb]:

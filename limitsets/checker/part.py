@@ -3,11 +3,11 @@
 docs/certificates.md, "What is claimed", names the parameters; docs/model.md has the geometry.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Any
 
-from .balls import ONE, ZERO, Arb, Rising, exact, span
+from .balls import ONE, ZERO, Arb, Centred, centred, exact, span
 from .file import quantity, require, rows, table
 
 
@@ -21,38 +21,31 @@ def ends_of(value: object, where: str, unit: Fraction) -> tuple[Fraction, Fracti
 def narrow_part(part: object, unit: Fraction) -> tuple[list[tuple[Any, ...]], Arb]:
     """Enclose (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho.
 
-    A formula that names an interval twice gives too wide a ball.  The mean value theorem, f(c) + f'(box) (q - c), gives
-    a narrower one.
+    A formula that names an interval twice gives too wide a ball; the mean value theorem gives a narrower one.
     """
     wide, plain_rests, rho = read_wide(part, unit)
     if not wide:
         return plain_rests, rho
+    balls = [span(lo, hi) for _, lo, hi in wide.values()]
+    middles = [exact((lo + hi) / 2) for _, lo, hi in wide.values()]
+    off = [ball - middle for ball, middle in zip(balls, middles, strict=True)]
+    numbers = dict(zip(wide, centred(middles, balls, off), strict=True))
 
-    def middle(value: object, where: str) -> Arb:
-        lo, hi = ends_of(value, where, unit)
-        return exact((lo + hi) / 2) if id(value) in wide else span(lo, hi)
+    def ball_of(f: Any, known: Arb) -> Arb:
+        return f.x.intersection(known) if isinstance(f, Centred) and f.x.is_finite() else known
 
-    def rising(value: object, where: str) -> Any:
-        ball = span(*ends_of(value, where, unit))
-        return Rising(ball, [ONE if key == id(value) else ZERO for key in wide])
+    rests, narrow_rho = part_with(part, unit, numbers)
+    rows_of_sides = zip(rests, plain_rests, strict=True)
+    return [tuple(map(ball_of, *both)) for both in rows_of_sides], ball_of(narrow_rho, rho)
 
-    centre, rho_centre = read_part(part, unit, middle)
-    steep, rho_steep = read_part(part, unit, rising)
-    half = [span(-(hi - lo) / 2, (hi - lo) / 2) for _, lo, hi in wide.values()]
 
-    def about(c: Arb, f: Any, known: Arb) -> Arb:
-        if not isinstance(f, Rising):
-            return known
-        total = c
-        for slope, offset in zip(f.by, half, strict=True):
-            total = total + slope * offset
-        return known if not total.is_finite() or known in total else known.intersection(total)
+def part_with(part: object, unit: Fraction, numbers: Mapping[int, Any]) -> tuple[list[tuple[Any, ...]], Any]:
+    """Compute what `read_part` does with some numbers of the part given by id, in their arithmetic."""
 
-    rests = [
-        tuple(about(*each) for each in zip(*rows_of_side, strict=True))
-        for rows_of_side in zip(centre, steep, plain_rests, strict=True)
-    ]
-    return rests, about(rho_centre, rho_steep, rho)
+    def read(value: object, where: str) -> Any:
+        return numbers[id(value)] if id(value) in numbers else span(*ends_of(value, where, unit))
+
+    return read_part(part, unit, read)
 
 
 def read_wide(

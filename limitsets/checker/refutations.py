@@ -23,8 +23,9 @@ from .file import (
     table,
 )
 from .goals import read_goal
+from .near_foot import INSIDE
 from .scene import Scene, quantities, read_scene
-from .starts import INSIDE, Span, ranges_in_words, read_laid
+from .starts import Span, ranges_in_words, read_laid
 
 # ---------------------------------------------------------------- Periodic orbits in the attracting cells
 #

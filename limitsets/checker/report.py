@@ -527,7 +527,7 @@ def tell_starts(report: Report, goal: dict[str, Any], scenes: list[Scene], cells
         some = c.component >= 0 if starts.only else c.rank >= 0
         both.append(shares(c, scene, starts, some))
     beyond = None if starts.x is None else {str(i): x for i, x in enumerate(starts.x)}
-    report.starts = starts.kind if beyond is None else {"from": beyond}
+    report.starts = starts.kind if beyond is None else {starts.kind: beyond}
     if starts.kind == "within":
         report.starts = {"within": {str(i): spans for i, spans in enumerate(starts.laid or ()) if spans}}
     report.share, report.explained = (math.floor(min(each) * 1e6) / 1e6 for each in zip(*both, strict=True))

@@ -13,9 +13,7 @@ import numpy as np
 from flint import arb
 
 from .balls import (
-    HALF,
     ZERO,
-    Arb,
     Array,
     Pair,
     about,
@@ -27,25 +25,24 @@ from .balls import (
     sine_cosine,
 )
 from .cells import check_reach, grown, leading_into, targets_of
-from .file import Cells, Quantity, by_side, hex_float, require, rows, table, whole_number
+from .file import Cells, by_side, hex_float, require, rows, table, whole_number
 from .labels import range_max
-from .model import at_angle, landing_at, over_angles, ratios, rise_of_jog, root_above
+from .model import (
+    at_angle,
+    rise_of_jog,
+)
+from .near_foot import check_lost, check_outward
 from .near_hinge import (
     check_below_cells,
     check_near_joint,
     check_null,
     check_thinning,
-    near_angle,
     near_landing,
     read_near_hinge,
 )
-from .scene import MOST_HALVES, Scene, Side, check_by_halves, quantities
+from .scene import Scene, check_by_halves
 
 MOST_COUNTED = 100_000  # throws, or rounds, that a goal may count
-# A stated kappa keeps this share of itself from the ends of its noise, which are known to 100 bits.
-INSIDE = arb(2) ** -80
-VARYING = ("throw", "gravi")  # how the names of the quantities begin that kappa is computed from
-
 
 Span = tuple[float, float]
 
@@ -53,6 +50,7 @@ Span = tuple[float, float]
 class Starts(NamedTuple):
     """The starts of a goal: "every", "almost-every", "from" (beyond x on each side), "cells", "within" (some ranges).
 
+    "from_foot": those with x - a_i beyond `x` on each side, whatever a_i is; `lost` then is such a distance too.
     `thinning` counts its rounds; `near` has factors and fixed points where starts before the first cells are claimed; a
     worst sequence of landings takes starts up to `lost`, by side, to the joint; `only` the starts in the attracting
     cells are claimed.  `laid` has by side the ranges of x in which all starts lie: "within" claims all of these starts,
@@ -78,15 +76,16 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
     said, kind = section["starts"], section["starts"]
     x = laid = None
     if isinstance(said, dict):
-        table(said, "goal.starts", "", "from within cells")
-        require(len(said) == 1, "goal.starts is not one of from, within and cells")
+        table(said, "goal.starts", "", "from from_foot within cells")
+        require(len(said) == 1, "goal.starts is not one of from, from_foot, within and cells")
         ((kind, value),) = said.items()
-        if kind == "from":
-            x = [hex_float(each, "goal.starts") for each in by_side(value, "from", n_sides)]
+        if kind.startswith("from"):
+            x = [hex_float(each, "goal.starts") for each in by_side(value, kind, n_sides)]
         else:
             laid = read_laid(value, n_sides)
     require(
-        kind in ("every", "almost-every", "from", "cells") or bool(laid), "goal.starts is none that is known"
+        kind in ("every", "almost-every", "from", "from_foot", "cells") or bool(laid),
+        "goal.starts is none that is known",
     )
     thinning = 0
     if "thinning" in section:
@@ -122,7 +121,9 @@ def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: 
     """Require that the parts of a claim about starts fit each other and the goal; `points` are the fixed points."""
     kind = starts.kind
     anywhere = goal["anywhere"] and goal["kind"] != "attracts_all"  # which is about every start anyway
-    require(starts.lost is None or kind in ("from", "cells"), f"starts {kind}: none of them are lost")
+    lossy = ("from", "from_foot", "cells")
+    require(starts.lost is None or kind in lossy, f"starts {kind}: none of them are lost")
+    require(kind != "from_foot" or starts.near is None, "starts from the foot on have no near_joint")
     if kind in ("every", "almost-every"):
         near = (starts.near is not None or anywhere) and not any(points)
         require(near, f"starts {kind}: near_joint does not say so")
@@ -215,6 +216,10 @@ def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> N
     """Check that the starts claimed on a side lie in cells with a rank or near the joint."""
     edges, near = c.edges[side], starts.near
     first, claimed = float(edges[0]), c.rank >= 0
+    if starts.kind == "from_foot" and starts.x is not None:
+        check_starts_from_foot(c, scene, side, starts.x[side])
+        check_lost_starts(scene, starts, side)
+        return
     since = None if starts.x is None else starts.x[side]
     needed = np.zeros(len(edges) - 1, dtype=bool)
     if starts.kind != "cells":
@@ -228,9 +233,24 @@ def check_starts_of_side(c: Cells, scene: Scene, starts: Starts, side: int) -> N
     claimed[c.start[side] : c.start[side + 1]] |= ~needed
     claimed[: c.start[side]] = claimed[c.start[side + 1] :] = True
     c.prove_all(claimed, "nothing is claimed of starts in it: its rank is -1")
+    check_lost_starts(scene, starts, side)
+
+
+def check_lost_starts(scene: Scene, starts: Starts, side: int) -> None:
+    """Check that the starts that are said to be lost on a side are lost."""
     if starts.lost is not None:
-        with about(f"side {side}, starts up to x = {starts.lost[side]!r}"):
-            check_by_halves(scene, check_lost, side, starts.lost[side])
+        foot = starts.kind == "from_foot"
+        with about(f"side {side}, starts up to x{f' - a_{side}' * foot} = {starts.lost[side]!r}"):
+            check_by_halves(scene, check_lost, side, starts.lost[side], foot)
+
+
+def check_starts_from_foot(c: Cells, scene: Scene, side: int, away: float) -> None:
+    """Check that starts with x - a_i > away come to cells with a rank, beyond the last cell of the side without one."""
+    check_reach(c, scene, side)
+    edges, ranked = c.edges[side], c.rank[c.start[side] : c.start[side + 1]] >= 0
+    until = float(edges[int(np.flatnonzero(~ranked).max(initial=-1)) + 1])
+    with about(f"side {side}, starts with x - a_{side} > {away!r}"):
+        check_by_halves(scene, check_outward, side, until, away)
 
 
 def check_arrival(c: Cells, scene: Scene, starts: Starts, almost: bool) -> None:
@@ -279,55 +299,12 @@ def check_passing(scene: Scene, side: int, phi: list[float]) -> None:
     prove(moved > s.landing or moved < -s.landing, "a jog is not proved to move it one way")
 
 
-def check_lost(scene: Scene, side: int, end: float) -> None:
-    """Check that a worst sequence of landings takes every start in (a, end] to the joint.
-
-    A start R(p, kappa), told by its impact angle p, is thrown by D(p).  Where the throw is a jog with D < e for all p
-    up to an angle after the impact at the end, landings that fall short by e bring the part inward, by a least step: to
-    x <= a.
-    """
-    s, x = scene.sides[side], arb(end)
-    prove(s.landing > 0, "without noise of the landing place no part is lost by it")
-    if x <= s.a:
-        return  # there are no such starts
-    prove(x > s.a and x <= s.arm, "they do not lie on the arm")
-    kappa = kappa_of_worst(scene)
-    bound = near_angle(s, kappa.lower(), kappa.upper(), end)
-    prove(bound < 3, "the impact angle is not bounded")
-    top = root_above(s, x, kappa.lower(), at_angle(s, bound)).p
-    stack, looked = [(top * k / 64, top * (k + 1) / 64) for k in range(64)], 0
-    while stack:
-        lo, hi = stack.pop()
-        looked += 1
-        p = lo.union(hi)
-        R = landing_at(s, ratios(p), kappa) if s.exact else s.a + HALF * (kappa - s.small_d) * p
-        if over_angles(s, p, R, kappa)[0] == 0 and falls_short(s, lo, hi):
-            continue
-        prove(looked <= MOST_HALVES, "that a jog falls short is not proved")
-        stack += [(lo, HALF * (lo + hi)), (HALF * (lo + hi), hi)]
-
-
-def kappa_of_worst(scene: Scene) -> Arb:
-    """Choose kappa for a worst sequence: one value of the noise, but all where kappa is known to a tolerance only."""
-    loose = any(
-        isinstance(value, list | Quantity) for name, value in quantities(scene.raw) if name[:5] in VARYING
-    )
-    inner = scene.k_lo * (1 + INSIDE), scene.k_hi * (1 - INSIDE)
-    return inner[1] if not loose and inner[0] < inner[1] else scene.k_lo.union(scene.k_hi)
-
-
-def falls_short(s: Side, lo: Arb, hi: Arb) -> bool:
-    """Whether jogs with angles in [lo, hi] are proved to go outward by less than the landing scatters."""
-    rise = rise_of_jog(s, *sine_cosine(lo.union(hi)))
-    end = at_angle(s, hi).D
-    moved = end if rise > 0 else end - rise * ZERO.union(hi - lo)
-    return bool(moved < s.landing)
-
-
 def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float, float]:
     """Bound from below the shares of the arm whose starts are claimed, and whose starts are lost or creep inward."""
     if starts.kind in ("every", "almost-every", "within"):
         return 1.0, 0.0
+    if starts.kind == "from_foot":
+        return shares_from_foot(scene, starts)
     length = claimed = explained = 0.0
     end = float_below(exact(scene.arm[0]))
     if starts.laid is not None:
@@ -346,10 +323,26 @@ def shares(c: Cells, scene: Scene, starts: Starts, cells: Array) -> tuple[float,
     return claimed / length * room, explained / length * room
 
 
+def shares_from_foot(scene: Scene, starts: Starts) -> tuple[float, float]:
+    """Bound from below the shares, of the starts with each value of the parameters, that are claimed, and lost."""
+    least, most = (
+        sum(arm - foot for foot in feet)
+        for arm, feet in (
+            (float_below(exact(scene.arm[0])), [float_above(s.a) for s in scene.sides]),
+            (float_above(exact(scene.arm[1])), [float_below(s.a) for s in scene.sides]),
+        )
+    )
+    claimed, lost = 1.0 - sum(starts.x or ()) / least, sum(starts.lost or ()) / most
+    return claimed * (1 - 2.0**-30), lost * (1 - 2.0**-30)  # against the rounding of the sums
+
+
 def starts_in_words(starts: Starts, noisy: bool) -> str:
     """Put the starts in words, with the numbers that are checked."""
     some = "every start a_i < x <= arm.length on every side i"
-    if starts.x is not None:
+    if starts.kind == "from_foot":
+        beyond = [f"x - a_{i} > {x!r} on side {i}" for i, x in enumerate(starts.x or ())]
+        some = f"every start with {', or '.join(beyond)}, up to arm.length, whatever a_i is"
+    elif starts.x is not None:
         beyond = [f"{x!r} < x <= arm.length on side {i}" for i, x in enumerate(starts.x)]
         some = f"every start with {', or '.join(beyond)}"
     elif starts.laid is not None:
@@ -377,6 +370,7 @@ def explained_in_words(starts: Starts) -> list[str]:
         if fixed is not None:
             lines.append(f"    side {i}: starts a_{i} < x < {fixed[0]!r} stay on it and creep to a_{i}")
         elif starts.lost is not None:
-            lost = f"each start a_{i} < x <= {starts.lost[i]!r} is lost by a worst sequence of landings"
+            foot = f"a_{i} + " if starts.kind == "from_foot" else ""
+            lost = f"each start a_{i} < x <= {foot}{starts.lost[i]!r} is lost by a worst sequence of landings"
             lines.append(f"    side {i}: {lost}")
     return lines

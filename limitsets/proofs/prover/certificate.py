@@ -270,6 +270,15 @@ def tidy(table: Any) -> Any:
     return " ".join(table.split()) if isinstance(table, str) else table
 
 
+def scene_of(cover: Cover) -> dict[str, Any]:
+    """Return the scene of a cover as a certificate has it: its only effect is a spread, and it names its model."""
+    scene = {word: tidy(table) for word, table in cover.box.scene.items() if word != "effects"}
+    scene["model"] = _model(cover)
+    if cover.box.scene.get("effects", {}).get("spread"):
+        scene["effects"] = {"spread": cover.box.scene["effects"]["spread"]}
+    return scene
+
+
 def write(
     path: str | Path,
     proofs: Sequence[Attraction],
@@ -314,13 +323,8 @@ def write(
     boxes = []
     for number, proof in enumerate(proofs):
         packed |= arrays_of(proof, f"{number}.")
-        cover = proof.cover
-        # the only effect here is a spread; a scene may leave the model to its defaults
-        scene = {word: tidy(table) for word, table in cover.box.scene.items() if word != "effects"}
-        scene["model"] = _model(cover)
-        if cover.box.scene.get("effects", {}).get("spread"):
-            scene["effects"] = {"spread": cover.box.scene["effects"]["spread"]}
-        boxes.append({"scene": scene, "parameters": _parameters(cover), "prefix": f"{number}."})
+        parameters = _parameters(proof.cover)
+        boxes.append({"scene": scene_of(proof.cover), "parameters": parameters, "prefix": f"{number}."})
     return pack(
         path,
         _model(proofs[0].cover),

@@ -437,20 +437,6 @@ class _Spans(Numbers):
         return [side[4] for side in sides], p, q
 
 
-def lengths_of(scene: Scene, tree: Mapping[str, Any]) -> dict[str, RationalInterval]:
-    """Name the lengths of the part, and say what is known of each, in the scene's unit."""
-    reader = _Spans(scene.unit, tree)
-    names = [name for name, _ in texts(tree["part"], "part") if find(name).dimension == "length"]
-    return {name: reader.span(name) for name in names}
-
-
-def body_at(
-    scene: Scene, tree: Mapping[str, Any], lengths: Mapping[str, Any]
-) -> tuple[list[tuple[Any, ...]], Any]:
-    """Return (a, d, length) of every side and the radius of gyration, in whatever arithmetic the lengths are given."""
-    return _Spans(scene.unit, tree, instead=lengths).body()
-
-
 def _require_rest(
     sides: Sequence[tuple[Any, ...]],
     rests: Sequence[bool],

@@ -240,7 +240,9 @@ def _starts(starts: Any) -> str | None:
     if "within" in starts:
         spans = [(side, *pair) for side, pairs in starts["within"].items() for pair in pairs]
         return "within " + ", ".join(f"x = {lo:.6g} to {hi:.6g} on side {side}" for side, lo, hi in spans)
-    return "from " + ", ".join(f"x = {x:.6g} on side {side}" for side, x in starts["from"].items())
+    ((word, places),) = starts.items()
+    foot = " - a_{}" if word == "from_foot" else ""
+    return "from " + ", ".join(f"x{foot.format(side)} = {x:.6g} on side {side}" for side, x in places.items())
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from limitsets.feeder.goals import Goal, Reaches
 from limitsets.feeder.scene import Scene, load
 from limitsets.proofs.prover.attraction import Attraction, attraction
 from limitsets.proofs.prover.cover import cover
+from limitsets.proofs.prover.from_foot import FromFoot, is_nearly_all, starts_from_foot
 from limitsets.proofs.prover.goals import Answer, cuts, prove, prove_or_refute
 from limitsets.proofs.prover.goals.kind import against, undecided
 from limitsets.proofs.prover.goals.laid_starts import laid_only, narrowed, starts_in
@@ -169,7 +170,7 @@ def _followed(
 
 
 # The words for the starts of a goal, from the most starts to the fewest.
-STARTS = ("every", "within", "almost-every", "from", "cells")
+STARTS = ("every", "within", "almost-every", "from", "from_foot", "cells")
 
 
 def weakest_of(claims: Sequence[Claim], attractions: Sequence[Attraction]) -> Claim:
@@ -191,6 +192,12 @@ def weakest_of(claims: Sequence[Claim], attractions: Sequence[Attraction]) -> Cl
                 side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]
             }
         most, whole = zip(*(one.shares_from(section) for one in attractions), strict=True)
+    elif isinstance(starts, dict) and "from_foot" in starts:
+        feet = [starts_from_foot(one) for one in attractions]
+        joined = FromFoot.of_all([one for one in feet if one is not None])
+        starts, section = joined.starts, section | joined.section
+        most = tuple(joined.shares_of(one) for one in attractions)
+        whole = tuple(one is not None and is_nearly_all(each) for one, each in zip(feet, most, strict=True))
     else:
         section["starts"] = weakest.section["starts"]
         most, whole = tuple(claim.shares for claim in claims), (True,)
@@ -198,15 +205,15 @@ def weakest_of(claims: Sequence[Claim], attractions: Sequence[Attraction]) -> Cl
     shares = {key: pick(each[key] for each in most) for key, pick in least.items()}
     notes = {claim.note for claim in claims}
     note = notes.pop() if len(notes) == 1 else ""
-    joined = replace(weakest, section=section, counterexample=(), starts=starts, shares=shares, note=note)
+    claim = replace(weakest, section=section, counterexample=(), starts=starts, shares=shares, note=note)
     if all(whole):
-        return joined
+        return claim
     share = math.ceil(1000.0 * shares["open"]) / 10.0
     reason = (
         "each value is proved alone, but near the joint starts that come out at one value may stay behind at another:"
         f" of {share:g} % of the starts the same is not proved for all, and 1 % may be"
     )
-    return replace(joined, verdict="proved-on-cells", reason=reason)
+    return replace(claim, verdict="proved-on-cells", reason=reason)
 
 
 def _weakest_numbers(sections: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -16,6 +16,8 @@ import numpy as np
 from limitsets.feeder.goals import Goal, laid_words, unknown_goal
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction, near_section
+from limitsets.proofs.prover.basin import MOST_UNEXPLAINED
+from limitsets.proofs.prover.from_foot import is_nearly_all, starts_from_foot
 from limitsets.proofs.prover.goals import kinds, reaches
 from limitsets.proofs.prover.goals.kind import Answer, Kind, undecided
 from limitsets.proofs.prover.goals.laid_starts import (
@@ -127,6 +129,9 @@ def _for_starts(attraction: Attraction, answer: Answer, *, almost: bool) -> Answ
     """Say for which starts a goal holds that is proved of the attracting cells."""
     basin, starts = attraction.basin, attraction.basin.starts
     shares, missing = basin.shares, basin.missing
+    foot = starts_from_foot(attraction) if starts == "cells" and basin.open > MOST_UNEXPLAINED else None
+    if foot is not None and is_nearly_all(foot.shares_of(attraction)):
+        starts, shares = foot.starts, foot.shares_of(attraction)
     if almost:
         starts = "almost-every" if starts == "every" else starts
         flat = not_null(attraction) if starts != "cells" else ""
@@ -134,7 +139,9 @@ def _for_starts(attraction: Attraction, answer: Answer, *, almost: bool) -> Answ
             starts, missing = "cells", missing or flat
             shares = attraction.shares
     section: dict[str, Any] = {**answer.section, "starts": starts}
-    if isinstance(starts, dict):
+    if foot is not None and starts == foot.starts:
+        section |= foot.section
+    elif isinstance(starts, dict):
         section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
         if attraction.cover.box.landing > 0.0:
             finite = ((side, float(x)) for side, x in enumerate(basin.explained) if np.isfinite(x))
@@ -170,13 +177,17 @@ def sentence(section: Mapping[str, Any]) -> str:
     """Put a proved goal in words for people, from its section of the certificate."""
     said = KINDS[section["kind"]].sentence(section)
     starts = section.get("starts")
-    if isinstance(starts, dict) and "from" not in starts:
+    if isinstance(starts, dict) and not starts.keys() & {"from", "from_foot"}:
         return _of_laid(section, said)
     if section.get("from_anywhere") or starts is None:
         return said
     if isinstance(starts, str):
         return f"{said} {COMES[starts]}"
-    beyond = ", ".join(f"x > {float.fromhex(x):.6g} on side {side}" for side, x in starts["from"].items())
+    ((word, places),) = starts.items()
+    beyond = ", ".join(
+        f"x{f' - a_{side}' * (word == 'from_foot')} > {float.fromhex(x):.6g} on side {side}"
+        for side, x in places.items()
+    )
     but = ", but for starts of total length zero" if "thinning" in section else ""
     return f"{said} Every start with {beyond} comes to the attracting cells{but}."
 

@@ -15,6 +15,7 @@ from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.goals import AttractsAll, FlipOrder, OrientedBeyond, Predicate, StaysOnArm
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction
+from limitsets.proofs.prover.bands import throws_below
 from limitsets.proofs.prover.cover import targets
 from limitsets.proofs.prover.goals.kind import (
     Answer,
@@ -40,7 +41,6 @@ from limitsets.proofs.prover.goals.recurrent_orbits import (
 )
 from limitsets.proofs.prover.goals.violating_orbits import State, one_throw, start_that_leaves
 from limitsets.proofs.prover.thinning import perron_frobenius_bound, slopes
-from limitsets.proofs.prover.two_throws import stays_below
 from limitsets.systems.cells import CellSet, cell_ends
 from limitsets.systems.maps import codes
 
@@ -220,8 +220,9 @@ def _prove_oriented_beyond(attraction: Attraction, scene: Scene, goal: OrientedB
         cells = "1 attracting cell reaches" if bad.sum() == 1 else f"{bad.sum()} attracting cells reach"
         beyond = f"{cells} beyond x = {goal.x:g} {scene.unit} on other sides than {goal.side}"
         reason = missing or (beyond if bad.any() else "")
-        if reason and not missing and stays_below(attraction, scene, bad, below(goal.x)):
-            reason, more = "", {"throws": 2}
+        throws = throws_below(attraction, bad, below(goal.x)) if reason and not missing else 0
+        if throws:
+            reason, more = "", {"throws": throws}
     if reason:
         return undecided(reason)
     ends = max(hi for parts in attraction.cells.extents().values() for _, hi in parts)
@@ -278,7 +279,8 @@ def _sentence_oriented_beyond(section: Mapping[str, Any]) -> str:
     if section.get("from_anywhere"):
         return f"After a throw from {begins(section)}, every part {beyond}"
     if section.get("throws"):
-        return f"After two throws with the same parameters in the attracting cells, every part {beyond}"
+        throws = "a throw" if section["throws"] == 1 else f"{section['throws']} throws"
+        return f"After {throws} with the same parameters in the attracting cells, every part {beyond}"
     return f"In the attracting cells, every part {beyond}"
 
 
