@@ -245,4 +245,4 @@ def widest(box: Box, chains: list[Chain]) -> int:
         one_way = all(d >= 0 for d in by) or all(d <= 0 for d in by)
         size = max(float(d.rad() if one_way else abs(d).upper()) for d in by)
         costs.append(size * float(abs(off).upper()))
-    return int(np.argmax(costs))
+    return box.free[int(np.argmax(costs))]

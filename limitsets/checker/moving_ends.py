@@ -81,16 +81,22 @@ class Box:
     ends: list[Pair]
     places: dict[Chain, Moving | None] = field(default_factory=dict)
     angles: dict[Chain, Moving | None] = field(default_factory=dict)
+    corners: "dict[tuple[Pair, ...], Box]" = field(default_factory=dict)
+
+    @cached_property
+    def free(self) -> list[int]:
+        """The parameters that are intervals: slopes are by these."""
+        return [k for k, (lo, hi) in enumerate(self.ends) if lo < hi]
 
     @cached_property
     def middle(self) -> list[Arb]:
-        """The middle of each parameter."""
-        return [arb(lo + (hi - lo) / 2) for lo, hi in self.ends]
+        """The middle of each of these."""
+        return [arb(lo + (hi - lo) / 2) for lo, hi in map(self.ends.__getitem__, self.free)]
 
     @cached_property
     def balls(self) -> list[Arb]:
-        """The range of each parameter."""
-        return [arb(lo).union(arb(hi)) for lo, hi in self.ends]
+        """The range of each."""
+        return [arb(lo).union(arb(hi)) for lo, hi in map(self.ends.__getitem__, self.free)]
 
     @cached_property
     def off(self) -> list[Arb]:
@@ -100,11 +106,14 @@ class Box:
     @cached_property
     def sides(self) -> list[tuple[Any, ...]]:
         """What throws from each side depend on: a, d, shift, rho^2, kappa and h."""
-        own = centred([ZERO, *self.middle], [ZERO, *self.balls], [ZERO, *self.off])[1:]
+        values: list[Any] = [arb(lo) for lo, _ in self.ends]
+        free = centred([ZERO, *self.middle], [ZERO, *self.balls], [ZERO, *self.off])[1:]
+        for k, number in zip(self.free, free, strict=True):
+            values[k] = number
         part, unit = self.scene.raw["part"], LENGTHS[self.scene.unit]
-        numbers = dict(zip(read_wide(part, unit)[0], own[PART:], strict=True))
+        numbers = dict(zip(read_wide(part, unit)[0], values[PART:], strict=True))
         rests, rho = part_with(part, unit, numbers)
-        return [(a, d, shift, rho * rho, *own[:PART]) for a, d, _, shift in rests]
+        return [(a, d, shift, rho * rho, *values[:PART]) for a, d, _, shift in rests]
 
     def throw(self, side: int, middle: Arb, angle: Arb) -> Thrown:
         """Throw from a side with the angles of a ball and all parameters, each number about that at the middles."""
@@ -117,7 +126,7 @@ class Box:
         s = Side(a, d, known.length, h=h, rho2=rho2, arm=known.arm, exact=known.exact, signed=known.signed)
         s.shift, s.small_d, s.ell = shift, d if known.small_d > 0 else ZERO, ell2.sqrt()
         s.hd, s.over_2m = h + d, HALF / (rho2 + ell2)
-        return by_angle(s, kappa, Centred(middle, angle, [ONE, *(ZERO for _ in self.ends)], off))
+        return by_angle(s, kappa, Centred(middle, angle, [ONE, *(ZERO for _ in self.free)], off))
 
     def moving(self, middle: Arb, slopes: list[Arb]) -> Moving:
         """Enclose a number over the box by the mean value theorem."""
@@ -158,8 +167,8 @@ class Box:
         place, s = self.place(chain), self.scene.sides[side]
         if place is None:
             return None
-        a, d, *_ = (z.at if isinstance(z, Centred) else z for z in self.sides[side])
-        a, d, x, kappa = (float(z.mid()) for z in (a, d, place.middle, self.middle[KAPPA]))
+        known = (z.at if isinstance(z, Centred) else z for z in self.sides[side])
+        a, d, _, _, kappa, _, x = (float(z.mid()) for z in (*known, place.middle))
         late = (x + math.sqrt(max(x * x + 2 * kappa * (d + math.hypot(a, d)), 0.0))) / kappa
         guess = guess_root((a, d, d if s.small_d > 0 else 0.0, a), s.exact, x, kappa, late)
         return self.root(side, "begins", place, arb(guess)) if 0 < guess < FULL_TURN else None
@@ -170,11 +179,14 @@ class Box:
         The number that decides is monotone on the angles of the cells that are not decided, which hold the change, and
         on a ball that has a root for each parameter; they overlap, so that the two are one.
         """
-        undecided, none = arb(change.first).union(arb(change.last)), [ZERO] * len(self.ends)
+        undecided, none = arb(change.first).union(arb(change.last)), [ZERO] * len(self.free)
         guess = undecided.mid()
         for _ in range(GUESSES):
             number = self.throw(change.side, guess, guess).decides
-            guess = (guess - number.at / number.by[0].mid()).mid()
+            step = (number.at / number.by[0].mid()).mid()
+            guess = (guess - step).mid()
+            if abs(step) < LEAST_BALL * guess:
+                break
         found = self.root(change.side, "decides", Moving(ZERO, ZERO, none), guess) if guess > 0 else None
         if found is None or not found.over.overlaps(undecided):
             return None
@@ -195,7 +207,7 @@ class Box:
         """Compute what `place` keeps."""
         *before, last = chain
         if isinstance(last, float):
-            return Moving(arb(last), arb(last), [ZERO] * len(self.ends))
+            return Moving(arb(last), arb(last), [ZERO] * len(self.free))
         side, branch, sign = (last.side, None, 0) if isinstance(last, Change) else last
         angle = self.angle((*before, last) if branch is None else tuple(before), side)
         if angle is None:
@@ -215,16 +227,18 @@ class Box:
         if place is None:
             return arb("inf")
         corner = self.worst(place)
-        return (
-            place.over.upper() if corner.ends == self.ends else place.over.upper().min(corner.highest(chain))
-        )
+        top = place.over.upper()
+        return top if corner is self else top.min(corner.highest(chain))
 
     def worst(self, place: Moving, *, point: bool = False) -> "Box":
         """Return the part of the box where a place is highest; with `point` one point of it."""
-        ends = []
-        for d, mid, (lo, hi) in zip(place.slopes, map(float, self.middle), self.ends, strict=True):
-            ends.append((hi, hi) if d >= 0 else (lo, lo) if d <= 0 else (mid, mid) if point else (lo, hi))
-        return self if ends == self.ends else Box(self.scene, ends)
+        ends = self.ends.copy()
+        for k, d, mid in zip(self.free, place.slopes, map(float, self.middle), strict=True):
+            lo, hi = ends[k]
+            ends[k] = (hi, hi) if d >= 0 else (lo, lo) if d <= 0 else (mid, mid) if point else (lo, hi)
+        if ends == self.ends:
+            return self
+        return self.corners.setdefault(tuple(ends), Box(self.scene, ends))
 
     def is_below(self, one: Chain, other: Chain, *, strictly: bool = False) -> bool:
         """Whether one chain is proved to end at another's end or before, for all parameters."""

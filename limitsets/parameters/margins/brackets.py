@@ -213,7 +213,7 @@ def _grow(
         outcome = query.prove(scale.piece(scale.between(sign * low, sign * high)), finest=finest)
         if outcome.verdict == "proved":
             pieces.append(outcome)
-            low, share = high, min(share * Fraction(9, 8), Fraction(3))
+            low, share = high, min(share * Fraction(33, 32), Fraction(3))
             step = share * (wall - high)
             tell(float(low / target))
         else:

@@ -65,14 +65,14 @@ class Sensitivity:
         By how much each falls when a quantity rises by its tolerance.
     cost : ndarray, shape (n, quantities)
         By how much less is proved of each when a quantity may be anywhere in its tolerance, proved as noise.
-    two_throws : ndarray of bool, shape (n,)
-        Whether two throws with the same parameters are looked at: then what is proved falls as the corners do.
+    same_throws : ndarray of bool, shape (n,)
+        Whether throws with the same parameters are followed: then what is proved falls as the corners do.
     """
 
     slack: Array
     fall: Array
     cost: Array
-    two_throws: Mask
+    same_throws: Mask
 
     @classmethod
     def none(cls, quantities: int) -> Sensitivity:
@@ -127,13 +127,13 @@ def sensitivity_of(query: Query, tolerance: Tolerance) -> Sensitivity:
     cost = np.maximum(np.array(costs), 1.2 * np.abs(fall))
     usable = np.isfinite(slack) & np.isfinite(fall).all(axis=0) & np.isfinite(cost).all(axis=0)
     sides = query.scene.sides.a
-    two_throws = [
+    same_throws = [
         isinstance(goal, OrientedBeyond) and not goal.from_anywhere
         for goal in query.goals
         for _ in _slack_of(goal, sides.tolist())
     ]
     return Sensitivity(
-        slack[usable], fall.T[usable], cost.T[usable], np.array(two_throws, dtype=bool)[usable]
+        slack[usable], fall.T[usable], cost.T[usable], np.array(same_throws, dtype=bool)[usable]
     )
 
 
@@ -169,7 +169,7 @@ def _proved_slack(query: Query, piece: SceneBox | None) -> Array:
 # ----------------------------------------------------------------
 # Proof of goals over a box of scenes by adaptive subdivision.
 #
-# Two throws with the same parameters may settle the box as a whole (`proofs/prover/two_throws.py`).  Otherwise a piece
+# Throws with the same parameters may settle the box as a whole (`proofs/prover/bands.py`).  Otherwise a piece
 # counts as noise, which costs about as much slack again as its deviation.  Pieces therefore have to be narrow near the
 # worst corner, in the quantities of large sensitivity, and nowhere else.
 
@@ -248,7 +248,7 @@ class Subdivision:
             return _Guess(1.0, 1.0, k, (part.low[k] + part.high[k]) / 2)
         costs, fall = self.cost * known.cost, np.abs(known.fall)
         at_corner = known.slack - known.fall @ (0.5 * (low + high)) - fall @ half
-        left = at_corner - np.where(known.two_throws[:, None], 0.0, np.maximum(costs - fall, 0.0)) @ half
+        left = at_corner - np.where(known.same_throws[:, None], 0.0, np.maximum(costs - fall, 0.0)) @ half
         worst = int(np.argmin(left))
         k = int(np.argmax(costs[worst] * half))
         # the part on the good side is to be as long as it may be
@@ -259,6 +259,15 @@ class Subdivision:
         width = (part.high[k] - part.low[k]) * Fraction(steps, 16)
         at = part.high[k] - width if known.fall[worst, k] > 0.0 else part.low[k] + width
         return _Guess(float(left[worst]), float(at_corner[worst]), k, at)
+
+    def whole(self) -> bool:
+        """Prove the box in one piece, as throws with the same parameters may settle it; whether that succeeds."""
+        count = len(self.tolerance.scales)
+        whole = _SubBox(Fraction(0), 0, (Fraction(-1),) * count, (Fraction(1),) * count)
+        piece = self.tolerance.piece(whole.low, whole.high, self.factor)
+        outcome = self.query.prove(piece, self.noise, finest=1, bases=1)
+        self.proved = [(whole, outcome)] if outcome.verdict == "proved" else []
+        return bool(self.proved)
 
     def run(self, seconds: float, tell: Tell) -> tuple[Fraction, str]:
         """Prove parts, nearest first; up to which part of the factor all are proved, and what stops it."""
@@ -271,8 +280,7 @@ class Subdivision:
             if failed and part.near >= min(near for near, _ in failed):
                 continue
             guess = self.judge(part)
-            # the whole box is worth a try whatever is guessed: two throws with the same parameters may settle it
-            worth = part.number == 0 or guess.left > WORTH * guess.at_corner
+            worth = guess.left > WORTH * guess.at_corner
             outcome = self._try(part, guess.left) if worth else None
             if outcome is not None and outcome.verdict == "proved":
                 self.proved.append((part, outcome))
@@ -371,6 +379,9 @@ SECONDS = 150.0
 # Parts of the bracket's lower end that are proved in turn.
 STAGES = tuple(Fraction(n, 32) for n in (1, 2, 4, 8, 16, 24, 32))
 
+# A box that is proved in one piece is this near to the largest such box, as a share.
+ONE_PIECE = Fraction(1, 32)
+
 # Corners whose factor is bracketed, the worst first; factors between which it is sought.
 CORNERS, SMALL, LEAST, MOST = 4, Fraction(1, 16), Fraction(1, 10**6), Fraction(10**6)
 
@@ -416,21 +427,18 @@ def joint_margin(
     bad, reason, target = at_corners.refuted, at_corners.reason, at_corners.proved
     target = rounded(target if bad is None else min(target, bad * (1 - share * Fraction(9, 10))))
     tell(0.05)
-    proved, pieces, noise = Fraction(0), list[Outcome](), dict[str, str]()
+    kept = _Proved(query, vector, sensitivity)
+    if target > 0 and not kept.in_one_piece(target):
+        halved(Fraction(0), target, kept.in_one_piece, ONE_PIECE, LEAST, rounded)
     end = time.perf_counter() + seconds
-    for stage in STAGES if target > 0 else ():
+    for stage in (each for each in STAGES if target * each > kept.factor):
         # the smaller box first: what is proved of it stands, whatever becomes of the larger one
-        cutting = Subdivision(query, vector, rounded(target * stage), sensitivity)
         left = end - time.perf_counter()
-        part, why = cutting.run(left if stage == STAGES[-1] else left / 2, tell)
-        part, missing = cutting.joined(part)
-        reason = missing or why or reason
-        if part * cutting.factor <= proved:
+        whole, why = kept.in_pieces(rounded(target * stage), left if stage == STAGES[-1] else left / 2, tell)
+        reason = why or reason
+        if not whole:
             break
-        proved, noise = part * cutting.factor, cutting.noise
-        pieces = cutting.within(part)
-        if part < 1:
-            break
+    proved, noise, pieces = kept.factor, kept.noise, kept.pieces
     closed = bad is not None and bad - proved <= share * bad
     reason = reason or "no orbit is found that violates it nearer to what is proved"
     return Margin(
@@ -453,17 +461,75 @@ def joint_margin(
     )
 
 
+@dataclass
+class _Proved:
+    """The largest box that is proved: its factor, and the pieces that prove it."""
+
+    query: Query
+    tolerance: Tolerance
+    sensitivity: Sensitivity
+    factor: Fraction = Fraction(0)
+    noise: dict[str, str] = field(default_factory=dict)
+    pieces: list[Outcome] = field(default_factory=list)
+
+    def in_one_piece(self, factor: Fraction) -> bool:
+        """Prove the box of a factor as a whole, if that can be done."""
+        cutting = Subdivision(self.query, self.tolerance, factor, self.sensitivity)
+        return cutting.whole() and self._keep(cutting, Fraction(1))[0]
+
+    def in_pieces(self, factor: Fraction, seconds: float, tell: Tell) -> tuple[bool, str]:
+        """Prove the box of a factor piece by piece: whether all of it is, and what stops it."""
+        cutting = Subdivision(self.query, self.tolerance, factor, self.sensitivity)
+        part, why = cutting.run(seconds, tell)
+        whole, missing = self._keep(cutting, part)
+        return whole, missing or why
+
+    def _keep(self, cutting: Subdivision, part: Fraction) -> tuple[bool, str]:
+        """Keep what proves a part of a box, as far as it is one claim, where that is more than before."""
+        part, missing = cutting.joined(part)
+        if part * cutting.factor > self.factor:
+            self.factor, self.noise = part * cutting.factor, cutting.noise
+            self.pieces = cutting.within(part)
+        return part == 1, missing
+
+
 def _at_corners(query: Query, tolerance: Tolerance, sensitivity: Sensitivity, width: Fraction) -> Bracket:
     """Bracket the factor at the worst corners, as single scenes."""
     count, bracket, proved = len(tolerance.scales), Bracket(), list[Fraction]()
-    for signs in (sensitivity.corners() or [(1,) * count, (-1,) * count])[:CORNERS]:
+    waiting, tried = (sensitivity.corners() or [(1,) * count, (-1,) * count])[:CORNERS], set[Signs]()
+    while waiting:
+        signs = waiting.pop(0)
+        tried.add(signs)
         own = _at_one(Ray(query, tolerance, signs), width, bracket.refuted)
         proved.append(own.proved)
         if own.refuted is not None and (bracket.refuted is None or own.refuted < bracket.refuted):
             bracket.refuted, bracket.against = own.refuted, own.against
+            worse = _worse_corner(query, tolerance, own.refuted, signs)
+            waiting += [worse] if worse not in tried else []
         bracket.reason = bracket.reason or own.reason
     bracket.proved = min(proved)
     return bracket
+
+
+def _worse_corner(query: Query, tolerance: Tolerance, factor: Fraction, signs: Signs) -> Signs:
+    """Turn signs of a corner as long as its slack falls: that far out it need not be linear, nor of the same orbit."""
+
+    def slack(some: Signs) -> float:
+        try:
+            return float(_slack(query, tolerance.corner(factor, some), start).min(initial=math.inf))
+        except AnswerError:  # no such part
+            return math.inf
+
+    nominal = query.prove(finest=0).found
+    assert nominal is not None
+    start = on_limit_set(nominal)
+    least, best = slack(signs), signs
+    for k in [*range(len(signs))] * 2:
+        turned = (*best[:k], -best[k], *best[k + 1 :])
+        found = slack(turned)
+        if found < least:
+            least, best = found, turned
+    return best
 
 
 def _at_one(ray: Ray, width: Fraction, known: Fraction | None) -> Bracket:

@@ -16,7 +16,7 @@ from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.certificate import arrays_of, scene_of
 
 # Throws that are followed, and boxes of parameters: more of them gain little, as the certificate may be cut as well.
-MOST_THROWS, MOST_BOXES = 8, 60
+MOST_THROWS, MOST_BOXES = 4, 24
 
 # A parameter as narrow as this, relative to itself, is known but for rounding.
 KNOWN = 1e-9
