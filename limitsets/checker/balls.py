@@ -146,7 +146,7 @@ class Rising:
 
     def signed_square(self) -> "Rising":
         """Take z |z|, whose derivative 2 |z| is narrower than that of a product."""
-        size = abs(self.x)
+        size = abs(self.x) if self.x > 0 or self.x < 0 else ZERO.union(abs(self.x).upper())
         return Rising(self.x * size, [2 * size * d for d in self.by])
 
     def __gt__(self, other: Any) -> bool:

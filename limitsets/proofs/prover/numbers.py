@@ -17,11 +17,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import isqrt
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-from limitsets.base.arrays import Array, Ints
+from limitsets.base.arrays import Array
 
 # ----------------------------------------------------------------
 # Rational intervals: exact arithmetic for the few numbers that a scene's decimals give.
@@ -222,8 +222,6 @@ def _as(value: object) -> Intervals | None:
     """Make intervals of a number; None of another operand, whose own class may take intervals."""
     if isinstance(value, Intervals):
         return value
-    if isinstance(value, RationalInterval):
-        return Intervals.of(*value.outward())
     return Intervals.of(float(value)) if isinstance(value, (int, float)) else None
 
 
@@ -253,17 +251,6 @@ class Intervals:
         """Return one interval."""
         return cls(np.array([lo], dtype=float), np.array([lo if hi is None else hi], dtype=float))
 
-    def __getitem__(self, chosen: Ints) -> Intervals:
-        return Intervals(self.lo[chosen], self.hi[chosen])
-
-    def rows(self, count: int) -> Intervals:
-        """Return so many, where one stands for all."""
-        return Intervals(np.broadcast_to(self.lo, (count,)), np.broadcast_to(self.hi, (count,)))
-
-    def __float__(self) -> float:
-        """Return a middle: formulas are put in order by it."""
-        return float(0.5 * (self.lo + self.hi).mean())
-
     def __neg__(self) -> Intervals:
         return Intervals(-self.hi, -self.lo)
 
@@ -277,7 +264,7 @@ class Intervals:
     def __sub__(self, b: Intervals) -> Intervals:
         return _outward(self.lo - b.hi, self.hi - b.lo)
 
-    def __rsub__(self, other: RationalInterval | float) -> Intervals:
+    def __rsub__(self, other: float) -> Intervals:
         return -self + other
 
     @_with_operand(_as)
@@ -320,13 +307,9 @@ class Intervals:
 # Intervals with their derivatives (forward mode): narrow enclosures of functions over boxes.
 
 
-Number: TypeAlias = Any
-"""A `RationalInterval`, or `Intervals` of many boxes."""
-
-
 @dataclass(frozen=True)
 class Jet:
-    """A span, and the spans of its derivatives; or arrays of intervals.
+    """A span, and the spans of its derivatives.
 
     Examples
     --------
@@ -335,8 +318,8 @@ class Jet:
     RationalInterval(lo=Fraction(2, 1), hi=Fraction(4, 1))
     """
 
-    value: Number
-    derivatives: tuple[Number, ...]
+    value: Any  # a RationalInterval
+    derivatives: tuple[Any, ...]
 
     def __float__(self) -> float:
         return float(self.value)
@@ -344,20 +327,20 @@ class Jet:
     def __neg__(self) -> Jet:
         return Jet(-self.value, tuple(-d for d in self.derivatives))
 
-    def __add__(self, other: Jet | Number) -> Jet:
+    def __add__(self, other: Jet | RationalInterval) -> Jet:
         if isinstance(other, Jet):
             return Jet(self.value + other.value, _each(self.derivatives, other.derivatives))
         return Jet(self.value + other, self.derivatives)
 
     __radd__ = __add__
 
-    def __sub__(self, other: Jet | Number) -> Jet:
+    def __sub__(self, other: Jet | RationalInterval) -> Jet:
         return self + (-other)
 
-    def __rsub__(self, other: Number) -> Jet:
+    def __rsub__(self, other: RationalInterval) -> Jet:
         return Jet(other - self.value, tuple(-d for d in self.derivatives))
 
-    def __mul__(self, other: Jet | Number) -> Jet:
+    def __mul__(self, other: Jet | RationalInterval) -> Jet:
         if other is self:
             return Jet(self.value * self.value, tuple(2 * (self.value * d) for d in self.derivatives))
         if isinstance(other, Jet):
@@ -370,14 +353,14 @@ class Jet:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Jet | Number) -> Jet:
+    def __truediv__(self, other: Jet | RationalInterval) -> Jet:
         if not isinstance(other, Jet):
             return Jet(self.value / other, tuple(d / other for d in self.derivatives))
         ratio = self.value / other.value
         by = (one - ratio * two for one, two in zip(self.derivatives, other.derivatives, strict=True))
         return Jet(ratio, tuple(d / other.value for d in by))
 
-    def __rtruediv__(self, other: Number) -> Jet:
+    def __rtruediv__(self, other: RationalInterval) -> Jet:
         ratio = other / self.value
         return Jet(ratio, tuple(-(ratio * d) / self.value for d in self.derivatives))
 
@@ -392,11 +375,11 @@ class Jet:
         return bool(self.value > other)
 
 
-def _each(one: Sequence[Number], two: Sequence[Number]) -> tuple[Number, ...]:
+def _each(one: Sequence[RationalInterval], two: Sequence[RationalInterval]) -> tuple[RationalInterval, ...]:
     return tuple(a + b for a, b in zip(one, two, strict=True))
 
 
-def root(x: Jet | Number) -> Any:
+def root(x: Jet | RationalInterval) -> Any:
     """Square root.
 
     Raises
@@ -404,11 +387,9 @@ def root(x: Jet | Number) -> Any:
     ZeroDivisionError
         It may be 0, where it has no derivative.
     """
-    if isinstance(x, Intervals):
-        return x.square_root()
     if isinstance(x, RationalInterval):
         return square_root(x)
-    half_power = root(x.value)
+    half_power = square_root(x.value)
     return Jet(half_power, tuple(d / (2 * half_power) for d in x.derivatives))
 
 
