@@ -14,17 +14,25 @@ from flint import arb
 
 from .balls import Arb, Array, Pair, float_above, float_below, float_of, prove
 from .file import LENGTHS, Cells, quantity
-from .moving_ends import Box, Chain, Change, Thrown
+from .moving_ends import ByAngle, Change, MovingEnd, ParameterBox
 from .part import read_wide
 from .scene import Scene
 
-MOST_THROWS = 64
-MOST_BOXES = 1000  # of parameters
+MOST_SAME_THROWS = 64
+MOST_HALVED = 1000  # of parameters
 MOST_BANDS = 200  # after a throw
-PIECES, MOST_PIECES = 8, 2000  # of a range of angles, at first and at most
+ANGLE_PIECES, MOST_ANGLE_PIECES = 8, 2000  # of a range of angles, at first and at most
 
 
 Limit = Change | float | None
+
+
+class Interval(NamedTuple):
+    """Attracting cells side by side: their ends, and the angles of throws from them."""
+
+    side: int
+    ends: Pair
+    angles: Pair
 
 
 class Image(NamedTuple):
@@ -45,8 +53,8 @@ class Band(NamedTuple):
     """A part of an interval of attracting cells: beyond all of some chains, and short of all of others."""
 
     of: int
-    lower: list[Chain]
-    upper: list[Chain]
+    lower: list[MovingEnd]
+    upper: list[MovingEnd]
 
 
 def intervals_of(c: Cells) -> Array:
@@ -93,33 +101,34 @@ def limits_of(
     return begin, end
 
 
-def check_angles(box: Box, side: int, angles: Pair, good: Callable[[Thrown], bool], what: str) -> None:
+def check_angles(
+    box: ParameterBox, side: int, angles: Pair, good: Callable[[ByAngle], bool], what: str
+) -> None:
     """Check something of throws with a range of angles and all parameters, cut finer where needed."""
-    stack, looked = list(itertools.pairwise(np.linspace(*angles, PIECES + 1).tolist())), 0
+    stack, looked = list(itertools.pairwise(np.linspace(*angles, ANGLE_PIECES + 1).tolist())), 0
     while stack:
         lo, hi = stack.pop()
         looked += 1
         mid = lo + (hi - lo) / 2
         if not good(box.throw(side, arb(mid), arb(lo).union(arb(hi)))):
-            prove(looked < MOST_PIECES and lo < mid < hi, f"side {side}: {what}")
+            prove(looked < MOST_ANGLE_PIECES and lo < mid < hi, f"side {side}: {what}")
             stack += [(lo, mid), (mid, hi)]
 
 
-def check_hypotheses(c: Cells, box: Box, number: Array, images: list[Image]) -> None:
+def check_hypotheses(box: ParameterBox, intervals: list[Interval], images: list[Image]) -> None:
     """Check that throws rise on every interval, and that what decides rises or falls where the branch changes."""
-    for one in range(int(number.max(initial=-1)) + 1):
-        own = np.flatnonzero(number == one)
+    for one in intervals:
         check_angles(
             box,
-            int(c.side[own[0]]),
-            (float(c.phi[own, 0].min()), float(c.phi[own, 1].max())),
+            one.side,
+            one.angles,
             lambda thrown: bool(thrown.begins.by[0] > 0 and thrown.jogs_to.by[0] > 0),
             "a throw is not proved to rise with x on the attracting cells",
         )
     limits = {limit for image in images for limit in (image.begin, image.end)}
     for change in (limit for limit in limits if isinstance(limit, Change)):
 
-        def monotone(thrown: Thrown, rises: bool = change.rises) -> bool:
+        def monotone(thrown: ByAngle, rises: bool = change.rises) -> bool:
             slope = thrown.decides.by[0]
             return bool(slope > 0) if rises else bool(slope < 0)
 
@@ -128,7 +137,7 @@ def check_hypotheses(c: Cells, box: Box, number: Array, images: list[Image]) -> 
 
 
 def throws_below(
-    c: Cells, scene: Scene, bad: Array, x: float, most: int, most_boxes: int = MOST_BOXES
+    c: Cells, scene: Scene, bad: Array, x: float, most: int, most_boxes: int = MOST_HALVED
 ) -> int:
     """Find after how many throws with the same parameters no part in an interval with bad cells rests beyond x.
 
@@ -145,32 +154,36 @@ def throws_below(
     number = intervals_of(c)
     images = images_of(c, number)
     own = np.unique(number[bad & (number >= 0)]).tolist()
-    edges = [own[[0, -1]] for own in (np.flatnonzero(number == k) for k in range(int(number.max()) + 1))]
-    ends = [(float(c.lower()[first]), float(c.upper()[last])) for first, last in edges]
+    intervals = []
+    for k in range(int(number.max(initial=-1)) + 1):
+        cells = np.flatnonzero(number == k)
+        angles = float(c.phi[cells, 0].min()), float(c.phi[cells, 1].max())
+        ends = float(c.lower()[cells[0]]), float(c.upper()[cells[-1]])
+        intervals.append(Interval(int(c.side[cells[0]]), ends, angles))
     begin = parameters_of(scene)
-    check_hypotheses(c, begin, number, images)
+    check_hypotheses(begin, intervals, images)
     stack, looked, needed = [begin], 0, 1
     beyond = f"throws with the same parameters may end beyond x = {x!r} on another side"
     while stack:
         box = stack.pop()
         looked += 1
-        throws, above = bands_below(box, images, ends, own, arb(x), most)
+        throws, above = bands_below(box, images, intervals, own, arb(x), most)
         if not above:
             needed = max(needed, throws)
             continue
         # where one scene of the box goes beyond, no halving helps
         point = box.worst(box.enclosed(above)[0], point=True)
-        prove(point is not box and not bands_below(point, images, ends, own, arb(x), most)[1], beyond)
-        k = widest(box, above)
+        prove(point is not box and not bands_below(point, images, intervals, own, arb(x), most)[1], beyond)
+        k = parameter_to_halve(box, above)
         lo, hi = box.ends[k]
         cut = lo + (hi - lo) / 2
         prove(looked + len(stack) < most_boxes and lo < cut < hi, beyond)
         halves = ((lo, cut), (cut, hi))
-        stack += [Box(scene, [*box.ends[:k], half, *box.ends[k + 1 :]]) for half in halves]
+        stack += [ParameterBox(scene, [*box.ends[:k], half, *box.ends[k + 1 :]]) for half in halves]
     return needed
 
 
-def parameters_of(scene: Scene) -> Box:
+def parameters_of(scene: Scene) -> ParameterBox:
     """Return the box of all parameters of a scene."""
     unit = LENGTHS[scene.unit]
     h = quantity(scene.raw["arm"]["surface_height"], "length", "arm.surface_height")
@@ -179,19 +192,22 @@ def parameters_of(scene: Scene) -> Box:
         (h.lo / unit, h.hi / unit),
         *((lo, hi) for _, lo, hi in read_wide(scene.raw["part"], unit)[0].values()),
     ]
-    return Box(scene, [kappa, *((float_of(lo, up=False), float_of(hi, up=True)) for lo, hi in own)])
+    return ParameterBox(scene, [kappa, *((float_of(lo, up=False), float_of(hi, up=True)) for lo, hi in own)])
 
 
 def bands_below(
-    box: Box, images: list[Image], ends: list[Pair], own: list[int], x: Arb, most: int
-) -> tuple[int, list[Chain]]:
+    box: ParameterBox, images: list[Image], intervals: list[Interval], own: list[int], x: Arb, most: int
+) -> tuple[int, list[MovingEnd]]:
     """Throw all intervals until the bands in some of them end at x or before: the throws, or chains beyond x."""
-    bands = [Band(k, [(lo,)], [(hi,)]) for k, (lo, hi) in enumerate(ends)]
-    throws, beyond = 0, list[Chain]()
+    bands = [Band(k, [(lo,)], [(hi,)]) for k, (_, (lo, hi), _) in enumerate(intervals)]
+    throws, beyond = 0, [(intervals[k].ends[1],) for k in own]
     while throws < most and len(bands) <= MOST_BANDS:
         throws += 1
         thrown = [
-            image_of(box, image, band, ends) for image in images for band in bands if band.of == image.of
+            image_of_band(box, image, band, intervals)
+            for image in images
+            for band in bands
+            if band.of == image.of
         ]
         bands = apart(box, [band for band in thrown if band is not None])
         above = (
@@ -205,21 +221,27 @@ def bands_below(
     return throws, beyond
 
 
-def image_of(box: Box, image: Image, band: Band, ends: list[Pair]) -> Band | None:
+def image_of_band(box: ParameterBox, image: Image, band: Band, intervals: list[Interval]) -> Band | None:
     """Throw the part of a band within the limits of an image; None where that part is proved to be empty."""
     lower = band.lower if image.begin is None else box.extreme([*band.lower, (image.begin,)], 1)
     upper = band.upper if image.end is None else box.extreme([*band.upper, (image.end,)], -1)
     if any(box.is_below(high, low, strictly=True) for high in upper for low in lower):
         return None
-    low, high = ends[image.to]
+    # throws rise on the angles of the interval, and on those of a chain that meet them
+    own = intervals[image.of].angles
+    low, high = intervals[image.to].ends
     below, above = (
-        [*((*chain, (image.side, image.branch, sign)) for chain in chains), (end,)]
-        for chains, sign, end in ((lower, -1, low), (upper, 1, high))
+        [
+            (*chain, (image.side, image.branch, sign))
+            for chain in chains
+            if box.lies_in(chain, image.side, own)
+        ]
+        for chains, sign in ((lower, -1), (upper, 1))
     )
-    return Band(image.to, box.extreme(below, 1), box.extreme(above, -1))
+    return Band(image.to, box.extreme([*below, (low,)], 1), box.extreme([*above, (high,)], -1))
 
 
-def apart(box: Box, bands: list[Band]) -> list[Band]:
+def apart(box: ParameterBox, bands: list[Band]) -> list[Band]:
     """Leave out the bands that lie in others."""
 
     def is_within(one: Band, other: Band) -> bool:
@@ -236,7 +258,7 @@ def apart(box: Box, bands: list[Band]) -> list[Band]:
     return kept
 
 
-def widest(box: Box, chains: list[Chain]) -> int:
+def parameter_to_halve(box: ParameterBox, chains: list[MovingEnd]) -> int:
     """Choose the parameter to halve: that along which chains neither rise nor fall, or one rises and another falls."""
     costs = []
     slopes = [place.slopes for place in box.enclosed(chains)]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .balls import float_of, prove
-from .bands import MOST_THROWS, throws_below
+from .bands import MOST_SAME_THROWS, throws_below
 from .cells import grown, leading_into, targets_of
 from .file import LENGTHS, Cells, one_length, require, rows, table, whole_number
 from .near_hinge import check_everywhere, check_thinning, near_landing, not_arriving
@@ -57,7 +57,7 @@ def read_goal(section: dict[str, Any], n_sides: int) -> dict[str, Any]:
         x = one_length(section["x"], "goal.x")
         goal |= {"x": x, "text": str(x), "side": count(section["side"], n_sides, "side")}
     if kind == "oriented_beyond":
-        goal["throws"] = count(section.get("throws", 0), MOST_THROWS + 1, "throws")
+        goal["throws"] = count(section.get("throws", 0), MOST_SAME_THROWS + 1, "throws")
         require(not (anywhere and goal["throws"]), "goal.throws are counted of attracting cells alone")
     if kind == "reaches":
         require(isinstance(section["every_orbit"], bool), "goal.every_orbit is neither true nor false")

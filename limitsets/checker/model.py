@@ -228,6 +228,8 @@ def guess_root(floats: tuple[float, ...], is_exact: bool, x: float, kappa: float
     last = math.inf
     # next to the joint the root is far smaller than p, and the first steps only halve the guess
     for k in range(100):
+        if not math.isfinite(p):
+            return math.nan
         sin, cos = math.sin(p), math.cos(p)
         a = first_a if sin > 0 else a_past
         slope = x - a * cos + d * sin - kappa * p

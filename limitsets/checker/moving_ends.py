@@ -20,12 +20,12 @@ from .scene import Scene, Side
 
 KAPPA, HEIGHT, PART = range(3)  # the parameters of a box: kappa, h, and from there the numbers of the part
 # Balls of angles tried for a root: how many, how wide the first is, how much wider the next than the enclosure.
-TRIED, LEAST_BALL, WIDER = 12, arb(2) ** -60, arb(1.05)
+TRIED, LEAST_BALL, INFLATED = 12, arb(2) ** -60, arb(1.05)
 # Steps of Newton's method to the middle of such a ball, with slopes over the box: each gains some digits.
 GUESSES = 8
 
 
-class Thrown(NamedTuple):
+class ByAngle(NamedTuple):
     """A throw by its impact angle: where it begins and jogs to, what decides (above 0: a flip), a flip's shift."""
 
     begins: Any
@@ -34,14 +34,14 @@ class Thrown(NamedTuple):
     shift: Any
 
 
-def by_angle(s: Side, kappa: Any, p: Any) -> Thrown:
+def by_angle(s: Side, kappa: Any, p: Any) -> ByAngle:
     """Throw with the angle p, in any arithmetic: no equation has to be solved.
 
     In the exact model sgn(om) K and sgn(X) V are compared by their roots, with their signs, which are smooth at 0.
     """
     if not s.exact:
         x = s.a + HALF * (kappa - s.small_d) * p
-        return Thrown(x, x - s.h * p, deciding(s, p, x, kappa), s.shift)
+        return ByAngle(x, x - s.h * p, deciding(s, p, x, kappa), s.shift)
     sin, cos = p.sin_cos()
     x = HALF * kappa * p + (s.a * sin - s.d * (ONE - cos)) / p
     jog = x - s.h * p + s.a * (ONE - cos) - s.d * (p - sin)
@@ -49,7 +49,7 @@ def by_angle(s: Side, kappa: Any, p: Any) -> Thrown:
     spin = s.rho2 + X * (x - kappa * p) + H * s.hd
     if not (s.signed or spin > 0):
         spin = -spin if -spin > 0 else arb("nan")
-    return Thrown(x, jog, spin * s.over_2m.sqrt() - X * (kappa / (s.ell + H)).sqrt(), s.shift)
+    return ByAngle(x, jog, spin * s.over_2m.sqrt() - X * (kappa / (s.ell + H)).sqrt(), s.shift)
 
 
 class Moving(NamedTuple):
@@ -69,19 +69,25 @@ class Change(NamedTuple):
     rises: bool
 
 
+def meets(ball: Arb, ends: Pair) -> bool:
+    """Whether a ball and an interval have a number in common."""
+    lo, hi = map(arb, ends)
+    return bool(lo in ball or hi in ball or (ball >= lo and ball <= hi))
+
+
 # A place, and then throws: each a side, a branch (0 jog, 1 flip), and to which end the landing is off (-1, 1).
-Chain = tuple[Any, ...]
+MovingEnd = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class Box:
+class ParameterBox:
     """A box of the parameters (kappa, h, and the lengths of the part that are intervals), and the chains in it."""
 
     scene: Scene
     ends: list[Pair]
-    places: dict[Chain, Moving | None] = field(default_factory=dict)
-    angles: dict[Chain, Moving | None] = field(default_factory=dict)
-    corners: "dict[tuple[Pair, ...], Box]" = field(default_factory=dict)
+    places: dict[MovingEnd, Moving | None] = field(default_factory=dict)
+    angles: dict[tuple[MovingEnd, int], Moving | None] = field(default_factory=dict)
+    corners: "dict[tuple[Pair, ...], ParameterBox]" = field(default_factory=dict)
 
     @cached_property
     def free(self) -> list[int]:
@@ -115,7 +121,7 @@ class Box:
         rests, rho = part_with(part, unit, numbers)
         return [(a, d, shift, rho * rho, *values[:PART]) for a, d, _, shift in rests]
 
-    def throw(self, side: int, middle: Arb, angle: Arb) -> Thrown:
+    def throw(self, side: int, middle: Arb, angle: Arb) -> ByAngle:
         """Throw from a side with the angles of a ball and all parameters, each number about that at the middles."""
         off = [angle - middle, *self.off]
         a, d, shift, rho2, kappa, h = (
@@ -146,21 +152,26 @@ class Box:
             if not (steep > 0 or steep < 0):
                 return None
             slopes = [(t - d) / steep for t, d in zip(target.slopes, others, strict=True)]
-            found = self.moving(guess - (number.at - target.middle) / steep, slopes)
-            if not found.over.is_finite():
+            angle = self.moving(guess - (number.at - target.middle) / steep, slopes)
+            if not angle.over.is_finite():
                 return None
-            if ball.contains_interior(found.over):
-                return found
-            ball = arb(guess, (abs(found.over - guess) * WIDER + least).upper())
+            if ball.contains_interior(angle.over):
+                return angle
+            ball = arb(guess, (abs(angle.over - guess) * INFLATED + least).upper())
         return None
 
-    def angle(self, chain: Chain, side: int) -> Moving | None:
+    def angle(self, chain: MovingEnd, side: int) -> Moving | None:
         """Enclose the angle of the throw from the end of a chain."""
-        if chain not in self.angles:
-            self.angles[chain] = self.angle_of(chain, side)
-        return self.angles[chain]
+        if (chain, side) not in self.angles:
+            self.angles[chain, side] = self.angle_of(chain, side)
+        return self.angles[chain, side]
 
-    def angle_of(self, chain: Chain, side: int) -> Moving | None:
+    def lies_in(self, chain: MovingEnd, side: int, angles: Pair) -> bool:
+        """Whether throws from the end of a chain are enclosed, by angles that meet a range."""
+        angle = self.angle(chain, side)
+        return angle is not None and meets(angle.over, angles)
+
+    def angle_of(self, chain: MovingEnd, side: int) -> Moving | None:
         """Compute what `angle` keeps."""
         if isinstance(chain[-1], Change):
             return self.changes(chain[-1])
@@ -187,23 +198,23 @@ class Box:
             guess = (guess - step).mid()
             if abs(step) < LEAST_BALL * guess:
                 break
-        found = self.root(change.side, "decides", Moving(ZERO, ZERO, none), guess) if guess > 0 else None
-        if found is None or not found.over.overlaps(undecided):
+        angle = self.root(change.side, "decides", Moving(ZERO, ZERO, none), guess) if guess > 0 else None
+        if angle is None or not meets(angle.over, (change.first, change.last)):
             return None
-        steep = self.throw(change.side, found.middle, found.over).decides.by[0]
-        return found if (steep > 0 if change.rises else steep < 0) else None
+        steep = self.throw(change.side, angle.middle, angle.over).decides.by[0]
+        return angle if (steep > 0 if change.rises else steep < 0) else None
 
-    def place(self, chain: Chain) -> Moving | None:
+    def place(self, chain: MovingEnd) -> Moving | None:
         """Enclose where a chain ends, the landing off by as much as it may be; None if that fails."""
         if chain not in self.places:
             self.places[chain] = self.place_of(chain)
         return self.places[chain]
 
-    def enclosed(self, chains: list[Chain]) -> list[Moving]:
+    def enclosed(self, chains: list[MovingEnd]) -> list[Moving]:
         """Return where chains end, as far as that is enclosed."""
         return [place for place in map(self.place, chains) if place is not None]
 
-    def place_of(self, chain: Chain) -> Moving | None:
+    def place_of(self, chain: MovingEnd) -> Moving | None:
         """Compute what `place` keeps."""
         *before, last = chain
         if isinstance(last, float):
@@ -221,7 +232,7 @@ class Box:
         slopes = [steep * d + other for d, other in zip(angle.slopes, others, strict=True)]
         return self.moving(number.at + sign * self.scene.sides[0].landing, slopes)
 
-    def highest(self, chain: Chain) -> Arb:
+    def highest(self, chain: MovingEnd) -> Arb:
         """Bound the end of a chain from above: a parameter with which it rises, or falls, counts at one end."""
         place = self.place(chain)
         if place is None:
@@ -230,7 +241,7 @@ class Box:
         top = place.over.upper()
         return top if corner is self else top.min(corner.highest(chain))
 
-    def worst(self, place: Moving, *, point: bool = False) -> "Box":
+    def worst(self, place: Moving, *, point: bool = False) -> "ParameterBox":
         """Return the part of the box where a place is highest; with `point` one point of it."""
         ends = self.ends.copy()
         for k, d, mid in zip(self.free, place.slopes, map(float, self.middle), strict=True):
@@ -238,9 +249,9 @@ class Box:
             ends[k] = (hi, hi) if d >= 0 else (lo, lo) if d <= 0 else (mid, mid) if point else (lo, hi)
         if ends == self.ends:
             return self
-        return self.corners.setdefault(tuple(ends), Box(self.scene, ends))
+        return self.corners.setdefault(tuple(ends), ParameterBox(self.scene, ends))
 
-    def is_below(self, one: Chain, other: Chain, *, strictly: bool = False) -> bool:
+    def is_below(self, one: MovingEnd, other: MovingEnd, *, strictly: bool = False) -> bool:
         """Whether one chain is proved to end at another's end or before, for all parameters."""
         if one == other:
             return not strictly
@@ -251,13 +262,13 @@ class Box:
         away = self.moving(a.middle - b.middle, slopes).over
         return bool(away < 0 if strictly else away <= 0)
 
-    def extreme(self, chains: list[Chain], sign: int) -> list[Chain]:
+    def extreme(self, chains: list[MovingEnd], sign: int) -> list[MovingEnd]:
         """Leave out chains of which the least (sign -1) or the greatest is sought: those never it, or not enclosed."""
 
-        def is_enough(one: Chain, other: Chain) -> bool:
+        def is_enough(one: MovingEnd, other: MovingEnd) -> bool:
             return self.is_below(one, other) if sign < 0 else self.is_below(other, one)
 
-        kept: list[Chain] = []
+        kept: list[MovingEnd] = []
         for chain in chains:
             if self.place(chain) is not None and not any(is_enough(one, chain) for one in kept):
                 kept = [*(other for other in kept if not is_enough(chain, other)), chain]

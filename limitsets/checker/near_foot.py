@@ -23,7 +23,7 @@ from .model import (
 from .near_hinge import near_angle, near_landing
 from .scene import MOST_HALVES, Scene, Side, quantities
 
-PIECES = 64  # of a range of angles
+JOG_PIECES = 64  # of a range of angles
 HALVINGS = 40  # of a range that holds an angle
 # A stated kappa keeps this share of itself from the ends of its noise, which are known to 100 bits.
 INSIDE = arb(2) ** -80
@@ -70,13 +70,13 @@ def check_outward(scene: Scene, side: int, until: float, away: float) -> None:
         s.landing < at_angle(s, first).D,
         "a jog is not proved to go outward by more than the landing scatters",
     )
-    cuts = [first * k / PIECES for k in range(PIECES)]
-    cuts += [first + (last - first) * k / PIECES for k in range(PIECES + 1)]
+    cuts = [first * k / JOG_PIECES for k in range(JOG_PIECES)]
+    cuts += [first + (last - first) * k / JOG_PIECES for k in range(JOG_PIECES + 1)]
     for k, (lo, hi) in enumerate(itertools.pairwise(cuts)):
         p = lo.union(hi)
         alone = not s.exact or landing_slope(s, ratios(p), scene.k_lo) > 0
         prove(alone, "the impact is not proved to be the only one")
-        if k >= PIECES:
+        if k >= JOG_PIECES:
             R = s.a + from_foot(s, lo, scene.k_lo).union(from_foot(s, hi, scene.k_hi))
             decision, rise, _ = over_angles(s, p, R, kappa)
             prove(decision == 0 and rise > 0, "a jog that goes the farther the later it lands is not proved")

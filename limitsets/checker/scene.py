@@ -5,6 +5,7 @@ docs/certificates.md, "What is claimed": the exact scene, a tolerance, noise at 
 
 import bisect
 import copy
+import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -172,6 +173,7 @@ def read_scene(raw: object, noise: object) -> Scene:
     rests, rho = narrow_part(scene["part"], unit)
     require(bool(rho > 0), "the radius of gyration is not positive")
     k_lo, k_hi = read_kappa(scene, noise, unit)
+    require(float(k_lo) > 0.0 and float(k_hi) < math.inf, "throw: kappa is no ordinary number")
     scatter = read_noise(noise, "landing.x", "length").ball() / exact(unit)
     flight, flip = read_model(scene["model"])
     require(reach.lo > 0, "arm.length is not positive")

@@ -95,6 +95,7 @@ def read_starts(section: dict[str, Any], goal: dict[str, Any], n_sides: int) -> 
     lost = None
     if "lost" in section:
         lost = [hex_float(each, "lost") for each in by_side(section["lost"], "lost", n_sides)]
+        require(kind != "from_foot" or min(lost) >= 0.0, "goal.lost is a distance below 0")
     almost = goal["kind"] == "reaches" and not goal["every"]
     starts = Starts(
         kind, x, thinning, near=near, lost=lost, only=almost and kind == "cells" and laid is None, laid=laid

@@ -139,6 +139,20 @@ def test_without_such_throws_or_with_too_few_the_cells_do_not_do(good, tmp_path)
     assert judged(f, tmp_path) == ("proved", "")
 
 
+def test_more_bands_than_are_followed_prove_nothing(good, tmp_path, monkeypatch):
+    monkeypatch.setattr(checker.bands, "MOST_BANDS", 1)
+    assert judged(good["one"].copy(), tmp_path)[0] == "failed"
+
+
+def test_angles_are_kept_by_the_side_of_the_throw():
+    """A number may be the end of cells on two sides: an angle kept for one of them was taken on the other."""
+    _, box = box_of(("exact", "signed"))
+    first = [float(box.angle((20.0,), side).middle) for side in (0, 2)]
+    _, again = box_of(("exact", "signed"))
+    assert [float(again.angle((20.0,), side).middle) for side in (2, 0)][::-1] == first
+    assert first[0] > first[1] + 0.1
+
+
 OTHER = [65, -2, 2.0, "2", True, None, 10**30]
 
 
@@ -261,6 +275,10 @@ OTHER_STARTS = [
     lambda s: s["starts"]["from_foot"].update({"0": (0.0).hex()}),
     lambda s: s["starts"]["from_foot"].update({"0": (40.0).hex()}),
     lambda s: s["lost"].update({"0": (40.0).hex()}),
+    lambda s: s["lost"].update({"0": (-0.1).hex()}),
+    lambda s: s["lost"].update({"0": (1e200).hex()}),
+    lambda s: s["lost"].update({str(k): (-1.7e308).hex() for k in range(3)}),
+    lambda s: s["starts"]["from_foot"].update({"0": (1e200).hex()}),
     lambda s: s.update(near_joint={str(k): {"q": (1.01).hex()} for k in range(3)}),
     lambda s: s.update(starts={"from": s["starts"]["from_foot"]}),
 ]

@@ -90,19 +90,6 @@ def test_the_landing_place_differs_at_every_throw():
     assert abs(0.02 * alone.refuted - landing.refuted) < 0.02 * landing.refuted
 
 
-@pytest.mark.sweep
-def test_what_runs_out_of_time_says_so_and_keeps_what_is_proved(tmp_path):
-    # the highest place of paper-initial off side 2 is three throws from what decides it: two throws do not settle the
-    # box; without any time each stage is tried once, as a whole: the same on every machine
-    initial = ls.load(ls.load("paper-initial").as_dict() | {"tolerance": TOLERANCE})
-    short = joint_margin(initial, (OrientedBeyond(21.7, 2),), seconds=0.0)
-    assert not short.closed
-    assert "time" in short.reason
-    assert short.proved > 0.0
-    (file, _) = short.save(tmp_path)
-    assert ls.recheck(file).verdict == "proved"
-
-
 def test_by_the_public_name_and_from_the_scene():
     (found,) = ls.margin(scene({"throw.speed": "0.5 %"}), "joint", width=0.05)
     assert (found.quantity, found.reading, found.unit) == ("joint", "tolerance", "")
@@ -135,14 +122,12 @@ def corner(factor, signs):
     return base.with_values(values | {"throw.kappa": base.kappa / (1 + 0.01 * factor * signs[0]) ** 2}).map
 
 
-@pytest.mark.sweep
 def test_nine_quantities_and_the_landing_place(tmp_path):
     found = joint_margin(scene(NINE), GOALS[:1], width=0.01, seconds=15.0)
-    # 0.47 is refuted; the parts' feet differ by more than the landings scatter, and below some x nothing is proved of
-    # the starts: beyond a factor of about 0.3 these are more than 1 % of the arm
-    assert 0.2 < found.proved < found.refuted < 0.48
-    assert not found.closed
-    assert found.reason
+    # the worst corner fails from 0.4714 on, as long orbits of it show
+    assert 0.465 <= found.proved < found.refuted < 0.473
+    assert found.closed
+    assert len(found.pieces) == 1
     assert found.noise.keys() == {"landing.x"}
     for file in found.save(tmp_path):
         word = "refuted" if file.name.endswith(".refuted.zip") else "proved"
@@ -155,6 +140,28 @@ def test_nine_quantities_and_the_landing_place(tmp_path):
         random = np.random.default_rng(0)
         reached = highest_scattered(corner(factor, worst), 0.01 * factor, random, 3000)
         assert (reached > 20.0) is above
+
+
+def test_what_runs_out_of_time_says_so_and_keeps_what_is_proved(tmp_path):
+    """paper-initial: the lesser of two chains of throws is highest, so that each alone would stop at 0.15."""
+    initial = ls.load(ls.load("paper-initial").as_dict() | {"tolerance": NINE})
+    found = joint_margin(initial, (OrientedBeyond(21.8, 2),), seconds=0.0)
+    assert 0.2 <= found.proved < found.refuted < 0.2225
+    assert not found.closed
+    assert "time" in found.reason
+    (file, _) = found.save(tmp_path)
+    assert ls.recheck(file).verdict == "proved"
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize(
+    ("name", "x"), [("paper-designed-small-angle", 13.0), ("paper-initial-small-angle", 20.6)]
+)
+def test_both_small_angle_scenes_close(name, x):
+    small = ls.load(ls.load(name).as_dict() | {"tolerance": NINE})
+    found = joint_margin(small, (OrientedBeyond(x, 2),), seconds=10.0)
+    assert found.closed
+    assert len(found.pieces) == 1
 
 
 @pytest.mark.parametrize(
@@ -282,7 +289,7 @@ def test_a_side_on_which_no_part_rests_has_no_room_to_lose():
     room = [310.0 - x[side == s].max() for s in range(1, 5) if (side == s).any()]
     assert len(room) < 4  # no part rests on the chamfer
     assert found.slack == pytest.approx(room, rel=0.05)
-    assert found.cost.shape == found.fall.shape == (len(room), 1)
+    assert found.fall.shape == (len(room), 1)
 
 
 def test_a_corner_that_becomes_flat_is_no_part():

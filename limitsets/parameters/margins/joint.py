@@ -12,12 +12,11 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import NamedTuple
 
 import numpy as np
 
 from limitsets.base import AnswerError
-from limitsets.base.arrays import Array, Mask
+from limitsets.base.arrays import Array
 from limitsets.feeder.goals import Goal, OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.margins.brackets import Bracket, Ray, Tell
@@ -63,22 +62,15 @@ class Sensitivity:
         In the scene as it is, one number for each way in which a goal can fail; negative where one does.
     fall : ndarray, shape (n, quantities)
         By how much each falls when a quantity rises by its tolerance.
-    cost : ndarray, shape (n, quantities)
-        By how much less is proved of each when a quantity may be anywhere in its tolerance, proved as noise.
-    same_throws : ndarray of bool, shape (n,)
-        Whether throws with the same parameters are followed: then what is proved falls as the corners do.
     """
 
     slack: Array
     fall: Array
-    cost: Array
-    same_throws: Mask
 
     @classmethod
     def none(cls, quantities: int) -> Sensitivity:
         """Return what is known where nothing attracts."""
-        nothing = np.zeros((0, quantities))
-        return cls(np.zeros(0), nothing, nothing, np.zeros(0, dtype=np.bool_))
+        return cls(np.zeros(0), np.zeros((0, quantities)))
 
     def corners(self) -> list[Signs]:
         """Signs of the worst corner for each way to fail, the worst of all first."""
@@ -103,13 +95,9 @@ def sensitivity_of(query: Query, tolerance: Tolerance) -> Sensitivity:
     if nominal is None or nominal.found is None or not (nominal.found.component >= 0).any():
         return Sensitivity.none(count)
     start, step = on_limit_set(nominal.found), float(CHANGE)
-    slack, level = (
-        _slack(query, tolerance.corner(Fraction(0), [0] * count), start),
-        _proved_slack(query, None),
-    )
-    falls, costs = [], []
-    for k, one in enumerate(tolerance.scales):
-        size = CHANGE * tolerance.sizes[k]
+    slack = _slack(query, tolerance.corner(Fraction(0), [0] * count), start)
+    falls = []
+    for k in range(count):
         ends = []
         for sign in (-1, 1):
             try:
@@ -118,23 +106,9 @@ def sensitivity_of(query: Query, tolerance: Tolerance) -> Sensitivity:
             except AnswerError:
                 ends.append(slack)
         falls.append((ends[0] - ends[1]) / (2 * step))
-        try:
-            low = _proved_slack(query, one.piece(one.between(-size, size)))
-        except AnswerError:
-            low = level
-        costs.append((level - low) / step)
     fall = np.array(falls)
-    cost = np.maximum(np.array(costs), 1.2 * np.abs(fall))
-    usable = np.isfinite(slack) & np.isfinite(fall).all(axis=0) & np.isfinite(cost).all(axis=0)
-    sides = query.scene.sides.a
-    same_throws = [
-        isinstance(goal, OrientedBeyond) and not goal.from_anywhere
-        for goal in query.goals
-        for _ in _slack_of(goal, sides.tolist())
-    ]
-    return Sensitivity(
-        slack[usable], fall.T[usable], cost.T[usable], np.array(same_throws, dtype=bool)[usable]
-    )
+    usable = np.isfinite(slack) & np.isfinite(fall).all(axis=0)
+    return Sensitivity(slack[usable], fall.T[usable])
 
 
 def _slack(query: Query, piece: SceneBox | None, start: tuple[float, int]) -> Array:
@@ -155,39 +129,22 @@ def _slack_of(goal: Goal, highest: Sequence[float]) -> list[float]:
     return []
 
 
-def _proved_slack(query: Query, piece: SceneBox | None) -> Array:
-    """Give the proved slack of each goal; 0 for a place to be reached, whose slack these cells do not prove."""
-    extents = query.cells(piece, STEP).cells.extents()
-    sides = range(query.scene.sides.a.size)
-    highest = [max((hi for _, hi in extents.get(side, ())), default=-math.inf) for side in sides]
-    slacks: list[float] = []
-    for goal in query.goals:
-        slacks += [0.0] if isinstance(goal, Reaches) else _slack_of(goal, highest)
-    return np.array(slacks)
-
-
 # ----------------------------------------------------------------
 # Proof of goals over a box of scenes by adaptive subdivision.
 #
-# Throws with the same parameters may settle the box as a whole (`proofs/prover/bands.py`).  Otherwise a piece
-# counts as noise, which costs about as much slack again as its deviation.  Pieces therefore have to be narrow near the
-# worst corner, in the quantities of large sensitivity, and nowhere else.
+# Throws with the same parameters may settle the box as a whole (`proofs/prover/bands.py`).  Otherwise the cells of a
+# piece let its quantities differ at every throw, as noise does.  Pieces therefore have to be narrow in the quantities
+# of large sensitivity, and most of all near the worst corner, where nothing but a piece that fails is cut.
 
 
 # Pieces after which the proof of the box ends with what it has.
 MOST_PIECES = 4000
 
-# What a piece costs, proved as a whole, against what was measured one quantity at a time; learned on the way.
-COST, LEAST_COST, MOST_COST = 1.0, 0.7, 3.0
+# Finer cells are tried of parts whose costliest quantity is narrower than this share of the box.
+NARROW = Fraction(1, 8)
 
-# Share of what was to spare at first, below which cells have to be finer: the steps of `Query.prove`.
-FINER = (0.06, 0.015)
-
-# A part is worth a try from this share of what its worst corner has to spare.
-WORTH = 0.15
-
-# Share of the largest cost that a quantity counts for at least, where nothing attracts.
-LEAST_SHARE = 0.2
+# Share of the largest cost that a quantity counts for at least.
+LEAST_SHARE = 0.1
 
 # A piece narrower than this share of the box is not cut again.
 NARROWEST = Fraction(1, 4096)
@@ -217,15 +174,6 @@ def _nearness(low: Parts, high: Parts) -> Fraction:
     return max(max(lo, -hi, Fraction(0)) for lo, hi in zip(low, high, strict=True))
 
 
-class _Guess(NamedTuple):
-    """What is to spare on a part, proved as a whole, and at its worst corner alone; the quantity to cut, and where."""
-
-    left: float
-    at_corner: float
-    k: int
-    at: Fraction
-
-
 class Subdivision:
     """Proof of a box, piece by piece."""
 
@@ -233,32 +181,15 @@ class Subdivision:
         self, query: Query, tolerance: Tolerance, factor: Fraction, sensitivity: Sensitivity
     ) -> None:
         self.query, self.tolerance, self.factor, self.sensitivity = query, tolerance, factor, sensitivity
-        self.cost, self.noise = COST, tolerance.noise(factor)
+        self.noise = tolerance.noise(factor)
         self.proved: list[tuple[_SubBox, Outcome]] = []
-        self.tried = 0
 
-    def judge(self, part: _SubBox) -> _Guess:
-        """Guess what is to spare on a part, and where to cut it."""
-        low, high = (np.array([float(x) for x in end]) * float(self.factor) for end in (part.low, part.high))
-        half, known = 0.5 * (high - low), self.sensitivity
-        if not half.size:
-            return _Guess(1.0, 1.0, 0, Fraction(0))
-        if not known.slack.size:
-            k = int(np.argmax(half))
-            return _Guess(1.0, 1.0, k, (part.low[k] + part.high[k]) / 2)
-        costs, fall = self.cost * known.cost, np.abs(known.fall)
-        at_corner = known.slack - known.fall @ (0.5 * (low + high)) - fall @ half
-        left = at_corner - np.where(known.same_throws[:, None], 0.0, np.maximum(costs - fall, 0.0)) @ half
-        worst = int(np.argmin(left))
-        k = int(np.argmax(costs[worst] * half))
-        # the part on the good side is to be as long as it may be
-        wanted = WORTH * at_corner[worst] - left[worst]
-        share = 2.0 * wanted / max((fall + costs)[worst, k] * 2.0 * half[k], 1e-300)
-        share = share if 0.1 < share < 0.6 else 0.5
-        steps = max(1, min(15, round(16 * share)))
-        width = (part.high[k] - part.low[k]) * Fraction(steps, 16)
-        at = part.high[k] - width if known.fall[worst, k] > 0.0 else part.low[k] + width
-        return _Guess(float(left[worst]), float(at_corner[worst]), k, at)
+    def _costliest(self, part: _SubBox) -> int:
+        """Say along which quantity to cut a part: that which matters most over its width."""
+        costs = np.abs(self.sensitivity.fall).max(axis=0, initial=0.0)
+        shares = np.maximum(costs / max(costs.max(initial=0.0), 1e-300), LEAST_SHARE)
+        widths = np.array([float(hi - lo) for lo, hi in zip(part.low, part.high, strict=True)])
+        return int(np.argmax(widths * shares)) if widths.size else 0
 
     def whole(self) -> bool:
         """Prove the box in one piece, as throws with the same parameters may settle it; whether that succeeds."""
@@ -279,42 +210,24 @@ class Subdivision:
             part = heapq.heappop(waiting)
             if failed and part.near >= min(near for near, _ in failed):
                 continue
-            guess = self.judge(part)
-            worth = guess.left > WORTH * guess.at_corner
-            outcome = self._try(part, guess.left) if worth else None
-            if outcome is not None and outcome.verdict == "proved":
+            k = self._costliest(part)
+            narrow = not part.low or part.high[k] - part.low[k] <= 2 * NARROW
+            piece = self.tolerance.piece(part.low, part.high, self.factor)
+            outcome = self.query.prove(piece, self.noise, finest=3 if narrow else 1, bases=1)
+            if outcome.verdict == "proved":
                 self.proved.append((part, outcome))
-                self.cost = max(LEAST_COST, self.cost * 0.99)
                 tell(len(self.proved) / (len(self.proved) + len(waiting)))
                 continue
-            if outcome is not None and self.sensitivity.slack.size:
-                self.cost = min(MOST_COST, self.cost * 1.03)
-            k, at = self._where(part, guess, outcome)
             why = self._stop(part, k, outcome, waiting, time.perf_counter() > end)
             if why:
                 failed.append((part.near, why))
                 continue
-            for piece in part.cut(k, at, number):
-                heapq.heappush(waiting, piece)
+            for half in part.cut(k, (part.low[k] + part.high[k]) / 2, number):
+                heapq.heappush(waiting, half)
             number += 2
         return min(failed, default=(Fraction(1), ""))
 
-    def _where(self, part: _SubBox, guess: _Guess, outcome: Outcome | None) -> tuple[int, Fraction]:
-        """Say along which quantity to cut a part, and where.
-
-        Where nothing attracts, or no part is proved to rest, what a quantity costs elsewhere says little: the widest.
-        """
-        cells = None if outcome is None else outcome.found
-        if not part.low or outcome is None or (cells is not None and (cells.component >= 0).any()):
-            return guess.k, guess.at
-        widths = np.array([float(hi - lo) for lo, hi in zip(part.low, part.high, strict=True)])
-        cost = self.sensitivity.cost.max(axis=0, initial=0.0)
-        k = int(np.argmax(widths * np.maximum(cost / max(cost.max(initial=0.0), 1e-300), LEAST_SHARE)))
-        return k, (part.low[k] + part.high[k]) / 2
-
-    def _stop(
-        self, part: _SubBox, k: int, outcome: Outcome | None, waiting: list[_SubBox], late: bool
-    ) -> str:
+    def _stop(self, part: _SubBox, k: int, outcome: Outcome, waiting: list[_SubBox], late: bool) -> str:
         """Say why a part is given up; empty if it is to be cut."""
         if late:
             return (
@@ -324,9 +237,7 @@ class Subdivision:
             return f"the box of all quantities is in {MOST_PIECES} pieces: ask for a wider bracket"
         if part.low and part.high[k] - part.low[k] > NARROWEST:
             return ""
-        return (
-            outcome.reason if outcome else ""
-        ) or "a piece of the box of all quantities is too narrow to be cut"
+        return outcome.reason or "a piece of the box of all quantities is too narrow to be cut"
 
     def within(self, share: Fraction) -> list[Outcome]:
         """Return what proves a share of the box: parts that reach beyond are cut back, their cells serve for less."""
@@ -358,15 +269,6 @@ class Subdivision:
                 Fraction(1, 64),
             )
         return share, missing
-
-    def _try(self, part: _SubBox, left: float) -> Outcome:
-        self.tried += 1
-        finest = 3
-        if self.sensitivity.slack.size:
-            finest = 1 + sum(left < share * float(self.sensitivity.slack.min()) for share in FINER)
-        # where nothing attracts the piece is cut: that helps more than finer cells
-        piece = self.tolerance.piece(part.low, part.high, self.factor)
-        return self.query.prove(piece, self.noise, finest, bases=1)
 
 
 # ----------------------------------------------------------------
@@ -526,9 +428,9 @@ def _worse_corner(query: Query, tolerance: Tolerance, factor: Fraction, signs: S
     least, best = slack(signs), signs
     for k in [*range(len(signs))] * 2:
         turned = (*best[:k], -best[k], *best[k + 1 :])
-        found = slack(turned)
-        if found < least:
-            least, best = found, turned
+        own = slack(turned)
+        if own < least:
+            least, best = own, turned
     return best
 
 

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from limitsets.base.arrays import Mask
+from limitsets.feeder.scene.units import spelled_plainly
 from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.certificate import arrays_of, scene_of
 
@@ -43,9 +44,9 @@ def throws_below(attraction: Attraction, bad: Mask, x: float) -> int:
         return 0
     import flint
 
+    from limitsets.checker import bands
     from limitsets.checker.balls import PRECISION, UnprovedError
-    from limitsets.checker.bands import throws_below as found
-    from limitsets.checker.file import Cells
+    from limitsets.checker.file import BadFileError, Cells
     from limitsets.checker.scene import read_scene
 
     arrays = arrays_of(attraction, "")
@@ -53,9 +54,9 @@ def throws_below(attraction: Attraction, bad: Mask, x: float) -> int:
     names = ("jog", "flip", "branch", "rank", "component", "phi")
     with flint.ctx.workprec(PRECISION):
         try:
-            scene = read_scene(scene_of(attraction.cover), dict(box.noise) or None)
-            return found(
+            scene = read_scene(*spelled_plainly([scene_of(attraction.cover), dict(box.noise) or None]))
+            return bands.throws_below(
                 Cells(edges, *(arrays[name] for name in names)), scene, bad, x, MOST_THROWS, MOST_BOXES
             )
-        except UnprovedError:
+        except (BadFileError, UnprovedError):
             return 0

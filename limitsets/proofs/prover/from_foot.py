@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.feeder.scene.units import spelled_plainly
 from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.basin import MOST_UNEXPLAINED, ROUNDING
 from limitsets.proofs.prover.certificate import scene_of
@@ -71,13 +72,14 @@ def starts_from_foot(attraction: Attraction) -> FromFoot | None:
     import flint
 
     from limitsets.checker.balls import PRECISION, UnprovedError
+    from limitsets.checker.file import BadFileError
     from limitsets.checker.scene import read_scene
 
     with flint.ctx.workprec(PRECISION):
         try:
-            scene = read_scene(scene_of(attraction.cover), dict(box.noise))
+            scene = read_scene(*spelled_plainly([scene_of(attraction.cover), dict(box.noise)]))
             ends = [_side(scene, side, until) for side, until in enumerate(_first_ranked(attraction))]
-        except UnprovedError:
+        except (BadFileError, UnprovedError):
             return None
     away, lost = map(list, zip(*ends, strict=True))
     return FromFoot(away, lost)

@@ -327,20 +327,20 @@ class Jet:
     def __neg__(self) -> Jet:
         return Jet(-self.value, tuple(-d for d in self.derivatives))
 
-    def __add__(self, other: Jet | RationalInterval) -> Jet:
+    def __add__(self, other: Any) -> Jet:
         if isinstance(other, Jet):
             return Jet(self.value + other.value, _each(self.derivatives, other.derivatives))
         return Jet(self.value + other, self.derivatives)
 
     __radd__ = __add__
 
-    def __sub__(self, other: Jet | RationalInterval) -> Jet:
-        return self + (-other)
+    def __sub__(self, other: Any) -> Jet:
+        return self.__add__(-other)
 
-    def __rsub__(self, other: RationalInterval) -> Jet:
+    def __rsub__(self, other: Any) -> Jet:
         return Jet(other - self.value, tuple(-d for d in self.derivatives))
 
-    def __mul__(self, other: Jet | RationalInterval) -> Jet:
+    def __mul__(self, other: Any) -> Jet:
         if other is self:
             return Jet(self.value * self.value, tuple(2 * (self.value * d) for d in self.derivatives))
         if isinstance(other, Jet):
@@ -353,14 +353,14 @@ class Jet:
 
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Jet | RationalInterval) -> Jet:
+    def __truediv__(self, other: Any) -> Jet:
         if not isinstance(other, Jet):
             return Jet(self.value / other, tuple(d / other for d in self.derivatives))
         ratio = self.value / other.value
         by = (one - ratio * two for one, two in zip(self.derivatives, other.derivatives, strict=True))
         return Jet(ratio, tuple(d / other.value for d in by))
 
-    def __rtruediv__(self, other: RationalInterval) -> Jet:
+    def __rtruediv__(self, other: Any) -> Jet:
         ratio = other / self.value
         return Jet(ratio, tuple(-(ratio * d) / self.value for d in self.derivatives))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -183,30 +183,20 @@ def weakest_of(claims: Sequence[Claim], attractions: Sequence[Attraction]) -> Cl
     weakest = max(zip(words, claims, strict=True), key=lambda each: STARTS.index(each[0]))[1]
     starts = weakest.starts
     section.pop("lost", None)
+    most, whole = [claim.shares for claim in claims], True
     if isinstance(starts, dict) and "from" in starts:
-        starts = {"from": _farthest_start(claims, attractions, below_cells="near_joint" in section)}
-        section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
-        lost = [other["lost"] for other in sections if "lost" in other]
-        if len(lost) == len(claims):
-            section["lost"] = {
-                side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]
-            }
-        most, whole = zip(*(one.shares_from(section) for one in attractions), strict=True)
+        starts, places, most, whole = _from_farthest(section, claims, attractions)
     elif isinstance(starts, dict) and "from_foot" in starts:
-        feet = [starts_from_foot(one) for one in attractions]
-        joined = FromFoot.of_all([one for one in feet if one is not None])
-        starts, section = joined.starts, section | joined.section
-        most = tuple(joined.shares_of(one) for one in attractions)
-        whole = tuple(one is not None and is_nearly_all(each) for one, each in zip(feet, most, strict=True))
+        starts, places, most, whole = _from_foot(attractions)
     else:
-        section["starts"] = weakest.section["starts"]
-        most, whole = tuple(claim.shares for claim in claims), (True,)
+        places = {"starts": weakest.section["starts"]}
+    section |= places
     least = {"share": min, "leaves": min, "creeps": min, "open": max}
     shares = {key: pick(each[key] for each in most) for key, pick in least.items()}
     notes = {claim.note for claim in claims}
     note = notes.pop() if len(notes) == 1 else ""
     claim = replace(weakest, section=section, counterexample=(), starts=starts, shares=shares, note=note)
-    if all(whole):
+    if whole:
         return claim
     share = math.ceil(1000.0 * shares["open"]) / 10.0
     reason = (
@@ -230,6 +220,31 @@ def _weakest_numbers(sections: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     if "least_slope" in section:
         section["least_slope"] = min((other["least_slope"] for other in sections), key=float.fromhex)
     return section
+
+
+Joined: TypeAlias = tuple[Any, dict[str, Any], list[dict[str, float]], bool]
+"""Starts, the entries that name their places, shares in each piece, and whether the goal counts as proved of them."""
+
+
+def _from_farthest(
+    section: Mapping[str, Any], claims: Sequence[Claim], attractions: Sequence[Attraction]
+) -> Joined:
+    """Join starts from some x on."""
+    starts = _farthest_start(claims, attractions, below_cells="near_joint" in section)
+    places: dict[str, Any] = {"starts": {"from": {side: x.hex() for side, x in starts.items()}}}
+    lost = [claim.section["lost"] for claim in claims if "lost" in claim.section]
+    if len(lost) == len(claims):
+        places["lost"] = {side: min((each[side] for each in lost), key=float.fromhex) for side in lost[0]}
+    most, whole = zip(*(one.shares_from({**section, **places}) for one in attractions), strict=True)
+    return {"from": starts}, places, list(most), all(whole)
+
+
+def _from_foot(attractions: Sequence[Attraction]) -> Joined:
+    """Join starts from some distance to the foot on."""
+    feet = [starts_from_foot(one) for one in attractions]
+    joined = FromFoot.of_all([one for one in feet if one is not None])
+    most = [joined.shares_of(one) for one in attractions]
+    return joined.starts, joined.section, most, None not in feet and all(map(is_nearly_all, most))
 
 
 def _farthest_start(

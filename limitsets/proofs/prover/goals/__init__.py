@@ -127,11 +127,8 @@ def prove_or_refute(attraction: Attraction, scene: Scene, goal: Goal) -> Answer:
 
 def _for_starts(attraction: Attraction, answer: Answer, *, almost: bool) -> Answer:
     """Say for which starts a goal holds that is proved of the attracting cells."""
-    basin, starts = attraction.basin, attraction.basin.starts
-    shares, missing = basin.shares, basin.missing
-    foot = starts_from_foot(attraction) if starts == "cells" and basin.open > MOST_UNEXPLAINED else None
-    if foot is not None and is_nearly_all(foot.shares_of(attraction)):
-        starts, shares = foot.starts, foot.shares_of(attraction)
+    basin, missing = attraction.basin, attraction.basin.missing
+    starts, shares, places = _begin(attraction)
     if almost:
         starts = "almost-every" if starts == "every" else starts
         flat = not_null(attraction) if starts != "cells" else ""
@@ -139,13 +136,8 @@ def _for_starts(attraction: Attraction, answer: Answer, *, almost: bool) -> Answ
             starts, missing = "cells", missing or flat
             shares = attraction.shares
     section: dict[str, Any] = {**answer.section, "starts": starts}
-    if foot is not None and starts == foot.starts:
-        section |= foot.section
-    elif isinstance(starts, dict):
-        section["starts"] = {"from": {side: x.hex() for side, x in starts["from"].items()}}
-        if attraction.cover.box.landing > 0.0:
-            finite = ((side, float(x)) for side, x in enumerate(basin.explained) if np.isfinite(x))
-            section["lost"] = {str(side): x.hex() for side, x in finite}
+    if isinstance(starts, dict):
+        section |= places
     if basin.thinning:
         section["thinning"] = basin.thinning
     if basin.near:
@@ -157,6 +149,22 @@ def _for_starts(attraction: Attraction, answer: Answer, *, almost: bool) -> Answ
     return answer._replace(
         verdict="proved-on-cells", reason=missing, section=section, starts=starts, shares=shares, final=final
     )
+
+
+def _begin(attraction: Attraction) -> tuple[Any, dict[str, float], dict[str, Any]]:
+    """Say which starts come to the attracting cells, their shares, and the entries that name places."""
+    basin, starts = attraction.basin, attraction.basin.starts
+    if starts == "cells" and basin.open > MOST_UNEXPLAINED:
+        foot = starts_from_foot(attraction)
+        if foot is not None and is_nearly_all(foot.shares_of(attraction)):
+            return foot.starts, foot.shares_of(attraction), foot.section
+    if not isinstance(starts, dict):
+        return starts, basin.shares, {}
+    section: dict[str, Any] = {"starts": {"from": {side: x.hex() for side, x in starts["from"].items()}}}
+    if attraction.cover.box.landing > 0.0:
+        finite = ((side, float(x)) for side, x in enumerate(basin.explained) if np.isfinite(x))
+        section["lost"] = {str(side): x.hex() for side, x in finite}
+    return starts, basin.shares, section
 
 
 def cuts(goals: Sequence[Goal], sides: int) -> dict[int, list[float]]:
