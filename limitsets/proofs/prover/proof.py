@@ -182,7 +182,7 @@ class Claim:
     final : bool
         Whether finer cells cannot change the verdict.
     starts : str, dict or None
-        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}``,
+        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}``, ``{"from_foot": {"0": y}}``,
         ``{"within": {"0": [[lo, hi]]}}`` where parts are laid down, or "cells"; of one that is refuted, of which starts
         it is not true.  None for other claims.
     shares : dict of str to float
