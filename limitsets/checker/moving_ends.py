@@ -69,7 +69,7 @@ class Change(NamedTuple):
     rises: bool
 
 
-def meets(ball: Arb, ends: Pair) -> bool:
+def overlaps_range(ball: Arb, ends: Pair) -> bool:
     """Whether a ball and an interval have a number in common."""
     lo, hi = map(arb, ends)
     return bool(lo in ball or hi in ball or (ball >= lo and ball <= hi))
@@ -169,7 +169,7 @@ class ParameterBox:
     def lies_in(self, chain: MovingEnd, side: int, angles: Pair) -> bool:
         """Whether throws from the end of a chain are enclosed, by angles that meet a range."""
         angle = self.angle(chain, side)
-        return angle is not None and meets(angle.over, angles)
+        return angle is not None and overlaps_range(angle.over, angles)
 
     def angle_of(self, chain: MovingEnd, side: int) -> Moving | None:
         """Compute what `angle` keeps."""
@@ -199,7 +199,7 @@ class ParameterBox:
             if abs(step) < LEAST_BALL * guess:
                 break
         angle = self.root(change.side, "decides", Moving(ZERO, ZERO, none), guess) if guess > 0 else None
-        if angle is None or not meets(angle.over, (change.first, change.last)):
+        if angle is None or not overlaps_range(angle.over, (change.first, change.last)):
             return None
         steep = self.throw(change.side, angle.middle, angle.over).decides.by[0]
         return angle if (steep > 0 if change.rises else steep < 0) else None

@@ -182,9 +182,9 @@ class Claim:
     final : bool
         Whether finer cells cannot change the verdict.
     starts : str, dict or None
-        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}``, ``{"from_foot": {"0": y}}``,
-        ``{"within": {"0": [[lo, hi]]}}`` where parts are laid down, or "cells"; of one that is refuted, of which starts
-        it is not true.  None for other claims.
+        Of a goal that is proved, for which starts: "every", "almost-every", ``{"from": {"0": x}}``,
+        ``{"from_foot": {"0": y}}`` for those with x - a_0 > y, ``{"within": {"0": [[lo, hi]]}}`` where parts are laid
+        down, or "cells"; of one that is refuted, of which starts it is not true.  None for other claims.
     shares : dict of str to float
         Of a goal that is proved: shares of the arm for whose starts it is (`share`), whose starts are proved to leave
         (`leaves`) or to creep to the joint (`creeps`), and of whose starts nothing is proved (`open`); shares of where
