@@ -51,7 +51,7 @@ def row(margin: Any) -> dict[str, Any]:
 def main(
     scenes: Sequence[str] = tuple(GOALS),
     quantities: Sequence[str] = (),
-    seconds: float = 120.0,
+    seconds: float = 30.0,
     places: int = 6,
     width: float = 0.01,
     out: Path = HERE,
@@ -66,12 +66,11 @@ def main(
             "side": GOALS[name].side,
             "margins": [row(each) for each in margins],
         }
-    if seconds > 0:
-        joint = joint_margin(
-            ls.load("paper-designed"), (GOALS["paper-designed"],), TOLERANCE, seconds=seconds
-        )
-        ls.plot.tolerance_box(joint).savefig(out / "joint.png")
-        found["joint"] = row(joint) | {"pieces": len(joint.pieces)}
+        if seconds > 0:
+            joint = joint_margin(ls.load(name), (GOALS[name],), TOLERANCE, seconds=seconds)
+            found[name]["joint"] = row(joint) | {"pieces": len(joint.pieces)}
+            if name == "paper-designed":
+                ls.plot.tolerance_box(joint).savefig(out / "joint.png")
     if places > 0:
         curve = margins_beyond("paper-designed", 2, places=places, width=0.05)
         ls.plot.margin_curve(curve).savefig(out / "beyond.png")

@@ -14,6 +14,7 @@ import limitsets as ls
 from limitsets.parameters.design import critical_jacobian
 from limitsets.parameters.margins.deviations import Tolerance
 from limitsets.parameters.margins.estimate import estimated, failing
+from limitsets.parameters.margins.margin_result import bound
 from tests.studies.test_studies import expected_of, load_study, readme_of
 
 # ----------------------------------------------------------------
@@ -53,8 +54,10 @@ def test_the_readme_shows_what_was_found(recorded):
     text = readme_of("04_margins")
     assert study.table(recorded) in text
     # never more than is proved
-    assert f"{math.floor(1e4 * recorded['joint']['proved']) / 1e4:.4f}" in text
-    assert f"{math.ceil(1e4 * recorded['joint']['refuted']) / 1e4:.4f}" in text
+    for name in study.GOALS:
+        joint = recorded[name]["joint"]
+        ends = bound(joint["proved"]), bound(joint["refuted"], up=True)
+        assert f"| {name} | {ends[0]} | {ends[1]} |" in text
     best, margin = recorded["beyond"]["best"]
     assert f"{best:.1f} in instead of 20 in" in text
     assert f"{margin:.1f} %" in text
