@@ -154,6 +154,7 @@ def throws_below(
     number = intervals_of(c)
     images = images_of(c, number)
     own = np.unique(number[bad & (number >= 0)]).tolist()
+    prove(int(number.max(initial=-1)) < MOST_BANDS, "there are too many intervals of attracting cells")
     intervals = []
     for k in range(int(number.max(initial=-1)) + 1):
         cells = np.flatnonzero(number == k)
