@@ -8,6 +8,7 @@ import copy
 import math
 from fractions import Fraction
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -151,6 +152,67 @@ def test_angles_are_kept_by_the_side_of_the_throw():
     _, again = box_of(("exact", "signed"))
     assert [float(again.angle((20.0,), side).middle) for side in (2, 0)][::-1] == first
     assert first[0] > first[1] + 0.1
+
+
+@pytest.mark.parametrize(
+    ("slopes", "rises", "good"),
+    [
+        ((1, 1, 1), True, True),
+        ((1, 1, -1), False, True),
+        ((-1, 1, 1), True, False),
+        ((1, -1, 1), True, False),
+        ((1, 1, -1), True, False),
+        ((1, 1, 1), False, False),
+        ((1, 1, 0), True, False),
+    ],
+)
+def test_throws_have_to_rise_and_what_decides_to_be_monotone(slopes, rises, good):
+    bands, balls = checker.bands, checker.balls
+    thrown = checker.moving_ends.ByAngle(*(balls.Rising(arb(0), [arb(each)]) for each in slopes), arb(0))
+    box = SimpleNamespace(throw=lambda *_: thrown)
+    change = checker.moving_ends.Change(0, 0.1, 0.2, rises)
+    given = box, [bands.Interval(0, (1.0, 2.0), (0.1, 0.3))], [bands.Image(0, 0, 0, 0, None, change)]
+    assert (balls.reason_of(bands.check_hypotheses, *given) == "") is good
+
+
+def six_cells(jog, flip):
+    """Cells of one side, two and three of which attract, with the targets of jogs and flips by cell."""
+    ways = [np.full((6, 2), -1) for _ in range(2)]
+    for way, targets in zip(ways, (jog, flip), strict=True):
+        for cell, ends in targets.items():
+            way[cell] = ends
+    component = np.array([0, 0, -1, 0, 0, 0])
+    phi = np.stack([0.1 * np.arange(6), 0.1 * np.arange(6) + 0.15], axis=1)
+    none = np.zeros(6, dtype=int)
+    return checker.file.Cells([np.arange(7.0)], *ways, branch=none, rank=none, component=component, phi=phi)
+
+
+JOGS, FLIPS = {0: (3, 3), 1: (3, 4), 3: (0, 0), 4: (0, 1)}, {4: (3, 3), 5: (3, 4)}
+
+
+def images_in(jog, flip):
+    c = six_cells(jog, flip)
+    return checker.bands.images_of(c, checker.bands.intervals_of(c))
+
+
+def test_a_branch_ends_where_it_changes_or_where_its_cells_end():
+    change = checker.moving_ends.Change(0, 0.4, 0.1 * 4 + 0.15, True)
+    image = checker.bands.Image
+    assert images_in(JOGS, FLIPS) == [
+        image(0, 1, 0, 0, None, None),
+        image(1, 0, 0, 0, None, change),
+        image(1, 1, 0, 1, change, None),
+    ]
+    # no cell is a decided jog: the change may lie before all of them
+    assert images_in(JOGS, {3: (3, 3), **FLIPS})[1:] == [
+        image(1, 0, 0, 0, None, 5.0),
+        image(1, 1, 0, 1, None, None),
+    ]
+
+
+def test_a_piece_leads_to_one_interval():
+    with pytest.raises(checker.balls.UnprovedError, match="several intervals"):
+        images_in({**JOGS, 1: (1, 3)}, FLIPS)
 
 
 OTHER = [65, -2, 2.0, "2", True, None, 10**30]
