@@ -467,3 +467,26 @@ def test_chains_hold_the_orbits_of_the_scenes_of_a_box(model, landing):
             assert float(place.over.rad()) < 0.3
             looked += 1
     assert looked > 12
+
+
+def test_the_slopes_of_chains_hold_over_the_whole_box():
+    """From the middle of the box to one of its scenes: the slopes times the way, as the mean value theorem has it."""
+    widths = dict.fromkeys(DESIGNED, Fraction(1, 400))
+    scene, box = box_of(("exact", "signed"), 0.0, widths)
+    part, unit = box.scene.raw["part"], checker.file.LENGTHS["in"]
+    lengths = [where for where, _, _ in checker.part.read_wide(part, unit)[0].values()]
+    names, random, looked = ["throw.kappa", "arm.surface_height", *lengths], np.random.default_rng(3), 0
+    for chain, side in (((16.0, (2, 0, 1)), 2), ((14.0, (1, 1, -1)), 1), ((22.0, (2, 1, 1), (0, 1, 1)), 2)):
+        place = box.place(chain)
+        for _ in range(20):
+            values = {name: DESIGNED[name] + 0.0025 * float(random.choice([-1, 1])) for name in names}
+            throw, x, on = scene.with_values(values).map, chain[0], side
+            for _, branch, _ in chain[1:]:
+                thrown = images(throw, [x], on)
+                assert int(thrown.side[0] != on) == branch
+                x, on = float(thrown.x[0]), int(thrown.side[0])
+            way = [values[name] - float(mid) for name, mid in zip(names, box.middle, strict=True)]
+            ends = place.middle + sum((d * w for d, w in zip(place.slopes, way, strict=True)), arb(0))
+            assert float(ends.lower()) - 1e-9 <= x <= float(ends.upper()) + 1e-9
+            looked += 1
+    assert looked == 60
