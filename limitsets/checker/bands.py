@@ -141,8 +141,8 @@ def throws_below(
 ) -> int:
     """Find after how many throws with the same parameters no part in an interval with bad cells rests beyond x.
 
-    An interval's upper end after some throws is the largest of some ends, each the least of some chains: an orbit from
-    a piece lies below the piece's end, and below the interval's top, and so below their images as throws rise.
+    `bad` are all attracting cells of wrong sides that reach beyond x.  The box of all parameters is halved where bands
+    do not settle it, until every part of it is settled, or one scene in it goes beyond x.
     """
     names = scene.noise if isinstance(scene.noise, dict) else {}
     same = set(names) <= {"landing.x"}

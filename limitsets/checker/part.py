@@ -166,9 +166,3 @@ def read_plate(
         total, sx, sy, second = total + w, sx + w * x, sy + w * y, second + w * (x**2 + y**2)
     require(density.lo > 0 and bool(total > 0), "a mass is not positive")
     return (sx / total, sy / total), second / total - (sx / total) ** 2 - (sy / total) ** 2
-
-
-def read_lengths(part: object, unit: Fraction) -> list[tuple[int, str, Arb]]:
-    """List the lengths of the part that are intervals, in the order in which they are read: id, name and ball."""
-    wide, _, _ = read_wide(part, unit)
-    return [(k, where, span(lo, hi)) for k, (where, lo, hi) in wide.items() if not where.endswith(".mass")]
