@@ -13,7 +13,7 @@ from flint import arb
 from .balls import Arb, Array
 from .landings import Border, Landings, Noisy, both_ends, upper
 from .laws import Column
-from .means import INFLATE, PAD, Mesh, Scatter, Spread, mean_rows
+from .means import INFLATE, Mesh, Scatter, Spread, mean_rows
 from .model import over_angles
 from .noisy_throw import Hit, Slopes, advance_over, guess_angles, kappa_at, slopes_over
 from .steps import Chain, Parts
@@ -214,31 +214,13 @@ class Links(Landings):
         return rows
 
     def add_turns(self, cell: int, flips: int, over: list[Slopes], h: float, slack: float) -> None:
-        """Bound how much the slope of the mean varies along a cell, part by part of the law of the speed.
-
-        Or how far G, affine on cells at most d wide, lies above its chord over a length l where its slope falls by at
-        most L per length: L (l^2 + d^2)/8, for less a parabola's interpolant it is convex.
-        """
-        at, rows = self.start + cell, list[tuple[float, ...]]()
+        """Bound how much the slope of the mean varies along a cell, part by part of the law of the speed."""
+        rows = list[tuple[float, ...] | None]()
         for column, each in zip(self.columns, over, strict=True):
-            least, most = both_ends(each.x)
-            if not (math.isfinite(least) and math.isfinite(most)):
-                return
-            length, bow = max(-least, most) * h, upper(abs(each.xx)) * h * h * 0.125 * INFLATE
             for j in range(column.first, max(column.last, 1)):
-                weight = self.weights[j]
-                side, lo, hi = self.around(flips, self.place[cell : cell + 2, j : j + 2], slack)
-                even = weight * (length**2 + self.widest(side, lo, hi) ** 2) * 0.125 * INFLATE
-                scale = h * 0.25 * weight * INFLATE
-                rows.append((at, least * scale, most * scale, side, lo, hi, even, weight * bow))
-        self.parts.turns.rows += rows
-
-    def widest(self, side: int, lo: float, hi: float) -> float:
-        """Return the width of the widest cell on a range where throws land."""
-        pad = PAD * self.goal.size()
-        row = self.goal.place[self.goal.first[side] : self.goal.first[side + 1]]
-        first, last = np.searchsorted(row, (lo - pad, hi + pad), side="right")
-        return float(np.diff(row[max(first - 1, 0) : last + 1]).max())
+                where = self.around(flips, self.place[cell : cell + 2, j : j + 2], slack)
+                rows.append(turn_of(self.start + cell, h, each.x, each.xx, self.goal, where, self.weights[j]))
+        self.parts.turns.rows += [row for row in rows if row] if None not in rows else []
 
     def add_node(self, node: int) -> None:
         """Share the throws from a node out, and collect how far they may be off."""
@@ -332,6 +314,23 @@ class Links(Landings):
             return math.inf
         slope = slopes_over(self.side, phi, kappa, 1 + deviations).x
         return upper(abs(slope) * (arb(float(self.x[node])) - x_lo)) * INFLATE
+
+
+def turn_of(
+    at: int, h: float, slope: Arb, bend: Arb, goal: Mesh, where: tuple[int, float, float], weight: float = 1.0
+) -> tuple[float, ...] | None:
+    """Bound how much the slope of G(T(x)) varies along a cell that T takes to a range; None where T' has no bounds.
+
+    Or how far G, affine on cells at most d wide, lies above its chord over a length l where its slope falls by at most
+    L per length: L (l^2 + d^2)/8, for less a parabola's interpolant it is convex.
+    """
+    least, most = both_ends(slope)
+    bow = upper(abs(bend)) * h * h * 0.125 * INFLATE if bend.is_finite() else math.inf
+    if not (math.isfinite(least) and math.isfinite(most) and math.isfinite(bow)):
+        return None
+    length, scale = max(-least, most) * h, h * 0.25 * weight * INFLATE
+    even = weight * (length**2 + goal.widest(*where) ** 2) * 0.125 * INFLATE
+    return at, least * scale, most * scale, *where, even, weight * bow
 
 
 def chain_of(

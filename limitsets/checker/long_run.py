@@ -22,14 +22,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .balls import Array, Pair, prove
-from .brackets import Setting, chain_on, places_in_words, read_setting, require_edges
+from .balls import Array, Pair, about, prove
+from .brackets import Place, Setting, chain_on, places_in_words, read_setting, require_edges
 from .cells import Progress
 from .file import Arrays, hex_float, read_side, require, rounded, rows, section_alone, table
+from .laws import Law
 from .means import Mesh
 from .steps import Chain
 
 FLIPS, SIDE = "flips", "side"
+SIGNS = (-1.0, 1.0)  # of the lower end, and of the upper
+Gain = Callable[[Array], tuple[Array, Array]]
 
 
 class Counted(NamedTuple):
@@ -97,13 +100,13 @@ def long_run_in_words(c: LongRun) -> list[str]:
 # The cells that no throw leaves.
 
 
-def kept_cells(c: Setting, chain: Chain) -> Array:
-    """Mark the most cells, by their left nodes, from which no throw leads to others."""
+def kept_cells(chain: Chain, law: Law) -> Array:
+    """Mark the most cells, by their left nodes, from which no throw leads to others: `law` is of the landing."""
     mesh, goal, live = chain.mesh, chain.goal, chain.cells.at
     kept, alone = np.zeros(len(mesh.place), dtype=bool), np.ones(len(mesh.place), dtype=bool)
     alone[np.concatenate([chain.hard.at, chain.hard.at + 1])] = False
     kept[live] = alone[live] & alone[live + 1]
-    reach, met = float(np.nextafter(float(c.noisy.landing.reach), np.inf)), []
+    reach, met = float(np.nextafter(float(law.reach), np.inf)), []
     for span in (chain.cells.one, chain.cells.two):
         side = np.searchsorted(goal.first, span.first, side="right") - 1
         met.append(mesh.within(side, goal.place[span.first] - reach, goal.place[span.last + 1] + reach))
@@ -118,9 +121,9 @@ def kept_cells(c: Setting, chain: Chain) -> Array:
         kept[left] = False
 
 
-def check_starts_stay(c: Setting, mesh: Mesh, kept: Array) -> None:
+def check_starts_stay(starts: list[Place], mesh: Mesh, kept: Array) -> None:
     """Check that cells that throws do not leave hold all starts."""
-    for side, lo, hi in c.starts:
+    for side, lo, hi in starts:
         for cell in range(int(mesh.first[side]), int(mesh.first[side + 1]) - 1):
             a, b = Fraction(float(mesh.place[cell])), Fraction(float(mesh.place[cell + 1]))
             where = f"side {side}, x in [{float(a)!r}, {float(b)!r}]: "
@@ -133,14 +136,17 @@ def check_starts_stay(c: Setting, mesh: Mesh, kept: Array) -> None:
 # The inequality.
 
 
-def most_gain(
-    chain: Chain, kept: Array, side: int | None, sign: float
-) -> Callable[[Array], tuple[Array, Array]]:
+def nodes_of(kept: Array) -> Array:
+    """Return the nodes of some cells."""
+    return np.unique(np.concatenate([np.flatnonzero(kept), np.flatnonzero(kept) + 1]))
+
+
+def most_gain(chain: Chain, kept: Array, side: int | None, sign: float) -> Gain:
     """Give a function that bounds sign g + K u at the nodes of the cells that are kept; and lists these nodes."""
     mesh = chain.mesh
     sides = len(mesh.first) - 1
     own = np.searchsorted(mesh.first, np.arange(len(mesh.place)), side="right") - 1
-    nodes = np.unique(np.concatenate([np.flatnonzero(kept), np.flatnonzero(kept) + 1]))
+    nodes = nodes_of(kept)
     free = np.full(len(mesh.place), -np.inf)
 
     def gain(u: Array) -> tuple[Array, Array]:
@@ -151,6 +157,16 @@ def most_gain(
         return nodes, np.where(own == sides - 1, flipped, above)[nodes]
 
     return gain
+
+
+def check_end(sign: float, u: Array, end: float, gain: Gain, size: float = 4.0) -> None:
+    """Check that u proves an end of an average, the lower with -1: `size` is of what is counted."""
+    prove(bool(np.isfinite(u).all()), "a function is not finite")
+    nodes, gained = gain(u)
+    prove(bool(np.isfinite(gained).all()), "a function is too large")
+    excess = float((gained - u[nodes]).max()) + 2.0**-48 * (float(np.abs(u).max()) + size)
+    only = f"only {rounded(sign * excess, up=sign > 0)} is proved"
+    prove(excess <= sign * end, f"the {'upper' if sign > 0 else 'lower'} end is {end!r}: {only}")
 
 
 def check_long_run(c: LongRun, progress: Progress) -> None:
@@ -168,19 +184,11 @@ def check_long_run(c: LongRun, progress: Progress) -> None:
         chain.beyond == 0.0 and bool(c.setting.noisy.landing.beyond == 0),
         "noise without a bound may lead out",
     )
-    kept = kept_cells(c.setting, chain)
-    check_starts_stay(c.setting, chain.mesh, kept)
+    kept = kept_cells(chain, c.setting.noisy.landing)
+    check_starts_stay(c.setting.starts, chain.mesh, kept)
     for k, one in enumerate(c.counted):
-        for sign, u, bound in (
-            (-1.0, one.functions[0], -one.bounds[0]),
-            (1.0, one.functions[1], one.bounds[1]),
-        ):
-            prove(bool(np.isfinite(u).all()), f"average {k}: a function is not finite")
-            nodes, gained = most_gain(chain, kept, one.side, sign)(u)
-            prove(bool(np.isfinite(gained).all()), f"average {k}: a function is too large")
-            excess = float((gained - u[nodes]).max()) + 2.0**-48 * (float(np.abs(u).max()) + 4.0)
-            end = "upper" if sign > 0 else "lower"
-            only = f"only {rounded(sign * excess, up=sign > 0)} is proved"
-            prove(excess <= bound, f"average {k}: the {end} end is {sign * bound!r}: {only}")
+        with about(f"average {k}"):
+            for sign, u, end in zip(SIGNS, one.functions, one.bounds, strict=True):
+                check_end(sign, u, end, most_gain(chain, kept, one.side, sign))
     if progress is not None:
         progress(work, work)

@@ -17,6 +17,7 @@ from .map_cells import MapCells, map_tasks
 from .map_cycles import Cycle
 from .map_entropy import check_map_entropy
 from .map_file import OF_ORBITS, Goal, MapFile, Part, Regions
+from .map_long_run import check_long_run_of_map
 from .map_orbits import check_every
 from .map_weights import check_weights
 from .map_words import Outcome, box_in_words, outcome_of
@@ -42,6 +43,8 @@ def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[Fail
             failed |= failing(["average"], check_map_average, the_map, part.cells, part.average)
         if part.entropy is not None and "entropy" not in failed:
             failed |= failing(["entropy"], check_map_entropy, the_map, part.cells, part.entropy)
+    if part.long_run is not None:
+        failed |= failing(["long-run"], check_long_run_of_map, the_map, part.long_run)
     return failed, cycles
 
 
@@ -85,7 +88,7 @@ def check_leaving_cycle(cycles: list[Cycle], goal: Goal) -> None:
 def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], crew: Crew) -> Failed:
     """Check the claims about cells: first by whole numbers, then the images; those that fail with the reasons."""
     c, final = part.cells, final_cells(part)
-    claims = [name for name in part.claims if name not in ("cycles", "all-cycles")]
+    claims = [name for name in part.claims if name not in ("cycles", "all-cycles", "long-run")]
     assert c is not None
     attracting = (c.component >= 0) & ~final
     failed = failing(claims, check_drawn, part, c, cycles) or failing(claims, c.check_labels, final)

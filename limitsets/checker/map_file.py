@@ -23,6 +23,7 @@ from .file import (
 )
 from .map_cells import MapCells
 from .map_cycles import Begins, Listed, read_begins, read_cycles
+from .map_long_run import OF_LONG_RUN, LongRunOfMap, read_long_run_of_map
 from .map_orbits import Every, read_every
 from .map_plane import ParameterAxis, RegionPlace, read_axes, read_region_boxes
 from .observable import KEYS as OF_AVERAGES, Allowed, Average, read_average
@@ -41,6 +42,7 @@ CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "almost-every": "",
     "average": OF_AVERAGES,
     "entropy": ENTROPY_KEYS,
+    "long-run": OF_LONG_RUN,
     "refuted": "",
 }
 OF_ORBITS = (
@@ -75,6 +77,7 @@ class Part(NamedTuple):
     cells: MapCells | None
     average: Average | None
     entropy: Entropy | None
+    long_run: LongRunOfMap | None
 
 
 class MapFile(NamedTuple):
@@ -154,12 +157,12 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
         begins = read_begins(known["cycles"]["begins"], shape, where)
     drawn = read_drawn(known["converges"], cycles, where) if "converges" in known else []
     every = read_every(known["all-cycles"], shape, where) if "all-cycles" in known else None
-    about_cells = set(known) - {"cycles", "all-cycles", "refuted"}
+    about_cells = set(known) - {"cycles", "all-cycles", "refuted", "long-run"}
     labels = {"exits": "escapes" in known, "weights": "almost-every" in known}
     cells = MapCells(arrays, box["prefix"], shape, **labels) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
     numbers = read_numbers(known, shape, where)
-    average, entropy = read_on_a_line(known, shape, arrays, box["prefix"], where)
+    average, entropy, long_run = read_on_a_line(known, shape, arrays, box["prefix"], where)
     return Part(
         parameters,
         known,
@@ -172,23 +175,26 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
         cells=cells,
         average=average,
         entropy=entropy,
+        long_run=long_run,
     )
 
 
 def read_on_a_line(
     known: dict[str, Any], shape: Shape, arrays: Arrays, prefix: str, where: str
-) -> tuple[Average | None, Entropy | None]:
-    """Read `average` and `entropy`, None where these are not claimed."""
+) -> tuple[Average | None, Entropy | None, LongRunOfMap | None]:
+    """Read `average`, `entropy` and `long-run`, None where these are not claimed."""
     for name in {"average", "entropy"} & set(known):
         require("converges" not in known, f"{where}: {name} does not stand beside converges")
         require(shape.dimension == 1, f"{where}: {name} is of one axis")
-    average, entropy = None, None
+    average, entropy, long_run = None, None, None
     if "average" in known:
         allowed = Allowed(shape.sides, shape.branches, shape.names)
         average = read_average(known["average"], arrays, prefix, allowed, where)
     if "entropy" in known:
         entropy = read_entropy(known["entropy"], arrays, prefix, shape.sides, where)
-    return average, entropy
+    if "long-run" in known:
+        long_run = read_long_run_of_map(known["long-run"], arrays, prefix, shape, f"{where}: long-run")
+    return average, entropy, long_run
 
 
 def read_numbers(known: dict[str, Any], shape: Shape, where: str) -> dict[str, Any]:

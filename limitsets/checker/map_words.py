@@ -14,6 +14,7 @@ from .file import plain
 from .map_cells import MapCells
 from .map_cycles import Cycle, interval_in_words
 from .map_file import CLAIMS_OF_MAP, OF_ORBITS, Goal, Part, Regions
+from .map_long_run import long_run_of_map_in_words
 from .observable import average_in_words
 from .program import named
 
@@ -51,7 +52,13 @@ def holds_for(part: Part) -> str:
     wide = [named(name) for name, (lo, hi) in part.parameters.items() if lo != hi]
     names = [name for name in CLAIMS_OF_MAP if name in part.claims]
     # who ends in the ball of a cycle tends to it, and stays, for one value only
-    fixed = {*OF_ORBITS, "average", "entropy", *(("attracts-all", "ends-in") if part.drawn else ())}
+    fixed = {
+        *OF_ORBITS,
+        "average",
+        "entropy",
+        "long-run",
+        *(("attracts-all", "ends-in") if part.drawn else ()),
+    }
     groups = (
         ("fixed in time", [name for name in names if name in fixed]),
         ("changed at every step too", [name for name in names if name not in fixed]),
@@ -170,6 +177,11 @@ class Proved:
         assert self.part.entropy is not None
         return entropy_in_words(self.part.entropy)
 
+    def scattered(self) -> str:
+        """Say between which numbers averages lie where steps scatter."""
+        assert self.part.long_run is not None
+        return "\n".join(long_run_of_map_in_words(self.part.long_run))
+
 
 SENTENCES: dict[str, Callable[[Proved], str]] = {
     "cycles": Proved.cycle_list,
@@ -187,6 +199,7 @@ SENTENCES: dict[str, Callable[[Proved], str]] = {
     "almost-every": Proved.almost,
     "average": Proved.averaged,
     "entropy": Proved.entropic,
+    "long-run": Proved.scattered,
     "refuted": lambda proved: (
         f"an open set of starts, around a point of a cycle, violates: {proved.of_goal()}"
     ),

@@ -13,7 +13,9 @@ from .balls import Array
 from .laws import Law
 
 PAD = 2.0**-40  # more than the roundings of a place, as a share of the largest place
-NARROW = 2.0**-20  # cells below this share of the largest place are those where a function may jump
+NARROW = (
+    2.0**-20
+)  # cells below this share of the largest place are those where a function may jump, of a scene
 INFLATE = 1.0 + 2.0**-30  # against the roundings of the few operations that make a coefficient or add it up
 FINER = 4  # cells of W for each cell of V
 AT_ONCE = 50_000  # ranges shared out to cells at a time
@@ -40,6 +42,13 @@ class Mesh(NamedTuple):
         inner = np.ones(len(self.place), dtype=bool)
         inner[self.first[:-1]] = inner[self.first[1:] - 1] = False
         return float(np.abs(self.place[inner]).max()) + 1.0
+
+    def widest(self, side: int, lo: float, hi: float) -> float:
+        """Return the width of the widest cell that a range of places meets."""
+        pad = PAD * self.size()
+        row = self.place[self.first[side] : self.first[side + 1]]
+        first, last = np.searchsorted(row, (lo - pad, hi + pad), side="right")
+        return float(np.diff(row[max(first - 1, 0) : last + 1]).max())
 
     def within(self, side: Array, lo: Array, hi: Array) -> "Ranges":
         """Find the cells that ranges of places meet, or may meet by roundings."""
@@ -112,13 +121,13 @@ class Graph:
         return total
 
 
-def lifts(mesh: Mesh, deficit: Array) -> tuple[Array, Array]:
+def lifts(mesh: Mesh, deficit: Array, narrow: float) -> tuple[Array, Array]:
     """Return by how much each cell's bound is raised at its left and at its right node, for the cell's own deficit.
 
-    Nodes close together are raised by the same amount, for the difference would be a very steep slope.
+    Nodes close together (`narrow`) are raised by the same amount, for the difference would be a very steep slope.
     """
     at_nodes = np.maximum(deficit, np.concatenate([[0.0], deficit[:-1]]))
-    close = np.diff(mesh.place, append=np.inf) < NARROW * mesh.size()
+    close = np.diff(mesh.place, append=np.inf) < narrow * mesh.size()
     close[mesh.first[1:] - 1] = False
     begins = np.flatnonzero(np.concatenate([[True], ~close[:-1]]))
     many = np.diff(begins, append=len(deficit))
@@ -200,8 +209,8 @@ class Scatter:
     the density counts by h/4 times the variation.
     """
 
-    def __init__(self, coarse: Mesh, law: Law):
-        self.law, self.mesh = law, finer_mesh(coarse, law)
+    def __init__(self, coarse: Mesh, law: Law, narrow: float = NARROW):
+        self.law, self.mesh, self.narrow = law, finer_mesh(coarse, law, narrow), narrow
         side = np.repeat(np.arange(len(coarse.first) - 1), np.diff(self.mesh.first))
         y, strata = self.mesh.place, len(law.weights)
 
@@ -242,7 +251,7 @@ class Scatter:
             wild += np.where(product > at_most, at_most, 0.0)
         deficit = np.zeros(len(mean))
         deficit[self.cell] = INFLATE * (np.maximum(tame + 2.0**-40 * size, 0.0) + wild)
-        left, right = lifts(self.mesh, deficit)
+        left, right = lifts(self.mesh, deficit, self.narrow)
         lifted: Array = mean + np.maximum(left, np.concatenate([[0.0], right[:-1]]))
         return lifted
 
@@ -255,7 +264,7 @@ def changes_of(law: Law) -> list[tuple[int, int, float, float]]:
     ]
 
 
-def finer_mesh(coarse: Mesh, law: Law) -> Mesh:
+def finer_mesh(coarse: Mesh, law: Law, narrow: float) -> Mesh:
     """Place nodes for W: at even distances, and where a jump of V leads to a bend."""
     pad, reach = 4.0 * PAD * coarse.size(), float(law.reach)
     bends = np.array([0.0] if law.ripple else [float(law.ends[j]) for j, _ in law.jumps])
@@ -263,9 +272,9 @@ def finer_mesh(coarse: Mesh, law: Law) -> Mesh:
     for begin, end in zip(coarse.first[:-1], coarse.first[1:], strict=True):
         inner = coarse.place[begin + 1 : end - 1]
         width = np.diff(inner)
-        narrow = np.flatnonzero(width < NARROW * coarse.size())
+        close = np.flatnonzero(width < narrow * coarse.size())
         step = max(float(np.median(width)), (inner[-1] - inner[0]) / (4 * len(inner))) / FINER
-        jumps = np.concatenate([inner[narrow], inner[narrow + 1]])
+        jumps = np.concatenate([inner[close], inner[close + 1]])
         around = np.concatenate([jumps, jumps - pad, jumps + pad])
         special = np.unique(around[:, None] + bends)
         special = special[np.diff(special, prepend=-np.inf) > 0.25 * pad]  # the same but for roundings

@@ -152,17 +152,18 @@ def observed(
     average: Average, program_of: Callable[[Formulas], Program], ranges: list[Arb]
 ) -> list[Observed]:
     """Return by function what bounds it on a cell; `ranges` are of parameters."""
+    return [observed_of(function, program_of, ranges) for function in average.functions]
 
-    def one(function: Averaged) -> Observed:
-        if function.word == "lyapunov":
-            return lambda at: bounds_by_slope(at.slope().log(), at.bend, at.x)
-        if function.word == "formula":
-            return functools.partial(bounds_of_formula, program_of(function.what), ranges)
-        if function.word == "share":
-            return functools.partial(bounds_of_share, function.what)
-        return functools.partial(bounds_of_steps, set(function.what))
 
-    return [one(function) for function in average.functions]
+def observed_of(function: Averaged, program_of: Callable[[Formulas], Program], ranges: list[Arb]) -> Observed:
+    """Return what bounds a function on a cell."""
+    if function.word == "lyapunov":
+        return lambda at: bounds_by_slope(at.slope().log(), at.bend, at.x)
+    if function.word == "formula":
+        return functools.partial(bounds_of_formula, program_of(function.what), ranges)
+    if function.word == "share":
+        return functools.partial(bounds_of_share, function.what)
+    return functools.partial(bounds_of_steps, set(function.what))
 
 
 def bounds_by_slope(middle: Arb, slope: Arb, x: Arb) -> tuple[float, ...]:

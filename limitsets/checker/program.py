@@ -143,6 +143,16 @@ BINARY: dict[str, tuple[Function, Partials, Bends]] = {
 """Operations on two numbers, their partial derivatives at x, y from the value too, and their derivatives by x0."""
 
 
+def cube_root(x: Arb) -> Arb:
+    """Enclose the cube root, which rises with x and has its sign."""
+    if not x.is_finite():
+        return NAN
+    lo, hi = (
+        (-(-end).root(3)) if end < 0 else end.root(3) if end > 0 else ZERO for end in (x.lower(), x.upper())
+    )
+    return lo.union(hi)
+
+
 def flat_unless_at_kink(x: Arb, _: Arb) -> Arb:
     """Return the second derivative of |x|; nan where the kink may lie."""
     return ZERO if sign(x).is_exact() else NAN
@@ -158,6 +168,7 @@ UNARY: dict[str, tuple[Function, Slope, Slope]] = {
     "neg": (operator.neg, lambda _, __: -ONE, lambda _, __: ZERO),
     "abs": (magnitude, lambda x, _: sign(x), flat_unless_at_kink),
     "sqrt": (arb.sqrt, lambda _, v: 1 / (2 * v), lambda _, v: -1 / (4 * v * v * v)),
+    "cbrt": (cube_root, lambda _, v: 1 / (3 * v * v), lambda _, v: -2 / (9 * power(v, 5))),
     "exp": (arb.exp, lambda _, v: v, lambda _, v: v),
     "log": (arb.log, lambda x, _: 1 / x, lambda x, _: -1 / (x * x)),
     "sin": (arb.sin, lambda x, _: x.cos(), lambda _, v: -v),
@@ -272,30 +283,39 @@ class Program:
             if not constant:
                 self.steps.append((k, function, entries[0], entries[1] if len(entries) == 2 else -1))
 
-    def at(self, inputs: list[Arb]) -> list[Arb]:
-        """Enclose the results for all numbers in the balls of the inputs."""
+    def entries_of(self, word: str) -> list[tuple[int, int]]:
+        """List the operations of a word on one number that varies: their numbers, and those of their entries."""
+        return [(k, a) for k, _, a, _ in self.steps if self.formulas.operations[k].word == word]
+
+    def at(self, inputs: list[Arb], out: list[int] | None = None) -> list[Arb]:
+        """Enclose the results, or other operations, for all numbers in the balls of the inputs."""
         balls = self.known.copy()
         for k, j in self.inputs:
             balls[k] = inputs[j]
         for k, function, a, b in self.steps:
             balls[k] = function(balls[a]) if b < 0 else function(balls[a], balls[b])
-        return [balls[k] for k in self.out]
+        return [balls[k] for k in out or self.out]
 
-    def gradients(self, inputs: list[Arb]) -> list[list[Arb]]:
+    def gradients(self, inputs: list[Arb], out: list[int] | None = None, apart: int = -1) -> list[list[Arb]]:
         """Enclose the gradients of the results, by all inputs; at a kink all slopes between, at a jump nan.
 
-        A finite gradient is so only where the formula is defined and Lipschitz on the balls of the inputs.
+        A finite gradient is so only where the formula is defined and Lipschitz on the balls of the inputs.  With
+        `apart` that operation counts as one more input, the last, whatever its entries are.
         """
-        flat: Gradient = [None] * self.n_inputs
+        count = self.n_inputs + (apart >= 0)
+        flat: Gradient = [None] * count
         balls = self.known.copy()
         by: list[Gradient] = [flat] * len(balls)
         for k, j in self.inputs:
-            balls[k], by[k] = inputs[j], [ONE if i == j else None for i in range(self.n_inputs)]
+            balls[k], by[k] = inputs[j], [ONE if i == j else None for i in range(count)]
         for k, function, a, b in self.steps:
             word, _, exponent = self.formulas.operations[k]
             x = balls[a]
             y = None if b < 0 else balls[b]
             value = balls[k] = function(x) if y is None else function(x, y)
+            if k == apart:
+                by[k] = [None] * self.n_inputs + [ONE]
+                continue
             if y is not None:
                 first, second = BINARY[word][1](x, y, value) if value.is_finite() else (NAN, NAN)
                 by[k] = [summed(first, u, second, v) for u, v in zip(by[a], by[b], strict=True)]
@@ -303,7 +323,7 @@ class Program:
             slope = UNARY[word][1] if word != "pow" else powers_of(exponent)[0]
             factor = slope(x, value) if value.is_finite() else NAN
             by[k] = [None if u is None else factor * u for u in by[a]]
-        return [[ZERO if u is None else u for u in by[k]] for k in self.out]
+        return [[ZERO if u is None else u for u in by[k]] for k in out or self.out]
 
     def bend(self, inputs: list[Arb]) -> tuple[Arb, Arb, Arb]:
         """Enclose the one result, its derivative by x0 and the second; nan where a kink or a jump may lie.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .balls import Array
-from .means import INFLATE, Graph, Mesh, Rows, Scatter, lifts
+from .means import INFLATE, NARROW, Graph, Mesh, Rows, Scatter, lifts
 
 
 @dataclass
@@ -117,6 +117,7 @@ class Chain:
     ):
         self.mesh, self.scatter, self.rows, self.absorbed, self.beyond = mesh, scatter, rows, absorbed, beyond
         self.goal = goal = mesh if scatter is None else scatter.mesh
+        self.narrow = NARROW if scatter is None else scatter.narrow
         self.live = np.sort(parts.at_cells.array("at", np.int64))
         self.cells, self.nodes, self.hard = (
             Reach(goal, some) for some in (parts.at_cells, parts.at_nodes, parts.hard)
@@ -167,7 +168,9 @@ class Chain:
         # a cell has the chord of what its nodes are raised to, or the largest G where its throws land
         left, right = (
             mean[at] + (INFLATE * lift[live] + 2.0**-50 * g.size)
-            for at, lift in zip((live, live + 1), lifts(self.mesh, self.deficits(g)), strict=True)
+            for at, lift in zip(
+                (live, live + 1), lifts(self.mesh, self.deficits(g), self.narrow), strict=True
+            )
         )
         capped = (left >= top[live]) & (right >= top[live])
         for at, raised in ((live, left), (live + 1, right)):

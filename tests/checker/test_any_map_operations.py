@@ -29,6 +29,7 @@ EXACT = {  # each operation by mpmath; pow has its exponent behind the colon
     "neg": lambda x: -x,
     "abs": abs,
     "sqrt": mpmath.sqrt,
+    "cbrt": lambda x: mpmath.sign(x) * mpmath.cbrt(abs(x)),
     "exp": mpmath.exp,
     "log": mpmath.log,
     "sin": mpmath.sin,

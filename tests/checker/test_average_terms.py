@@ -222,6 +222,7 @@ FORMULAS = {
         [["x", 0], ["pow", 0, 2], ["c", "1"], ["add", 1, 2], ["sqrt", 3]],
         lambda x: mpmath.sqrt(x**2 + 1),
     ),
+    "cbrt": ([["x", 0], ["pow", 0, 2], ["cbrt", 1]], lambda x: mpmath.cbrt(x**2)),
     "exp": ([["x", 0], ["pow", 0, 2], ["exp", 1]], lambda x: mpmath.exp(x**2)),
     "log": ([["x", 0], ["pow", 0, 3], ["log", 1], ["mul", 0, 2]], lambda x: x * mpmath.log(x**3)),
     "sin": ([["x", 0], ["c", "3"], ["mul", 0, 1], ["sin", 2]], lambda x: mpmath.sin(3 * x)),

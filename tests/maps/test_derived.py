@@ -28,7 +28,7 @@ def _ricker(p, x, side):
 
 
 def _roots(p, x, side):
-    return np.sqrt(1.0 + p.r * x**2) - math.log(2.0 + x) / (p.s + x**4), side, 0
+    return np.sqrt(1.0 + p.r * x**2) * np.cbrt(x - 0.3) - math.log(2.0 + x) / (p.s + x**4), side, 0
 
 
 def _turns(p, x, side):
@@ -53,7 +53,7 @@ def _powers(p, x, side):
 
 EXACT = {
     _ricker: lambda r, s, x: x * (r * (1 - x)).exp(),
-    _roots: lambda r, s, x: (1 + r * x**2).sqrt() - (2 + x).log() / (s + x**4),
+    _roots: lambda r, s, x: (1 + r * x**2).sqrt() * _cube_root(x - flint.arb(0.3)) - (2 + x).log() / (s + x**4),
     _turns: lambda r, s, x: r * (3 * x).sin() - (s * x).cos() * x,
     _steep: lambda r, s, x: (flint.arb(0.4) * x).tan() + (r * x).tanh() - flint.arb.atan2(x, 1 + s * x**2),
     _corners: lambda r, s, x: abs(x - flint.arb(0.3)).max(r * x) - x.min(abs(s * x - 1)),

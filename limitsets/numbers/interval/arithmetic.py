@@ -6,13 +6,20 @@ Bodies are free of branches, so that loops over arrays of intervals vectorise.
 from __future__ import annotations
 
 import math
+import sys
 from typing import TypeAlias
+
+import numpy as np
 
 from limitsets.numbers.interval.rounding import above, above_sum, below, below_sum
 from limitsets.numbers.jit import mark_undefined, proof_kernel
 
 Ends: TypeAlias = tuple[float, float]
 """``(lo, hi)`` with lo <= hi, either of which may be infinite; (nan, nan) is the empty set."""
+
+
+# By which share a cube root in floats is off at most where its cubes enclose the number, and beyond that near 0.
+OF_ROOT, TINY = 2.0**-50, sys.float_info.min
 
 
 @proof_kernel
@@ -164,3 +171,12 @@ def sqrt(a: Ends) -> Ends:
     mark_undefined(a[0] < 0.0)
     lo, hi = math.sqrt(max(a[0], 0.0)), math.sqrt(max(a[1], 0.0))
     return or_empty(holds(a) & (a[1] >= 0.0), max(below(lo), 0.0), above(hi))
+
+
+@proof_kernel
+def cbrt(a: Ends) -> Ends:
+    """Cube root: a little beyond a root in floats, if the cubes of the two ends are proved to enclose a."""
+    lo, hi = np.cbrt(a[0]), np.cbrt(a[1])
+    lo, hi = lo - (OF_ROOT * abs(lo) + TINY), hi + (OF_ROOT * abs(hi) + TINY)
+    low, high = power((lo, lo), 3)[1] <= a[0], power((hi, hi), 3)[0] >= a[1]
+    return or_empty(holds(a), lo if low else -math.inf, hi if high else math.inf)

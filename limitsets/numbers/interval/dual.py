@@ -142,6 +142,11 @@ def _sqrt(a: Any) -> Dual:
     return Dual(root, a.slope / (2.0 * root))
 
 
+def _cbrt(a: Any) -> Dual:
+    root = np.cbrt(a.value)
+    return Dual(root, a.slope / (3.0 * root**2))
+
+
 def _floor(a: Any) -> Dual:
     whole = math.floor(a.value)
     return Dual(whole, _flat(whole))
@@ -206,6 +211,7 @@ for _stubs, _method, _left, _right in (
     ((min, np.minimum), _min, None, None),
     ((max, np.maximum), _max, None, None),
     ((math.sqrt, np.sqrt), _sqrt, None, None),
+    ((np.cbrt,), _cbrt, None, None),
     ((math.floor, np.floor), _floor, None, None),
     ((math.exp, np.exp), _exp, None, None),
     ((math.log, np.log), lambda a: Dual(math.log(a.value), a.slope / a.value), None, None),

@@ -145,6 +145,7 @@ for _stubs, _method in (
     ((min, np.minimum), _min),
     ((max, np.maximum), _max),
     ((math.sqrt, np.sqrt), _sqrt),
+    ((np.cbrt,), lambda a: Interval(*arithmetic.cbrt(ends_of(a)))),
     ((math.floor, np.floor), lambda a: Interval(*arithmetic.floor(ends_of(a)))),
     ((math.exp, np.exp), lambda a: Interval(*exponential.exp(ends_of(a)))),
     ((math.log, np.log), lambda a: Interval(*exponential.log(ends_of(a)))),

@@ -232,7 +232,8 @@ _OPERATION = re.compile(r">>> (add|sub|mul|truediv|pow|neg)\((.*)\)$")
 _SIGNS = {"add": " + ", "sub": " - ", "mul": " * ", "truediv": " / ", "pow": " ** ", "neg": "-"}
 
 NUMBERS_DO = (
-    "+ - * /, powers, abs, min and max of two, and of math or numpy sqrt exp log sin cos tan tanh atan2 floor; "
+    "+ - * /, powers, abs, min and max of two, and of math or numpy sqrt exp log sin cos tan tanh atan2 floor, "
+    "cbrt of numpy; "
     "no comparison"
 )
 

@@ -7,15 +7,12 @@ Decision Processes", 1994, section 8.5).
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from limitsets.base import (
     AnswerError,
@@ -29,13 +26,14 @@ from limitsets.base import (
     shown_in_notebooks,
     silent,
 )
-from limitsets.base.arrays import Array
+from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.scattering import Scattering, Uniform, scattering_of
 from limitsets.feeder.scene import Scene, load
 from limitsets.numbers.interval import guard
 from limitsets.proofs.chances.chain import Chain, Place, chain_of, edges_of, in_words, require_places
 from limitsets.proofs.prover import certify
 from limitsets.proofs.prover.certificate import pack
+from limitsets.proofs.prover.long_run_of_map import ALLOWANCE, settled, stretches
 
 if TYPE_CHECKING:
     from limitsets.checker.steps import Chain as Steps
@@ -45,14 +43,6 @@ CELLS = 4000
 ROOM = (2.0**-8, 2.0**-10, 0.0)
 # Beyond the starts cells go on by this share of the arm, so that no throw leads out of all of them.
 BESIDE = 2.0**-13
-# Steps at most, and by how much the gain of a throw may still differ between nodes.
-MOST_STEPS, STILL = 3000, 1e-6
-# They end too where so many steps bring the bound nearer by less than this share of that difference.
-PATIENCE, SOON = 100, 1e-3
-# A step goes so far towards what a throw gains, so that nothing swings.
-DAMPED = 0.8
-# A certificate claims bounds that are wider by this, for the roundings of another machine's sums.
-ALLOWANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,13 +196,13 @@ def long_run_averages(
     from limitsets.checker.long_run import check_starts_stay, kept_cells
 
     setting = read_setting(chain.section)
-    kept = kept_cells(setting, chain.steps)
+    kept = kept_cells(chain.steps, setting.noisy.landing)
     if starts is None:
         begin = _starts_in(read, chain.steps, kept)
         chain = replace(chain, section=chain.section | {"starts": in_words(begin, read.unit)})
     try:
         prove(bool(begin), "from every cell some throw may lead out")
-        check_starts_stay(read_setting(chain.section), chain.steps.mesh, kept)
+        check_starts_stay(read_setting(chain.section).starts, chain.steps.mesh, kept)
     except UnprovedError as error:
         remedy = f"leave starts out, take more cells, or all of a place that no throw leaves: {error}"
         raise AnswerError(
@@ -233,7 +223,7 @@ def _bounded(
     chain: Chain, kept: Array, sides: int, tell: Progress
 ) -> tuple[dict[str, dict[str, Any]], dict[str, Array]]:
     """Bound flips and the shares of all sides: by name as a certificate has them, and the functions."""
-    from limitsets.checker.long_run import FLIPS, SIDE
+    from limitsets.checker.long_run import FLIPS, SIDE, most_gain
 
     names = {"flips_per_throw": None} | {f"share_of_side_{k}": k for k in range(sides)}
     averages, functions = dict[str, dict[str, Any]](), dict[str, Array]()
@@ -241,7 +231,8 @@ def _bounded(
         averages[name] = {"of": FLIPS if side is None else {SIDE: side}}
         for k, (sign, word) in enumerate(((-1.0, "lower"), (1.0, "upper"))):
             tell(name, 2 * number + k, 2 * len(names))
-            bound, functions[f"{number}.{word}"] = _settled(chain, kept, side, sign)
+            gain, mesh = most_gain(chain.steps, kept, side, sign), chain.steps.mesh
+            bound, functions[f"{number}.{word}"] = settled(gain, mesh.place, mesh.first)
             averages[name][word] = (sign * (bound + ALLOWANCE)).hex()
     return averages, functions
 
@@ -272,16 +263,14 @@ def _without_scatter(scene: Scene) -> Scene:
     return load(text)
 
 
-def _starts_in(scene: Scene, steps: Steps, kept: Array) -> list[Place]:
+def _starts_in(scene: Scene, steps: Steps, kept: Mask) -> list[Place]:
     """List the places of cells, rounded inward; none where there are none."""
-    digit, places = 10.0 ** (math.floor(math.log10(scene.arm_length)) - 7), list[Place]()
-    for side, (first, end) in enumerate(itertools.pairwise(steps.mesh.first.tolist())):
-        borders = first + np.flatnonzero(np.diff(kept[first:end].astype(np.int8), prepend=0, append=0))
-        for lo, hi in steps.mesh.place[borders].reshape(-1, 2).tolist():
-            lo, hi = math.ceil(lo / digit) * digit, math.floor(hi / digit) * digit
-            if lo < hi:
-                places.append((side, round(lo, 12), round(hi, 12)))
-    return places
+    digit = 10.0 ** (math.floor(math.log10(scene.arm_length)) - 7)
+    inward = [
+        (side, round(math.ceil(lo / digit) * digit, 12), round(math.floor(hi / digit) * digit, 12))
+        for side, lo, hi in stretches(kept, steps.mesh.place, steps.mesh.first)
+    ]
+    return [place for place in inward if place[1] < place[2]]
 
 
 def _elsewhere(scene: Scene, starts: Sequence[Place]) -> list[Place]:
@@ -296,35 +285,6 @@ def _elsewhere(scene: Scene, starts: Sequence[Place]) -> list[Place]:
         if begin < scene.arm_length:
             places.append((side, begin, math.inf))
     return places
-
-
-def _settled(chain: Chain, kept: Array, side: int | None, sign: float) -> tuple[float, Array]:
-    """Find a function that gains about as much everywhere; with the most that it gains."""
-    from limitsets.checker.long_run import most_gain
-
-    gain, place = most_gain(chain.steps, kept, side, sign), chain.steps.mesh.place
-    u = np.zeros(place.size)
-    nodes, gained = gain(u)
-    own = np.searchsorted(chain.steps.mesh.first, np.arange(place.size), side="right")
-    # beyond the cells u goes on as at the nearest of their nodes; on sides without cells it is 0
-    near = np.arange(place.size)
-    for number in np.unique(own[nodes]):
-        mine, some = np.flatnonzero(own == number), nodes[own[nodes] == number]
-        near[mine] = some[np.abs(place[mine, None] - place[some]).argmin(axis=1)] if some.size else mine
-    best, every = (math.inf, u), list[float]()
-    for _ in range(MOST_STEPS):
-        more = gained - u[nodes]
-        lowest, highest = float(more.min()), float(more.max())
-        best = min(best, (highest, u), key=lambda each: each[0])
-        every.append(best[0])
-        before = every[-PATIENCE] if len(every) > PATIENCE else math.inf
-        if highest - lowest < STILL or before - best[0] < SOON * (highest - lowest):
-            break
-        u = u.copy()
-        u[nodes] += DAMPED * (more - 0.5 * (lowest + highest))
-        u = u[near]
-        nodes, gained = gain(u)
-    return best
 
 
 def _jogs(numbers: Mapping[str, tuple[float, float]], sides: int) -> dict[str, tuple[float, float]]:

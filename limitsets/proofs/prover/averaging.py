@@ -10,6 +10,7 @@ from limitsets.feeder.scene import Scene, load
 from limitsets.proofs.prover.averages_of_map import asked_of_map, averaged, cut_at_changes
 from limitsets.proofs.prover.averages_of_scene import averages_of_scene
 from limitsets.proofs.prover.certifying import require_none
+from limitsets.proofs.prover.long_run_of_map import LongRunOfMap, long_run_of_map
 from limitsets.proofs.prover.of_map import certify_map
 from limitsets.proofs.prover.proof import Proof
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
@@ -35,6 +36,16 @@ def average(
     upper: Any = None,
     progress: Progress | None = None,
 ) -> ProofOfMap: ...
+@overload
+def average(
+    map: tuple[Any, ...],
+    grid: Grid | None = None,
+    of: Any = None,
+    *,
+    upper: Any = None,
+    noise: float,
+    progress: Progress | None = None,
+) -> LongRunOfMap: ...
 @shown_in_notebooks
 @arguments_checked
 def average(
@@ -43,9 +54,10 @@ def average(
     of: Any = None,
     *,
     upper: Any = None,
+    noise: float | None = None,
     cells: int | None = None,
     progress: Progress | None = None,
-) -> Proof | ProofOfMap:
+) -> Proof | ProofOfMap | LongRunOfMap:
     """Prove between which numbers averages along almost every orbit lie.
 
     ``average(scene, of)`` of a scene, or ``average(map, grid, of)`` of a map of a line, whose steps stretch distances
@@ -69,6 +81,10 @@ def average(
         ``[[(0.0, 0.5)], [(0.5, 1.0)]]`` of lists of ranges is a histogram.  Default: "lyapunov", of a scene all words.
     upper : NamedTuple, optional
         Of a map alone: the upper corner of the parameters; the bounds hold for every fixed value between.
+    noise : float, optional
+        Of a map alone: each step lands within this distance of the image, evenly, whatever the steps before did.  Then
+        the map need not stretch: ln |f'| may have slopes 0, and cube roots with an infinite one.  What holds is said of
+        every start, almost surely: what the average tends to, if only along some of the steps, lies between the two.
     cells : int, optional
         Of a scene alone: into how many cells the attracting cells are cut, by default 8192, more where these do not
         suffice; the bounds come nearer as 1/cells.
@@ -77,7 +93,7 @@ def average(
 
     Returns
     -------
-    Proof or ProofOfMap
+    Proof, ProofOfMap or, with noise, LongRunOfMap
         With the claim `average`.  Where it is proved `average.numbers` has by name and component the two numbers, and
         `average.lo`, `average.hi` those of the first function on all components.
 
@@ -102,7 +118,9 @@ def average(
     """
     if isinstance(map, Scene | str | Path):
         twice = isinstance(grid, Grid) or of is not None  # else what is averaged stands in its place
-        require_none({"upper": upper, "grid": grid if twice else None}, "average", "beside a scene")
+        require_none(
+            {"upper": upper, "noise": noise, "grid": grid if twice else None}, "average", "beside a scene"
+        )
         if cells is not None and cells < 1:
             raise AnswerError("the cells of an average", cells, "1 or more", "leave it out")
         return averages_of_scene(load(map), of if grid is None else grid, cells, progress)
@@ -118,5 +136,7 @@ def average(
         raise AnswerError("the grid of an average", f"{grid.dimension} axes", "one", "averages are of a line")
     of = "lyapunov" if of is None else of
     corners = coerce(map), coerce(map if upper is None else upper)
+    if noise is not None:
+        return long_run_of_map(*corners, grid, of, noise, progress)
     fine = cut_at_changes(*corners, grid, asked_of_map(of, corners[0], grid).jumps)
     return averaged(certify_map(map, fine, ["invariant"], upper=upper, progress=progress), of)

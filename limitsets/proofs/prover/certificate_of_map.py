@@ -239,7 +239,7 @@ def _alike(carried: Array, slopes: Array) -> Array:
     return np.asarray(carried * sizes[:, None, None])
 
 
-def _parameters(lower: Any, upper: Any) -> dict[str, Any]:
+def parameters_of(lower: Any, upper: Any) -> dict[str, Any]:
     """Write each parameter as a decimal, or two where it has a range."""
     ends = zip(names_of(lower), names_of(upper), strict=True)
     return {name: decimal(lo) if lo == hi else [decimal(lo), decimal(hi)] for (name, lo), (_, hi) in ends}
@@ -258,7 +258,11 @@ def _section(claim: str, arrays: Arrays, known: Mapping[str, Any]) -> dict[str, 
         return {"max_rank": int(arrays["rank"].max())}
     if claim == "expanding":
         return {"least": (float.fromhex(known["least_slope"]) * (1.0 - LESS)).hex()}
-    return dict(known) if claim in ("average", "entropy", "cycles", "all-cycles", "converges") else {}
+    return (
+        dict(known)
+        if claim in ("average", "entropy", "long-run", "cycles", "all-cycles", "converges")
+        else {}
+    )
 
 
 class Part(NamedTuple):
@@ -331,7 +335,7 @@ def write_map(
             {"claim": word, "section": _section(word, part.arrays, known)}
             for word, known in part.claims.items()
         ]
-        boxes.append({"parameters": _parameters(*part.corners), "prefix": f"{k}.", "claims": claims})
+        boxes.append({"parameters": parameters_of(*part.corners), "prefix": f"{k}.", "claims": claims})
         arrays |= {f"{k}.{name}": np.ascontiguousarray(each) for name, each in part.arrays.items()}
         where = f"box {k}: " if len(parts) > 1 else ""
         verdicts |= {where + word: "refuted" if word == "refuted" else "proved" for word in part.claims}

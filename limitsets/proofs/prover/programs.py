@@ -52,8 +52,8 @@ SIGNS = {"add": ("+", 1), "sub": ("-", 1), "mul": ("*", 2), "div": ("/", 2)}
 # In doubles, on whole arrays.
 NUMPY: dict[str, Callable[..., Any]] = {
     "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "min": np.minimum, "max": np.maximum,
-    "atan2": np.arctan2, "neg": np.negative, "abs": np.abs, "sqrt": np.sqrt, "exp": np.exp, "log": np.log,
-    "sin": np.sin, "cos": np.cos, "tan": np.tan, "tanh": np.tanh, "floor": np.floor,
+    "atan2": np.arctan2, "neg": np.negative, "abs": np.abs, "sqrt": np.sqrt, "cbrt": np.cbrt, "exp": np.exp,
+    "log": np.log, "sin": np.sin, "cos": np.cos, "tan": np.tan, "tanh": np.tanh, "floor": np.floor,
 }  # fmt: skip
 
 # A parameter that could be read as something else is printed with "p." before it.

@@ -34,7 +34,10 @@ LARGEST_POWER = 200
 # Sizes of a constant.
 LEAST, GREATEST = 1e-99, 1e99
 
-ALLOWED = "+ - * /, whole powers, abs, min, max, sqrt, exp, log, sin, cos, tan, tanh, atan2 and floor of math or numpy"
+ALLOWED = (
+    "+ - * /, whole powers, abs, min, max, sqrt, exp, log, sin, cos, tan, tanh, atan2 and floor of math or numpy, "
+    "cbrt of numpy"
+)
 BRANCHES = (
     "give each branch a formula of its own, with a margin (pieces= of limitsets.map; image_on and margin of register), "
     "or write min, max, abs or floor"
@@ -166,7 +169,8 @@ for _name, _word in REFUSED.items():
 Recorded.__rpow__ = _refuses("a power", remedy="write exp(b * log(a))")  # type: ignore[attr-defined]  # likewise
 
 # Functions of math, numpy and Python that record -> the operation.
-WORDS = {word: word for word in ("sqrt", "exp", "log", "sin", "cos", "tan", "tanh", "floor", "min", "max", "atan2")} | {
+ALIKE = ("sqrt", "cbrt", "exp", "log", "sin", "cos", "tan", "tanh", "floor", "min", "max", "atan2")
+WORDS = {word: word for word in ALIKE} | {
     "fabs": "abs", "absolute": "abs", "arctan2": "atan2", "minimum": "min", "maximum": "max",
 }  # fmt: skip
 POWERS = ("pow", "power")

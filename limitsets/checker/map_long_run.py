@@ -1,0 +1,233 @@
+"""The claim `long-run` of a map: averages along orbits whose steps scatter, from every start in some places.
+
+docs/certificates.md, "Long-run averages".  What is averaged, g, is counted where a step lands, so that ln |f'| may have
+poles: where f' = 0, and at a cube root whose slope is infinite.  The file has a function u for either end, and checked
+is K(g + u) - u <= c at every place of N.  For g stands a function that is affine between nodes and nowhere below g but
+on cells with a pole; there its excess over 0 has a bounded integral, which counts with the largest density of landings.
+"""
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import arb
+
+from .any_map import Map, Shape
+from .balls import ONE, ZERO, Arb, Array, about, prove
+from .brackets import Place
+from .file import Arrays, read_box, read_side, require, rows, table
+from .landings import upper
+from .laws import Law, uniform_law
+from .long_run import SIGNS, Gain, check_end, check_starts_stay, kept_cells, nodes_of
+from .means import INFLATE
+from .noisy_map import Piece, chain_of_map
+from .observable import (
+    Allowed,
+    Averaged,
+    Observed,
+    OnCell,
+    function_in_words,
+    known_bounds,
+    observed_of,
+    read_function,
+)
+from .program import Program, rational
+from .steps import Chain
+
+OF_LONG_RUN = "landing starts functions"
+ENDS = ("lower", "upper")
+MOST_NODES_OF_MAP = 2_000_000
+
+
+class LongRunOfMap(NamedTuple):
+    """What is claimed: read, and not yet believed."""
+
+    landing: str
+    law: Law
+    starts: list[Place]
+    edges: list[Array]
+    functions: list[Averaged]  # `lower` and `upper` are the functions u
+
+
+# ----------------------------------------------------------------
+# Reading.
+
+
+def read_long_run_of_map(
+    section: dict[str, Any], arrays: Arrays, prefix: str, shape: Shape, where: str
+) -> LongRunOfMap:
+    """Read the claim of a box of parameters."""
+    require(shape.dimension == 1 and not shape.closes, f"{where}: long-run is of one axis, which ends")
+    bound = rational(section["landing"], f"{where}: landing")
+    require(0 < bound < 10**6, f"{where}: landing is not above 0, or too large")
+    edges = [arrays.read(f"{prefix}nodes.{side}", "<f8") for side in range(shape.sides)]
+    sound = all(len(e) >= 4 and bool((np.diff(e) > 0).all()) and float(np.abs(e).max()) < 1e6 for e in edges)
+    require(
+        sound and sum(map(len, edges)) <= MOST_NODES_OF_MAP,
+        f"{where}: the nodes do not ascend, or are too many",
+    )
+    starts = [
+        (read_side(one["side"], shape.sides), Fraction(lo), Fraction(hi))
+        for each in rows(section["starts"], f"{where}: starts", 1, 1000)
+        for one in (table(each, f"{where}: starts", "side box"),)
+        for lo, hi in read_box(one["box"], 1, f"{where}: starts")
+    ]
+    listed = rows(section["functions"], f"{where}: functions", 1, 99)
+    columns = [arrays.read(f"{prefix}long-run.{end}", "<f8", len(listed)) for end in ("upper", "lower")]
+    alike = all(len(column) == sum(len(e) + 2 for e in edges) for column in columns)
+    require(alike, f"{where}: a function has not one number for each node")
+    by_function = [column.reshape(len(column), -1).T for column in columns]
+    allowed = Allowed(shape.sides, shape.branches, shape.names)
+    functions = [
+        read_function(
+            one, [0], allowed, f"{where}: function {k}", [each[k] for each in by_function] + [np.zeros(0)]
+        )
+        for k, one in enumerate(listed)
+    ]
+    return LongRunOfMap(section["landing"], uniform_law(bound, 1), starts, edges, functions)
+
+
+def long_run_of_map_in_words(c: LongRunOfMap) -> Iterator[str]:
+    """Put the claim in words."""
+    places = ", ".join(f"[{float(lo)!r}, {float(hi)!r}] of side {side}" for side, lo, hi in c.starts)
+    yield f"steps land within {c.landing} of f(x), evenly and independent of each other; from every start in {places}"
+    yield "almost surely averages over n steps, as n grows, lie in the end between the two"
+    for one in c.functions:
+        lo, hi = known_bounds(one, 0)
+        yield f"    {lo!r} to {hi!r}: {function_in_words(one, ['take branch 0', 'take branch 1'])}"
+    yield "    means over stationary laws lie there too"
+
+
+# ----------------------------------------------------------------
+# What is counted.
+
+
+class Majorant(NamedTuple):
+    """A function that is affine between nodes, and how much what it stands for may exceed it in all (an integral)."""
+
+    values: Array
+    excess: float
+
+
+def majorants(
+    the_map: Map, chain: Chain, pieces: list[Piece], functions: list[Averaged]
+) -> list[list[Majorant]]:
+    """Bound what is counted from above, by function and sign: its negative for the lower end."""
+    ranges = the_map.piece([]).balls
+    observed = [observed_of(one, the_map.program_of, ranges) for one in functions]
+    values = np.full((len(functions), 2, len(chain.mesh.place)), -np.inf)
+    excess = np.zeros((len(functions), 2))
+    for piece in pieces:
+        program = the_map.image[piece.side, piece.branch]
+        at, ends = (
+            on_cell(program, piece, piece.ends, ranges),
+            [on_cell(program, piece, (x, x), ranges) for x in piece.ends],
+        )
+        for k, (one, bounds) in enumerate(zip(functions, observed, strict=True)):
+            for sign, row in enumerate(rows_of(bounds, at, ends)):
+                nodes = [piece.at, piece.at + 1]
+                if not np.isfinite(row).all():
+                    with about(f"side {piece.side}, x in [{piece.ends[0]!r}, {piece.ends[1]!r}]"):
+                        excess[k, sign] += (
+                            pole(program, piece, ranges, sign) if one.word == "lyapunov" else math.inf
+                        )
+                        prove(math.isfinite(excess[k, sign]), "what is averaged has no bound there")
+                    row = [0.0, 0.0]
+                values[k, sign, nodes] = np.maximum(values[k, sign, nodes], row)
+    values[np.isneginf(values)] = 0.0
+    return [
+        [Majorant(v, float(much) * INFLATE) for v, much in zip(*pair, strict=True)]
+        for pair in zip(values, excess, strict=True)
+    ]
+
+
+def on_cell(program: Program, piece: Piece, ends: tuple[float, float], ranges: list[Arb]) -> OnCell:
+    """Give a cell, or one of its ends, as functions take it."""
+    middle, alone = (arb(ends[0]) + arb(ends[1])) / 2, ends[0] == ends[1]
+    return OnCell(
+        piece.side, piece.branch, ends, arb(ends[0]).union(arb(ends[1])), middle=middle,
+        bend=ZERO if alone else piece.bend / piece.slope,
+        slope=lambda: abs(program.gradients([middle, *ranges])[0][0]),
+    )  # fmt: skip
+
+
+def rows_of(bounds: Observed, at: OnCell, ends: list[OnCell]) -> tuple[list[float], list[float]]:
+    """Bound a function and its negative at the two nodes of a cell, so that the chord is nowhere below.
+
+    A function exceeds its chord by at most |I| (B - A)/4 where its slope is from A to B: by twice what its mean may be
+    off.  What it is at a node counts no less than the least on the cell: it may jump there.
+    """
+    low, high, least, most, _ = bounds(at)
+    more = (high - low) * INFLATE
+    own = [bounds(each) for each in ends]
+    above = [max(one[3], least) + more for one in own]
+    return [-(min(one[2], most) - more) for one in own], above
+
+
+def pole(program: Program, piece: Piece, ranges: list[Arb], sign: int) -> float:
+    """Bound the integral of the positive part of ln |f'| over a cell (1), or of its negative (0).
+
+    From above it is at most |I| ln(1 + the mean of |f'|), by Jensen's inequality.  From below: where |f''| >= m,
+    |f'| <= exp(-s) on a length of at most 2 exp(-s)/m; integrate over s from 0 on.
+    """
+    x = arb(piece.ends[0]).union(arb(piece.ends[1]))
+    length = arb(piece.ends[1]) - arb(piece.ends[0])
+    least, mean = ZERO, piece.slope
+    if not piece.slope.is_finite():
+        least, mean = beside_root(program, [x, *ranges], length)
+    if sign:
+        return upper(length * (1 + mean.abs_upper()).log())
+    if least > 0:
+        return upper(length * least.min(ONE).log().abs_upper())
+    bend = piece.bend.abs_lower() if piece.bend.is_finite() else ZERO
+    return upper(length * (1 + (2 / (bend * length)).max(ONE).log())) if bend > 0 else math.inf
+
+
+def beside_root(program: Program, inputs: list[Arb], length: Arb) -> tuple[Arb, Arb]:
+    """Enclose the least |f'| on a cell that holds the zero of one cube root's argument, and bound the mean of |f'|.
+
+    f' = Q + P r with r the slope of the root, which has one sign, is unbounded, and whose integral is the root's rise.
+    """
+    roots = [(k, *program.at(inputs, [k, a]), a) for k, a in program.entries_of("cbrt")]
+    roots = [each for each in roots if each[1].contains(0)]
+    if len(roots) != 1:
+        return ZERO, arb("nan")
+    ((k, root, argument, a),) = roots
+    inner = program.gradients(inputs, out=[a])[0][0]
+    slopes = program.gradients(inputs, apart=k)[0]
+    rest, factor = slopes[0].abs_upper(), slopes[-1]
+    if not (inner > 0 or inner < 0):
+        return ZERO, arb("nan")
+    rate = inner.abs_lower() / (3 * argument.abs_upper().root(3) ** 2)
+    return factor.abs_lower() * rate - rest, rest + factor.abs_upper() * 2 * root.rad() / length
+
+
+# ----------------------------------------------------------------
+# The inequality.
+
+
+def gain_of(chain: Chain, kept: Array, counted: Majorant, law: Law) -> Gain:
+    """Give a function that bounds K(g + u) at the nodes of the cells that are kept; and lists these nodes."""
+    nodes, free = nodes_of(kept), np.full(len(chain.mesh.place), -np.inf)
+    more = counted.excess * law.most * INFLATE
+
+    def gain(u: Array) -> tuple[Array, Array]:
+        return nodes, chain.above(u + counted.values, free, more)[nodes]
+
+    return gain
+
+
+def check_long_run_of_map(the_map: Map, c: LongRunOfMap) -> None:
+    """Check the claim."""
+    chain, pieces = chain_of_map(the_map, c.edges, c.law)
+    kept = kept_cells(chain, c.law)
+    check_starts_stay(c.starts, chain.mesh, kept)
+    counted = majorants(the_map, chain, [piece for piece in pieces if kept[piece.at]], c.functions)
+    for k, one in enumerate(c.functions):
+        with about(f"function {k}"):
+            for sign, u, end, of in zip(
+                SIGNS, (one.lower, one.upper), one.bounds[0], counted[k], strict=True
+            ):
+                check_end(sign, u, end, gain_of(chain, kept, of, c.law), 4.0 + float(np.abs(of.values).max()))

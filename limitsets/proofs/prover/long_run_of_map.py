@@ -1,0 +1,270 @@
+"""Averages of a map of a line whose steps scatter: between which numbers they lie in the end, from every start.
+
+The checker proves one inequality for each number (`limitsets/checker/map_long_run.py`); how its function is found does
+not matter: u gains what one step counts, less a constant, until it stays (relative value iteration; Puterman, "Markov
+Decision Processes", 1994, section 8.5).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from limitsets.base import AnswerError, Column, Progress, Table, as_table, picked, silent
+from limitsets.base.arrays import Array, Arrays, Ints, Mask
+from limitsets.proofs.prover.averages import outward
+from limitsets.proofs.prover.averages_of_map import asked_of_map, cut_at_changes
+from limitsets.proofs.prover.certificate import Saved, require_checker
+from limitsets.proofs.prover.certificate_of_map import Part, parameters_of, write_map
+from limitsets.proofs.prover.programs import periods_of, recorded_map
+from limitsets.proofs.prover.recording import decimal
+from limitsets.systems.cells import Grid
+
+if TYPE_CHECKING:
+    from limitsets.checker.any_map import Map as CheckedMap
+
+# Cells are cut, each so often at most, where the slope varies by more than this factor, but for cells below this share
+# of a side; and where an image is longer than the mean by this factor.
+MOST_CUTS, VARIES, TINY, LONG = 400, 1.5, 2.0**-40, 2.0
+# Steps at most, and by how much the gain of a step may still differ between nodes.
+MOST_STEPS, STILL = 3000, 1e-6
+# They end too where so many steps bring the bound nearer by less than this share of that difference.
+PATIENCE, SOON = 100, 1e-3
+# A step goes so far towards what it gains, so that nothing swings.
+DAMPED = 0.8
+# A certificate claims bounds that are wider by this, for the roundings of another machine's sums.
+ALLOWANCE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class LongRunOfMap(Saved):
+    """Proved bounds of averages along orbits whose steps scatter, from every start in some places, almost surely.
+
+    Attributes
+    ----------
+    map, upper : NamedTuple
+        The corners of the parameters; the bounds hold for every fixed value between.
+    grid : Grid
+        The cells.
+    noise : float
+        Steps land evenly within this distance of the image, independent of each other.
+    starts : tuple of (int, float, float)
+        Side, from x, to x: from these no step leads out.
+    numbers : dict of str to (float, float)
+        By name between which two numbers the average lies in the end.
+    section, arrays : dict
+        The claim `long-run` as a certificate has it.
+    seconds : float
+        Time it took.
+    how : str
+        "proved".
+    """
+
+    map: Any
+    upper: Any
+    grid: Grid
+    noise: float
+    starts: tuple[tuple[int, float, float], ...]
+    numbers: dict[str, tuple[float, float]]
+    section: dict[str, Any]
+    arrays: Arrays
+    seconds: float
+    how: str = "proved"
+
+    @property
+    def lo(self) -> float:
+        """The least number in which the average of the first function can end."""
+        return next(iter(self.numbers.values()))[0]
+
+    @property
+    def hi(self) -> float:
+        """The largest."""
+        return next(iter(self.numbers.values()))[1]
+
+    def tables(self) -> tuple[Table, ...]:
+        """Give the tables that show it, the one that is saved as CSV first."""
+        rows = [
+            (name.replace("_", " "), *outward(lo, hi), hi - lo) for name, (lo, hi) in self.numbers.items()
+        ]
+        heads = ("average", Column("lo", show=".12g"), Column("hi", show=".12g"), Column("width", show=".2g"))
+        said = f"{self.how}: from every start in these places, almost surely, as steps go on for ever"
+        named = f"{type(self.map).__name__}: long-run averages, noise {self.noise:g}"
+        places = [(side, (lo, hi)) for side, lo, hi in self.starts]
+        starts = Table(("side", Column("x", show=".6g", ends=True)), places, "Starts", "no step leads out")
+        return Table(heads, rows, named, said), starts
+
+    def to_json(self) -> dict[str, Any]:
+        """Give the bounds as JSON takes them."""
+        return as_table(
+            **picked(self, "how", "noise", "starts", "seconds"),
+            map=type(self.map).__name__,
+            parameters=[end._asdict() for end in (self.map, self.upper)],
+            cells=self.grid.n_cells,
+            averages={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.numbers.items()},
+        )
+
+    def _write(self, path: str | Path, **how: Any) -> None:
+        part = Part((self.map, self.upper), {"long-run": self.section}, self.arrays)
+        write_map(path, self.grid.domain, [part], goal=None, **how)
+
+
+def long_run_of_map(
+    lower: Any, upper: Any, grid: Grid, of: Any, noise: float, progress: Progress | None
+) -> LongRunOfMap:
+    """Prove between which numbers averages lie in the end where each step lands evenly within `noise` of the image.
+
+    Raises
+    ------
+    AnswerError
+        Noise that is not above 0, an axis that closes, functions without a bound, or cells that steps leave.
+    """
+    begun, tell = time.perf_counter(), progress or silent
+    if not 0.0 < noise < math.inf:
+        raise AnswerError("the noise", noise, "a number above 0", "leave it out for averages without noise")
+    if grid.domain.closes:
+        raise AnswerError("the grid", "an axis that closes", "one that ends", "noise is of lines that end")
+    require_checker()
+    import flint
+
+    from limitsets.checker.any_map import Map, read_map, read_parameters
+    from limitsets.checker.balls import PRECISION, UnprovedError
+    from limitsets.checker.laws import uniform_law
+    from limitsets.checker.long_run import SIGNS, kept_cells
+    from limitsets.checker.map_long_run import ENDS, gain_of, majorants
+    from limitsets.checker.noisy_map import chain_of_map
+    from limitsets.checker.observable import Allowed, read_function
+
+    asked = asked_of_map(of, lower, grid)
+    fine = cut_at_changes(lower, upper, grid, asked.jumps, turns=True)
+    edges = [edges for (edges,) in fine.edges]
+    unknown = [np.zeros(0)] * 3  # the functions u that are to be found
+    law = uniform_law(Fraction(decimal(noise)), 1)
+    listed: list[dict[str, Any]] = [
+        {"of": one.section} | {end: [(0.0).hex()] for end in ENDS} for one in asked.functions
+    ]
+    with flint.ctx.workprec(PRECISION):
+        shape = read_map(recorded_map(lower, grid.sides) | {"periodic": periods_of(grid.domain)})
+        the_map = Map(shape, read_parameters(parameters_of(lower, upper), shape.names, "the map"))
+        allowed = Allowed(shape.sides, shape.branches, shape.names)
+        functions = [read_function(one, [0], allowed, "the function", unknown) for one in listed]
+        tell("cells", 0, 1)
+        edges = [refined(the_map, side, each) for side, each in enumerate(edges)]
+        chain, pieces = chain_of_map(the_map, edges, law)
+        kept = kept_cells(chain, law)
+        if not kept.any():
+            remedy = "widen the grid, or lower the noise"
+            raise AnswerError("the noise", noise, "so small that steps stay on some cells", remedy)
+        try:
+            counted = majorants(the_map, chain, [each for each in pieces if kept[each.at]], functions)
+        except UnprovedError as error:
+            raise AnswerError("the function to average", of, "one with a bound", str(error)) from None
+        columns = np.zeros((len(ENDS), len(chain.mesh.place), len(listed)))
+        for k, pair in enumerate(counted):
+            for sign, majorant, end, column in zip(SIGNS, pair, ENDS, columns, strict=True):
+                tell(asked.functions[k].name, 2 * k + (sign > 0.0), 2 * len(listed))
+                bound, column[:, k] = settled(
+                    gain_of(chain, kept, majorant, law), chain.mesh.place, chain.mesh.first
+                )
+                listed[k] = listed[k] | {end: [(sign * (bound + ALLOWANCE)).hex()]}
+    arrays = {f"nodes.{side}": each for side, each in enumerate(edges)} | {
+        f"long-run.{end}": column if len(listed) > 1 else column[:, 0]
+        for end, column in zip(ENDS, columns, strict=True)
+    }
+    starts = stretches(kept, chain.mesh.place, chain.mesh.first)
+    section = {
+        "landing": decimal(noise),
+        "starts": [{"side": side, "box": [[lo.hex(), hi.hex()]]} for side, lo, hi in starts],
+        "functions": listed,
+    }
+    numbers = {}
+    for one, each in zip(asked.functions, listed, strict=True):
+        lo, hi = (float.fromhex(each[end][0]) for end in ENDS)
+        shares = {"share", "steps"} & set(one.section)  # these lie between 0 and 1 by themselves
+        numbers[one.name] = (max(lo, 0.0), min(hi, 1.0)) if shares else (lo, hi)
+    return LongRunOfMap(
+        lower, upper, fine, noise, tuple(starts), numbers, section, arrays, time.perf_counter() - begun
+    )
+
+
+def refined(the_map: CheckedMap, side: int, edges: Array) -> Array:
+    """Cut cells on which the slope varies by a half or has no bounds, and those with an image longer than most.
+
+    Near a pole of ln |f'| cells become the shorter the nearer it is; small ones, of changes and turns, stay.
+    """
+    from limitsets.checker.any_map import possible
+
+    tiny, cells = TINY * (edges[-1] - edges[0]), list[tuple[float, float, float]]()
+    for ends in itertools.pairwise(edges.tolist()):
+        stack, cuts = [ends], 0
+        while stack:
+            lo, hi = stack.pop()
+            piece = the_map.piece([(lo, hi)])
+            branches = possible(the_map, side, piece)[0]
+            slope = the_map.image[side, branches[0]].bend(piece.balls)[1]
+            least, most = (float(each) for each in (slope.abs_lower(), slope.abs_upper()))
+            if len(branches) == 1 and cuts < MOST_CUTS and hi - lo > tiny and not most <= VARIES * least:
+                stack += [(0.5 * (lo + hi), hi), (lo, 0.5 * (lo + hi))]
+                cuts += 1
+                continue
+            cells.append((lo, hi, most * (hi - lo) if math.isfinite(most) else 0.0))
+    lo, hi, long = np.array(cells).T
+    parts = (
+        np.maximum(np.ceil(long / (LONG * long.mean())), 1.0).astype(int)
+        if long.any()
+        else np.ones(len(lo), int)
+    )
+    inner = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(lo, hi, parts.tolist(), strict=True)]
+    return np.unique(np.concatenate([*inner, hi[-1:]]))
+
+
+def stretches(kept: Mask, place: Array, first: Ints) -> list[tuple[int, float, float]]:
+    """List the stretches of cells, given by their left nodes: side, from x, to x."""
+    places = []
+    for side, (begin, end) in enumerate(itertools.pairwise(first.tolist())):
+        borders = begin + np.flatnonzero(np.diff(kept[begin:end].astype(np.int8), prepend=0, append=0))
+        places += [(side, lo, hi) for lo, hi in place[borders].reshape(-1, 2).tolist()]
+    return places
+
+
+def settled(gain: Callable[[Array], tuple[Ints, Array]], place: Array, first: Ints) -> tuple[float, Array]:
+    """Find a function that gains about as much everywhere; with the most that it gains.
+
+    Parameters
+    ----------
+    gain : callable
+        From a function at all nodes: numbers of nodes, and at these the mean after a step, with what is counted.
+    place, first : ndarray
+        Places of the nodes, and the number of the first of each side.
+    """
+    u = np.zeros(place.size)
+    nodes, gained = gain(u)
+    own = np.searchsorted(first, np.arange(place.size), side="right")
+    # beyond the cells u goes on as at the nearest of their nodes; on sides without cells it is 0
+    near = np.arange(place.size)
+    for number in np.unique(own[nodes]):
+        mine, some = np.flatnonzero(own == number), nodes[own[nodes] == number]
+        right = np.clip(np.searchsorted(place[some], place[mine]), 1, max(some.size - 1, 1))
+        left = place[mine] - place[some][right - 1] < place[some][right % some.size] - place[mine]
+        near[mine] = some[np.where(left, right - 1, right % some.size)]
+    best, every = (math.inf, u), list[float]()
+    for _ in range(MOST_STEPS):
+        more = gained - u[nodes]
+        lowest, highest = float(more.min()), float(more.max())
+        best = min(best, (highest, u), key=lambda each: each[0])
+        every.append(best[0])
+        before = every[-PATIENCE] if len(every) > PATIENCE else math.inf
+        if highest - lowest < STILL or before - best[0] < SOON * (highest - lowest):
+            break
+        u = u.copy()
+        u[nodes] += DAMPED * (more - 0.5 * (lowest + highest))
+        u = u[near]
+        nodes, gained = gain(u)
+    return best
