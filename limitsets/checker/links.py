@@ -219,7 +219,7 @@ class Links(Landings):
         for column, each in zip(self.columns, over, strict=True):
             for j in range(column.first, max(column.last, 1)):
                 where = self.around(flips, self.place[cell : cell + 2, j : j + 2], slack)
-                rows.append(turn_of(self.start + cell, h, each.x, each.xx, self.goal, where, self.weights[j]))
+                rows.append(turn_of(self.start + cell, h, each.x, each.xx, where, self.weights[j]))
         self.parts.turns.rows += [row for row in rows if row] if None not in rows else []
 
     def add_node(self, node: int) -> None:
@@ -317,20 +317,19 @@ class Links(Landings):
 
 
 def turn_of(
-    at: int, h: float, slope: Arb, bend: Arb, goal: Mesh, where: tuple[int, float, float], weight: float = 1.0
+    at: int, h: float, slope: Arb, bend: Arb, where: tuple[int, float, float], weight: float = 1.0
 ) -> tuple[float, ...] | None:
     """Bound how much the slope of G(T(x)) varies along a cell that T takes to a range; None where T' has no bounds.
 
     Or how far G, affine on cells at most d wide, lies above its chord over a length l where its slope falls by at most
-    L per length: L (l^2 + d^2)/8, for less a parabola's interpolant it is convex.
+    L per length: L (l^2 + d^2)/8, for less a parabola's interpolant it is convex; `Bent` knows d.
     """
     least, most = both_ends(slope)
     bow = upper(abs(bend)) * h * h * 0.125 * INFLATE if bend.is_finite() else math.inf
     if not (math.isfinite(least) and math.isfinite(most) and math.isfinite(bow)):
         return None
-    length, scale = max(-least, most) * h, h * 0.25 * weight * INFLATE
-    even = weight * (length**2 + goal.widest(*where) ** 2) * 0.125 * INFLATE
-    return at, least * scale, most * scale, *where, even, weight * bow
+    length, scale, eighth = max(-least, most) * h, h * 0.25 * weight * INFLATE, weight * 0.125 * INFLATE
+    return at, least * scale, most * scale, *where, length**2 * eighth, eighth, weight * bow
 
 
 def chain_of(

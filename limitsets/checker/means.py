@@ -43,13 +43,6 @@ class Mesh(NamedTuple):
         inner[self.first[:-1]] = inner[self.first[1:] - 1] = False
         return float(np.abs(self.place[inner]).max()) + 1.0
 
-    def widest(self, side: int, lo: float, hi: float) -> float:
-        """Return the width of the widest cell that a range of places meets."""
-        pad = PAD * self.size()
-        row = self.place[self.first[side] : self.first[side + 1]]
-        first, last = np.searchsorted(row, (lo - pad, hi + pad), side="right")
-        return float(np.diff(row[max(first - 1, 0) : last + 1]).max())
-
     def within(self, side: Array, lo: Array, hi: Array) -> "Ranges":
         """Find the cells that ranges of places meet, or may meet by roundings."""
         pad = PAD * self.size()

@@ -20,7 +20,7 @@ from .links import turn_of
 from .means import INFLATE, Scatter, Spread, mean_rows
 from .steps import Chain, Parts
 
-NARROW_OF_MAP = 2.0**-36  # cells below this share of the largest place count as jumps
+NARROW_OF_MAP = 2.0**-30  # cells below this share of the largest place count as jumps
 ROOM = 8.0  # so many times as far out as places and the noise reach images may lie: what is there is off all cells
 
 
@@ -90,16 +90,15 @@ def chain_of_map(the_map: Map, edges: list[Array], law: Law) -> tuple[Chain, lis
             parts.at_cells.rows.append((at, float(len(steps) > 1), *ranges[0], *ranges[1]))
             if len(steps) == 1:
                 (step,) = steps
-                row = turn_of(
-                    at, ends[1] - ends[0], step.piece.slope, step.piece.bend, scatter.mesh, ranges[0]
-                )
+                row = turn_of(at, ends[1] - ends[0], step.piece.slope, step.piece.bend, ranges[0])
                 parts.turns.rows += [] if row is None else [row]
             for node, image in zip((at, at + 1), steps[0].images, strict=True):
                 if len(steps) == 1 or node not in places:  # on a cell of one branch the node has this one too
                     places[node] = steps[0].to, image
     spread = spread_of(places, parts)
     rows = mean_rows(len(mesh.place), scatter.mesh, [spread])
-    return Chain(mesh, scatter, rows, {}, parts, 0.0), pieces
+    # nodes are not raised together: the cells beside a change of branch may be wide
+    return Chain(mesh, scatter, rows, {}, parts, 0.0, narrow=0.0), pieces
 
 
 def spread_of(places: dict[int, tuple[int, Arb]], parts: Parts) -> Spread:

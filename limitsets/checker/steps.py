@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .balls import Array
-from .means import INFLATE, NARROW, Graph, Mesh, Rows, Scatter, lifts
+from .means import INFLATE, NARROW, Graph, Mesh, Rows, Scatter, extremes, lifts
 
 
 @dataclass
@@ -40,7 +40,8 @@ class Parts:
     its largest slope (`steep`, instead of `varied` where that is less).  `ends`: coefficients of G' where the law or
     the branch changes, and `cap`, a coefficient of the variation of G that bounds the same; `inner`: coefficients of
     the variation; `turns`: coefficients whose products with G' may vary, part by part of the law, with `even`, that of
-    the largest fall of G' per length, and `bow`, that of the largest size of G', which together bound the same.
+    the largest fall of G' per length, `eighth`, to be multiplied by the square of the widest cell and added to it, and
+    `bow`, that of the largest size of G', which together bound the same.
     """
 
     at_cells: Collected = field(default_factory=lambda: Collected(LANDING))
@@ -48,7 +49,7 @@ class Parts:
     hard: Collected = field(default_factory=lambda: Collected((*LANDING, "node", "steep")))
     ends: Collected = field(default_factory=lambda: Collected((*BEND, "cap")))
     inner: Collected = field(default_factory=lambda: Collected(("at", "much", "side", "lo", "hi")))
-    turns: Collected = field(default_factory=lambda: Collected((*BEND, "even", "bow")))
+    turns: Collected = field(default_factory=lambda: Collected((*BEND, "even", "eighth", "bow")))
 
 
 class Reach:
@@ -89,6 +90,9 @@ class Bent:
         self.cap, self.even, self.bow = (
             some.array(name) if name in some.columns else np.zeros(0) for name in ("cap", "even", "bow")
         )
+        if "eighth" in some.columns:
+            width = np.diff(mesh.place, append=np.inf)
+            self.even += some.array("eighth") * extremes(width, self.span.first, self.span.last)[1] ** 2
 
     def products(self, g: Graph) -> tuple[Array, Array]:
         """Return the least and the largest of coefficient times slope."""
@@ -103,7 +107,7 @@ class Chain:
     `absorbed`: by name the nodes of the cells that absorb; the exits are one of the names.  `beside`: by hard cell the
     node whose mean may serve for it.  `curved`, `turned`: the live cells with `ends`, and with `turns`.  `scatter`
     makes G of V, where landings scatter; else G is V.  `beyond`: the probability of deviations of the speed of which
-    nothing is proved.
+    nothing is proved.  Nodes of cells below the share `narrow` of the largest place are raised together.
     """
 
     def __init__(
@@ -114,10 +118,11 @@ class Chain:
         absorbed: dict[str, Array],
         parts: Parts,
         beyond: float,
+        narrow: float = NARROW,
     ):
         self.mesh, self.scatter, self.rows, self.absorbed, self.beyond = mesh, scatter, rows, absorbed, beyond
         self.goal = goal = mesh if scatter is None else scatter.mesh
-        self.narrow = NARROW if scatter is None else scatter.narrow
+        self.narrow = narrow
         self.live = np.sort(parts.at_cells.array("at", np.int64))
         self.cells, self.nodes, self.hard = (
             Reach(goal, some) for some in (parts.at_cells, parts.at_nodes, parts.hard)

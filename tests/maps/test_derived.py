@@ -51,9 +51,16 @@ def _powers(p, x, side):
     return p.r * x**3 - 2 * x**2 + x**-2 / 7 - x**0 + (+x) - 1.0 / (3.0 - x), side, 0
 
 
+def _cube_root(x):
+    """Cube root of a number that is not 0."""
+    return x.root(3) if x > 0 else -(-x).root(3)
+
+
 EXACT = {
     _ricker: lambda r, s, x: x * (r * (1 - x)).exp(),
-    _roots: lambda r, s, x: (1 + r * x**2).sqrt() * _cube_root(x - flint.arb(0.3)) - (2 + x).log() / (s + x**4),
+    _roots: lambda r, s, x: (
+        (1 + r * x**2).sqrt() * _cube_root(x - flint.arb(0.3)) - (2 + x).log() / (s + x**4)
+    ),
     _turns: lambda r, s, x: r * (3 * x).sin() - (s * x).cos() * x,
     _steep: lambda r, s, x: (flint.arb(0.4) * x).tan() + (r * x).tanh() - flint.arb.atan2(x, 1 + s * x**2),
     _corners: lambda r, s, x: abs(x - flint.arb(0.3)).max(r * x) - x.min(abs(s * x - 1)),

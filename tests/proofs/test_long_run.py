@@ -186,8 +186,7 @@ def test_cells_that_throws_leave_are_not_kept():
     chain = SimpleNamespace(mesh=mesh, goal=mesh, cells=inner, hard=SimpleNamespace(at=np.array([6])))
 
     def kept(reach):
-        law = SimpleNamespace(landing=SimpleNamespace(reach=reach))
-        return np.flatnonzero(kept_cells(SimpleNamespace(noisy=law), chain)).tolist()
+        return np.flatnonzero(kept_cells(chain, SimpleNamespace(reach=reach))).tolist()
 
     # each image meets its neighbours too, for roundings at its ends: 5 is beside the hard cell
     assert kept(0.0) == []
@@ -273,7 +272,7 @@ def test_a_function_so_large_that_sums_overflow_proves_nothing(designed):
     from limitsets.checker.brackets import read_setting
 
     steps = designed.chain.steps
-    kept = kept_cells(read_setting(designed.chain.section), steps)
+    kept = kept_cells(steps, read_setting(designed.chain.section).noisy.landing)
     for size in (-1.797e308, 1.797e308, 1e200, np.nan):
         _, gained = most_gain(steps, kept, None, 1.0)(np.full(kept.size, size))
         assert np.isnan(gained).all()
@@ -310,7 +309,7 @@ def test_without_a_function_flips_are_at_most_what_one_counts(designed):
     from limitsets.checker.brackets import read_setting
 
     steps = designed.chain.steps
-    kept = kept_cells(read_setting(designed.chain.section), steps)
+    kept = kept_cells(steps, read_setting(designed.chain.section).noisy.landing)
     nodes, gained = most_gain(steps, kept, None, 1.0)(np.zeros(kept.size))
     last = nodes >= steps.mesh.first[2]
     assert 0.0 <= gained[~last].max() < 1e-9

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 # Cells are cut, each so often at most, where the slope varies by more than this factor, but for cells below this share
 # of a side; and where an image is longer than the mean by this factor.
-MOST_CUTS, VARIES, TINY, LONG = 400, 1.5, 2.0**-40, 2.0
+MOST_CUTS, VARIES, TINY, LONG = 400, 1.5, 2.0**-33, 2.0
 # Steps at most, and by how much the gain of a step may still differ between nodes.
 MOST_STEPS, STILL = 3000, 1e-6
 # They end too where so many steps bring the bound nearer by less than this share of that difference.
@@ -156,7 +156,8 @@ def long_run_of_map(
         allowed = Allowed(shape.sides, shape.branches, shape.names)
         functions = [read_function(one, [0], allowed, "the function", unknown) for one in listed]
         tell("cells", 0, 1)
-        edges = [refined(the_map, side, each) for side, each in enumerate(edges)]
+        jumps = [[x for s, x in asked.jumps if s == side] for side in range(grid.sides)]
+        edges = [refined(the_map, side, *each) for side, each in enumerate(zip(edges, jumps, strict=True))]
         chain, pieces = chain_of_map(the_map, edges, law)
         kept = kept_cells(chain, law)
         if not kept.any():
@@ -194,10 +195,11 @@ def long_run_of_map(
     )
 
 
-def refined(the_map: CheckedMap, side: int, edges: Array) -> Array:
+def refined(the_map: CheckedMap, side: int, edges: Array, jumps: Sequence[float]) -> Array:
     """Cut cells on which the slope varies by a half or has no bounds, and those with an image longer than most.
 
-    Near a pole of ln |f'| cells become the shorter the nearer it is; small ones, of changes and turns, stay.
+    Near a pole of ln |f'| cells become the shorter the nearer it is; small ones, of changes and turns, stay.  Beside
+    the places where what is averaged jumps there are nodes so close that the jump costs nothing.
     """
     from limitsets.checker.any_map import possible
 
@@ -222,7 +224,8 @@ def refined(the_map: CheckedMap, side: int, edges: Array) -> Array:
         else np.ones(len(lo), int)
     )
     inner = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(lo, hi, parts.tolist(), strict=True)]
-    return np.unique(np.concatenate([*inner, hi[-1:]]))
+    beside = np.array([x + k * tiny for x in jumps for k in (-1, 1)])
+    return np.unique(np.concatenate([*inner, hi[-1:], beside[(beside > edges[0]) & (beside < edges[-1])]]))
 
 
 def stretches(kept: Mask, place: Array, first: Ints) -> list[tuple[int, float, float]]:

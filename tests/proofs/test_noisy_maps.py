@@ -1,0 +1,361 @@
+"""Averages of maps whose steps scatter: known answers, random chains against rationals, poles, forged files."""
+
+import math
+import random
+from fractions import Fraction
+
+import flint
+import mpmath
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+import limitsets as ls
+from limitsets.base.errors import AnswerError
+from limitsets.checker.any_map import Map, read_map
+from limitsets.checker.balls import PRECISION
+from limitsets.checker.laws import uniform_law
+from limitsets.checker.long_run import SIGNS, kept_cells
+from limitsets.checker.map_long_run import gain_of, majorants, pole
+from limitsets.checker.noisy_map import Piece, chain_of_map
+from limitsets.checker.observable import Allowed, read_function
+from limitsets.proofs.prover.long_run_of_map import settled
+from tests.proofs.forge import opened
+
+A, B = 19 / 42 * (7 / 5) ** (1 / 3), 0.02328852830307032
+C = 20 / (3**20 * 7) * (7 / 5) ** (1 / 3) * math.exp(18.7)
+
+
+def half(x):
+    return 0.5 * x
+
+
+def left(x):
+    return (A + np.cbrt(x - 0.125)) * math.exp(-x) + B
+
+
+def right(x):
+    return C * (10 * x * math.exp(-10 * x / 3)) ** 19 + B
+
+
+def from_change(x):
+    return x - 0.3
+
+
+def swapped(x):
+    return 1.0 + 0.0 * x
+
+
+def swapped_back(x):
+    return -1.0 + 0.0 * x
+
+
+def itself(x):
+    return x
+
+
+def squared(x):
+    return x * x
+
+
+def parabola(x, r):
+    return r * x * (1.0 - x)
+
+
+# Matsumoto and Tsuda's map, on which noise makes order: J. Stat. Phys. 31 (1983) 87.
+ORDERED = ls.map(pieces=(left, right), margin=from_change)
+
+
+# ---------------------------------------------------------------- known answers
+
+
+def test_a_contraction_with_noise_has_the_mean_square_and_exponent_of_theory():
+    # X = sum of 2^-k e_k: the mean of X^2 is e^2/3 / (1 - 1/4)
+    e = 0.25
+    of = ["lyapunov", itself, squared, [(0.0, 2.0)]]
+    answer = ls.average(ls.map(half), ls.grid([(-1.0, 1.0)], cells=400), of, noise=e)
+    exact = {"lyapunov": -math.log(2.0), "itself": 0.0, "squared": 4 * e * e / 9, "share_of_0_to_2": 0.5}
+    assert answer.numbers.keys() == exact.keys()
+    for name, value in exact.items():
+        lo, hi = answer.numbers[name]
+        assert lo <= value <= hi < lo + 1e-4, name
+    assert answer.starts == ((0, -1.0, 1.0),)
+
+
+def test_two_intervals_that_are_swapped_share_the_time_from_every_start():
+    # the chain has period 2: single laws do not converge, averages do
+    to_and_fro = ls.map(pieces=(swapped, swapped_back), margin=itself)
+    answer = ls.average(to_and_fro, ls.grid([(-2.0, 2.0)], cells=64), [[(0.0, 3.0)]], noise=0.5)
+    assert answer.lo <= 0.5 <= answer.hi < answer.lo + 1e-6
+
+
+def test_a_set_that_no_step_leaves_is_a_part_of_the_grid():
+    # 2 x + noise leaves [-1, 1] from everywhere; x/2 stays where |x| <= 2 e
+    with pytest.raises(AnswerError, match=r"the noise.*steps stay on some cells"):
+        ls.average(ls.map(doubled), ls.grid([(-1.0, 1.0)], cells=50), noise=0.1)
+
+
+def doubled(x):
+    return 2.0 * x
+
+
+def test_noise_makes_order():
+    # the sampled exponent is -0.390 at 0.003 (2e7 steps of floats)
+    answer = ls.average(ORDERED, ls.grid([(0.0, 1.0)], cells=4000), noise=0.003)
+    assert -0.41 < answer.lo < -0.392
+    assert -0.389 < answer.hi < -0.37
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("seed", range(6))
+def test_random_orbits_of_noisy_parabolas_lie_within_the_bounds(seed):
+    rng = random.Random(seed)
+    r, e = rng.uniform(2.8, 3.9), 10 ** rng.uniform(-2.5, -1.7)
+    lo, hi = r * r / 4 * (1 - r / 4) - 3 * e, r / 4 + e  # from the image of the top on
+    lo = min(lo, r * (r / 4 + e) * (1 - r / 4 - e) - e) - 1e-3
+    answer = ls.average(
+        ls.map(parabola, r=r), ls.grid([(lo, hi + 1e-3)], cells=1000), ["lyapunov", itself], noise=e
+    )
+    x = np.random.default_rng(seed).uniform(lo, hi, 1000)
+    sums = np.zeros((2, 1000))
+    noise = np.random.default_rng(seed + 100)
+    for k in range(3000):
+        x = r * x * (1 - x) + noise.uniform(-e, e, 1000)
+        if k >= 500:
+            sums += np.log(np.abs(r * (1 - 2 * x))), x
+    means = sums / 2500
+    for name, row in zip(("lyapunov", "itself"), means, strict=True):
+        bound, error = answer.numbers[name], 5 * row.std() / math.sqrt(1000)
+        assert bound[0] - error <= row.mean() <= bound[1] + error, (name, r, e)
+
+
+# ---------------------------------------------------------------- random chains
+
+
+def random_chain(rng):
+    """A chain on sides: side i waits at a place c_i, within e of which steps land, and then turns one of two ways."""
+    count = rng.randint(2, 5)
+    places = [rng.randint(-8, 8) for _ in range(count)]
+    to = [[rng.randrange(count), rng.randrange(count)] for _ in range(count)]
+    borders = [rng.choice(places) + Fraction(rng.randint(-7, 7), 8) for _ in range(count)]
+    return places, to, borders
+
+
+def exact_shares(places, to, borders):
+    """Stationary shares of sides, by rationals: None where the chain has several closed classes."""
+    count = len(places)
+    matrix = [[Fraction(0)] * count for _ in range(count)]
+    for i in range(count):
+        # the part landed within 1 of the place of side i
+        above = min(max((places[i] + 1 - borders[i]) / 2, Fraction(0)), Fraction(1))
+        matrix[i][to[i][1]] += above
+        matrix[i][to[i][0]] += 1 - above
+    reach = [{j for j in range(count) if matrix[i][j] > 0} for i in range(count)]
+    for _ in range(count):
+        reach = [one | {k for j in one for k in reach[j]} for one in reach]
+    classes = {frozenset(reach[i]) for i in range(count) if all(i in reach[j] for j in reach[i])}
+    if len(classes) != 1:
+        return None
+    closed = sorted(*classes)
+    rows = [[matrix[j][i] - (i == j) for j in closed] for i in closed[:-1]] + [[Fraction(1)] * len(closed)]
+    right = [Fraction(0)] * (len(closed) - 1) + [Fraction(1)]
+    for k in range(len(closed)):  # Gauss and Jordan
+        pivot = next(i for i in range(k, len(closed)) if rows[i][k] != 0)
+        rows[k], rows[pivot], right[k], right[pivot] = rows[pivot], rows[k], right[pivot], right[k]
+        for i in range(len(closed)):
+            if i != k and rows[i][k] != 0:
+                factor = rows[i][k] / rows[k][k]
+                rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k], strict=True)]
+                right[i] -= factor * right[k]
+    return {i: right[k] / rows[k][k] for k, i in enumerate(closed)}
+
+
+def bounds_of(places, to, borders):
+    """What is proved of the shares of steps from each side."""
+    count, close = len(places), 2.0**-33
+    keys = [(i, b) for i in range(count) for b in (0, 1)]
+    raw = {
+        "dimension": 1, "sides": count, "branches": 2, "parameters": [], "periodic": [[None]] * count,
+        "programs": [
+            {"side": i, "branch": b, "to": to[i][b], "ops": [["c", str(places[to[i][b]])]], "out": [0]} for i, b in keys
+        ],
+        "margins": [
+            {"side": i, "ops": [["x", 0], ["c", repr(float(borders[i]))], ["sub", 0, 1]], "out": [2]}
+            for i in range(count)
+        ],
+    }  # fmt: skip
+    the_map, law = Map(read_map(raw), {}), uniform_law(Fraction(1), 1)
+    edges = []
+    for i in range(count):
+        ends = [float(borders[i]) + k * close for k in (-2, -1, 1, 2)]
+        edges.append(np.array(sorted({-12.0, 12.0, *ends})))
+    chain, pieces = chain_of_map(the_map, edges, law)
+    kept = kept_cells(chain, law)
+    assert kept.sum() == sum(len(each) - 1 for each in edges)
+    zero = [(0.0).hex()]
+    told = []
+    for i in range(count):
+        one = {"of": {"steps": [[i, 0], [i, 1]]}, "lower": zero, "upper": zero}
+        function = read_function(one, [0], Allowed(count, 2, []), "a test", [np.zeros(0)] * 3)
+        (pair,) = majorants(the_map, chain, pieces, [function])
+        low, high = (
+            sign * settled(gain_of(chain, kept, of, law), chain.mesh.place, chain.mesh.first)[0]
+            for sign, of in zip(SIGNS, pair, strict=True)
+        )
+        told.append((low, high))
+    return told
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(20), pytest.param(range(20, 220), marks=pytest.mark.sweep)], ids=["some", "many"]
+)
+def test_shares_of_random_chains_are_those_of_rationals(seeds):
+    known = 0
+    with flint.ctx.workprec(PRECISION):
+        for seed in seeds:
+            chain = random_chain(random.Random(seed))
+            shares = exact_shares(*chain)
+            if shares is None:
+                continue
+            known += 1
+            for i, (low, high) in enumerate(bounds_of(*chain)):
+                exact = shares.get(i, Fraction(0))
+                assert low - 1e-9 <= exact <= high + 1e-9, (seed, i)
+                assert high - low < 1e-4, (seed, i)
+    assert known > len(seeds) // 2
+
+
+# ---------------------------------------------------------------- poles
+
+
+def program_of(the_map, branch=0):
+    """The checker's formula of a recorded map."""
+    from limitsets.proofs.prover.programs import recorded_map
+    from limitsets.systems.maps import coerce
+
+    shape = read_map(recorded_map(coerce(the_map), 1) | {"periodic": [[None]]})
+    return Map(shape, {}).image[0, branch]
+
+
+def squares(x):
+    return 0.4 - 1.7 * (x - 0.25) * (x - 0.25)
+
+
+def roots(x):
+    return 0.3 + 0.8 * np.cbrt(x - 0.25) * (1.0 + x)
+
+
+POLES = {  # |f'| at 1/4 + t
+    "where the slope is 0": (squares, lambda t: 3.4 * abs(t)),
+    "where it is infinite": (
+        roots,
+        lambda t: abs(0.8 * ((1.25 + t) / (3 * mpmath.cbrt(t * t)) + mpmath.sign(t) * mpmath.cbrt(abs(t)))),
+    ),
+}
+
+
+@pytest.mark.parametrize("width", [2.0**-3, 2.0**-12, 2.0**-30])
+@pytest.mark.parametrize("share", [0.5, 0.3, 0.9])
+@pytest.mark.parametrize("case", POLES)
+def test_the_integral_beside_a_pole_is_bounded(case, share, width):
+    f, slope = POLES[case]
+    ends = 0.25 - share * width, 0.25 + (1 - share) * width
+    with flint.ctx.workprec(PRECISION), mpmath.workdps(60):
+        program = program_of(ls.map(f))
+        x = flint.arb(ends[0]).union(flint.arb(ends[1]))
+        _, first, second = program.bend([x])
+        piece = Piece(0, 0, 0, ends, first, second)
+        for sign in (0, 1):
+            part = lambda t, sign=sign: max((1 if sign else -1) * mpmath.log(slope(t)), 0)  # noqa: E731
+            exact = mpmath.quad(part, [mpmath.mpf(ends[0]) - 0.25, 0, mpmath.mpf(ends[1]) - 0.25])
+            bound = pole(program, piece, [], sign)
+            assert exact <= bound <= 4 * exact + 3 * width
+
+
+def test_a_map_that_is_flat_somewhere_has_no_exponent():
+    flat = ls.map(pieces=(swapped, half), margin=itself)
+    with pytest.raises(AnswerError, match=r"the function to average.*no bound"):
+        ls.average(flat, ls.grid([(-2.0, 2.0)], cells=64), noise=0.1)
+
+
+# ---------------------------------------------------------------- files
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    path = tmp_path_factory.mktemp("noisy") / "half.proof.zip"
+    answer = ls.average(ls.map(half), ls.grid([(-1.0, 1.0)], cells=100), ["lyapunov", squared], noise=0.25)
+    answer.save(path)
+    return path
+
+
+def test_a_saved_answer_is_rechecked_and_said_in_words(saved):
+    report = ls.recheck(saved)
+    assert report.verdict == "proved"
+    assert "from every start in [-1.0, 1.0] of side 0\n" in report.statement[-1]
+    assert "within 0.25 of f(x)" in report.statement[-1]
+
+
+def section_of(file):
+    return file.header["boxes"][0]["claims"][0]["section"]
+
+
+def narrower(word):
+    """Put an end of the second average in the middle between both."""
+
+    def forge(file):
+        one = section_of(file)["functions"][1]
+        ends = [float.fromhex(one[each][0]) for each in ("lower", "upper")]
+        one[word] = [(0.5 * sum(ends)).hex()]
+
+    return forge
+
+
+FORGED = {
+    "a narrower upper end": (narrower("upper"), "function 1: the upper end"),
+    "a narrower lower end": (narrower("lower"), "function 1: the lower end"),
+    "more noise": (lambda f: section_of(f).update(landing="0.3"), "the upper end"),
+    "noise that leads out": (lambda f: section_of(f).update(landing="0.6"), "no throw leads out"),
+    "starts beyond the cells": (
+        lambda f: section_of(f)["starts"][0].update(box=[[(-1.0).hex(), (1.5).hex()]]), "no throw leads out",
+    ),
+    "another function": (lambda f: f.arrays["0.long-run.upper"].__setitem__((slice(40, 60), 1), 3.0), "the upper end"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FORGED)
+def test_what_is_forged_is_denied(case, saved, tmp_path):
+    change, reason = FORGED[case]
+    forged = opened(saved)
+    change(forged)
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    assert report.verdict == "failed"
+    assert reason in str(report)
+
+
+def test_a_function_that_is_forged_everywhere_by_a_constant_is_harmless(saved, tmp_path):
+    forged = opened(saved)
+    forged.arrays["0.long-run.upper"] = forged.arrays["0.long-run.upper"] + 2.0
+    assert ls.recheck(forged.seal().write(tmp_path / "forged.zip")).verdict == "proved"
+
+
+BAD = {
+    "no noise": lambda f: section_of(f).update(landing="0"),
+    "noise in words": lambda f: section_of(f).update(landing="much"),
+    "a key too many": lambda f: section_of(f).update(more=1),
+    "nodes that descend": lambda f: (
+        f.arrays["0.nodes.0"].sort() or f.arrays["0.nodes.0"].__setitem__(3, -5.0)
+    ),
+    "too few numbers": lambda f: f.arrays.update({"0.long-run.lower": f.arrays["0.long-run.lower"][1:]}),
+    "an array that is missing": lambda f: f.arrays.pop("0.long-run.lower") is None,
+    "a function that is not finite": lambda f: f.arrays["0.long-run.upper"].__setitem__((5, 1), np.nan),
+    "a function without a name": lambda f: section_of(f)["functions"][0].update(of={}),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_files_are_refused(case, saved, tmp_path):
+    forged = opened(saved)
+    BAD[case](forged)
+    assert ls.recheck(forged.seal().write(tmp_path / "forged.zip")).verdict == "bad file"
