@@ -330,6 +330,67 @@ def test_the_ends_of_starts_are_those_of_worst_landings_at_the_corners(good, sid
             assert (x > foot + 1.0) is out
 
 
+def near_foot(model, kappa, noise):
+    """paper-designed as the checker reads it, at 50 digits, and what is proved of starts that are near the foot."""
+    scene = checker.scene.read_scene(written("paper-designed", model) | {"throw": {"kappa": kappa}}, noise)
+
+    def proves(check, *given):
+        return checker.balls.reason_of(getattr(checker.near_foot, check), scene, *given) == ""
+
+    return proves, {name: mpf(value) for name, value in DESIGNED.items()}
+
+
+def root_of(number, model, part, values, guess, less=0):
+    """The angle at which a jog goes so far (number 0) or the branch changes (number 1), and the start."""
+
+    def off(p):
+        x, jog, _, decides = by_hand(model, part, 0, values, p)
+        return (jog - x, decides)[number] - less
+
+    p = mp.findroot(off, guess, solver="anderson")
+    return p, float(by_hand(model, part, 0, values, p)[0])
+
+
+# kappa, noise besides that of the landing place, and for which kappa all are lost up to a start, and come out from one
+WORST = {
+    "fixed": (["20 in", "27 in"], {}, ("20", "27")),
+    "noise": ("21.66 in", {"throw.speed": "5 %"}, ("24", "24")),
+}
+
+
+@pytest.mark.parametrize("given", WORST.values(), ids=WORST)
+@pytest.mark.parametrize("model", MODELS)
+def test_which_starts_come_out_and_which_are_lost_is_told_by_the_worst_kappa(model, given):
+    """Where a jog goes just as far as the landing scatters: the larger kappa, the farther from the foot that is."""
+    kappa, noise, worst = given
+    proves, values = near_foot(model, kappa, noise | {"landing.x": "0.01 in"})
+    for side, part in enumerate(feet(values)):
+        foot = float(part[0])
+        near, far = (
+            root_of(0, model, part, values | {"throw.kappa": mpf(k)}, (0.01, 0.1), mpf("0.01"))[1] - foot
+            for k in worst
+        )
+        for by in (-1e-3, -1e-6, 1e-6, 1e-3):
+            assert proves("check_outward", side, foot + 2 * far, far * (1 + by)) is (by > 0)
+            assert proves("check_lost", side, near * (1 + by), True) is (by < 0)
+            assert proves("check_lost", side, foot + near * (1 + by), False) is (by < 0)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_near_the_foot_only_jogs_count(model):
+    """No start counts beyond the place where the branch changes at the least kappa, at 50 digits."""
+    (jogs, values), (short, _) = (
+        near_foot(model, ["20 in", "27 in"], {"landing.x": landing}) for landing in ("0.01 in", "3 in")
+    )
+    for side, part in enumerate(feet(values)[:2]):
+        _, x = root_of(1, model, part, values | {"throw.kappa": mpf(20)}, (0.3, 0.8))
+        foot = float(part[0])
+        for by in (-1.5, 1e-6, 1.0):
+            assert jogs("check_outward", side, x + by, 1.0) is (by < 0)
+            assert short("check_lost", side, x + by - foot, True) is (by < 0)
+            assert short("check_lost", side, x + by, False) is (by < 0)
+
+
 OTHER_STARTS = [
     lambda s: s["starts"]["from_foot"].pop("1"),
     lambda s: s["starts"]["from_foot"].update({"0": "nan"}),
