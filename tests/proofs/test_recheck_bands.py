@@ -340,14 +340,14 @@ def near_foot(model, kappa, noise):
     return proves, {name: mpf(value) for name, value in DESIGNED.items()}
 
 
-def root_of(number, model, part, values, guess, less=0):
-    """The angle at which a jog goes so far (number 0) or the branch changes (number 1), and the start."""
+def root_of(what, model, part, values, ends, target=0):
+    """The angle between two others at which a throw begins, goes as a jog, or decides as a number says; its start."""
 
     def off(p):
         x, jog, _, decides = by_hand(model, part, 0, values, p)
-        return (jog - x, decides)[number] - less
+        return {"begins": x, "goes": jog - x, "decides": decides}[what] - target
 
-    p = mp.findroot(off, guess, solver="anderson")
+    p = mp.findroot(off, ends, solver="anderson")
     return p, float(by_hand(model, part, 0, values, p)[0])
 
 
@@ -367,7 +367,7 @@ def test_which_starts_come_out_and_which_are_lost_is_told_by_the_worst_kappa(mod
     for side, part in enumerate(feet(values)):
         foot = float(part[0])
         near, far = (
-            root_of(0, model, part, values | {"throw.kappa": mpf(k)}, (0.01, 0.1), mpf("0.01"))[1] - foot
+            root_of("goes", model, part, values | {"throw.kappa": mpf(k)}, (0.01, 0.1), mpf("0.01"))[1] - foot
             for k in worst
         )
         for by in (-1e-3, -1e-6, 1e-6, 1e-3):
@@ -383,7 +383,7 @@ def test_near_the_foot_only_jogs_count(model):
         near_foot(model, ["20 in", "27 in"], {"landing.x": landing}) for landing in ("0.01 in", "3 in")
     )
     for side, part in enumerate(feet(values)[:2]):
-        _, x = root_of(1, model, part, values | {"throw.kappa": mpf(20)}, (0.3, 0.8))
+        _, x = root_of("decides", model, part, values | {"throw.kappa": mpf(20)}, (0.3, 0.8))
         foot = float(part[0])
         for by in (-1.5, 1e-6, 1.0):
             assert jogs("check_outward", side, x + by, 1.0) is (by < 0)
@@ -440,19 +440,16 @@ def some_function(x, y, sqrt, sine):
 
 def test_numbers_about_a_point_hold_the_function_and_its_slopes():
     random = np.random.default_rng(4)
-    for size in (1e-8, 1e-3, 0.05):
+    for sizes in product((1e-8, 1e-3, 0.05), repeat=2):
         point = random.uniform(0.7, 1.5, 2).tolist()
-        balls = [arb(p, size) for p in point]
-        numbers = checker.balls.centred([arb(p) for p in point], balls, [arb(0, size)] * 2)
+        balls = list(map(arb, point, sizes))
+        numbers = checker.balls.centred([arb(p) for p in point], balls, [arb(0, size) for size in sizes])
         found = some_function(*numbers, lambda z: z.sqrt(), lambda z: z.sin_cos()[0])
         assert float(found.at.rad()) < 1e-12
         widest = some_function(*balls, lambda z: z.sqrt(), lambda z: z.sin())
         assert found.x.rad() < widest.rad()
-        for _ in range(20):
-            at = [
-                mpf(p) + mpf(size) * mpf(float(s))
-                for p, s in zip(point, random.uniform(-1, 1, 2), strict=True)
-            ]
+        for shares in (*product((-1, 1), repeat=2), *random.uniform(-1, 1, (8, 2)).tolist()):
+            at = [mpf(p) + mpf(size) * mpf(s) for p, size, s in zip(point, sizes, shares, strict=True)]
             held(found.x, some_function(*at, mp.sqrt, mp.sin))
             for k in range(2):
                 slope = mp.diff(lambda *z: some_function(*z, mp.sqrt, mp.sin), at, (1 - k, k))
@@ -485,12 +482,12 @@ def box_of(model, landing=0.0, widths=WIDTHS):
 def test_throws_by_angle_hold_those_at_50_digits(model):
     _, box = box_of(model)
     random = np.random.default_rng(1)
-    half = float(next(iter(WIDTHS.values())))
     for side, p in product(range(3), random.uniform(0.05, 2.5, 6).tolist()):
         thrown = box.throw(side, arb(p), arb(p, 1e-4))
         for _ in range(4):
             values = {
-                name: mpf(value) + mpf(half * random.uniform(-1, 1)) for name, value in DESIGNED.items()
+                name: mpf(value) + mpf(WIDTHS[name]) * random.choice([-1, 1])
+                for name, value in DESIGNED.items()
             }
             own, at = feet(values), mpf(p) + mpf(1e-4 * random.uniform(-1, 1))
             shift = own[side][0] + own[(side + 1) % 3][2] - own[(side + 1) % 3][0]
@@ -500,6 +497,27 @@ def test_throws_by_angle_hold_those_at_50_digits(model):
             held((thrown.jogs_to - thrown.shift).x, flip)
             # in the exact model roots are compared: the sign is the same
             assert not (thrown.decides.x < 0 if decides > 0 else thrown.decides.x > 0)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_an_angle_holds_the_roots_of_all_scenes_of_a_box(model):
+    """Those at the corners, at 50 digits, from a good guess and from bad ones, which may give no angle."""
+    widths = {"throw.kappa": Fraction(2), "arm.surface_height": Fraction(1, 50)}
+    _, box = box_of(model, 0.0, widths)
+    values = {name: mpf(value) for name, value in DESIGNED.items()}
+    scenes = [
+        values
+        | {name: values[name] + sign * mpf(widths[name]) for name, sign in zip(widths, signs, strict=True)}
+        for signs in product((-1, 1), repeat=2)
+    ]
+    for side, (what, number) in product((0, 1), (("begins", 9), ("decides", 0))):
+        target = checker.moving_ends.Moving(arb(number), arb(number), [arb(0)] * 2)
+        roots = [root_of(what, model, feet(one)[side], one, (0.3, 0.8), number)[0] for one in scenes]
+        for factor in (1.0, 0.9, 1.1, 1.4):
+            angle = box.root(side, what, target, arb(factor * float(sum(roots)) / 4))
+            assert angle or factor != 1.0
+            for root in roots if angle else ():
+                held(angle.over, root)
 
 
 @pytest.mark.parametrize("landing", [0.0, 0.02])
