@@ -58,6 +58,13 @@ TRUE = {
     ),
     "nine": ("paper-designed", nine(0.465), {"landing.x": "0.00465 in"}),
     "initial": ("paper-initial", nine(0.2), {"landing.x": "0.002 in"}, "21.8 in"),
+    # the box is halved: one half needs more throws than the other, which comes last
+    "halves": (
+        "paper-initial",
+        {"throw.speed": "0.3 %", "part.mass.center.along": "0.003 in"},
+        None,
+        "21.7 in",
+    ),
 }
 
 
@@ -207,6 +214,17 @@ def test_a_branch_ends_where_it_changes_or_where_its_cells_end():
     assert images_in(JOGS, {3: (3, 3), **FLIPS})[1:] == [
         image(1, 0, 0, 0, None, 5.0),
         image(1, 1, 0, 1, None, None),
+    ]
+    # all cells are decided: where the first of a kind begins
+    assert images_in({k: JOGS[k] for k in (0, 1, 3)}, FLIPS)[1:] == [
+        image(1, 0, 0, 0, None, 4.0),
+        image(1, 1, 0, 1, 4.0, None),
+    ]
+    falls = change._replace(rises=False)
+    assert images_in(FLIPS, JOGS) == [
+        image(1, 1, 0, 0, falls, None),
+        image(0, 1, 0, 1, None, None),
+        image(1, 0, 0, 1, None, falls),
     ]
 
 
