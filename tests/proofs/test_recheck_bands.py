@@ -27,6 +27,8 @@ from tests.proofs.test_recheck import checker, verdict
 
 pytestmark = pytest.mark.usefixtures("precision")
 
+VALUES = {name: mpf(value) for name, value in DESIGNED.items()}
+
 
 def proof_of(name, tolerance, noise=None, x="20 in"):
     tree = ls.load(name).as_dict() | {"goal": {"oriented_beyond": {"x": x, "side": 2}}}
@@ -349,13 +351,10 @@ def test_the_ends_of_starts_are_those_of_worst_landings_at_the_corners(good, sid
 
 
 def near_foot(model, kappa, noise):
-    """paper-designed as the checker reads it, at 50 digits, and what is proved of starts that are near the foot."""
+    """Whether the checker proves something of starts near the foot in paper-designed."""
     scene = checker.scene.read_scene(written("paper-designed", model) | {"throw": {"kappa": kappa}}, noise)
-
-    def proves(check, *given):
-        return checker.balls.reason_of(getattr(checker.near_foot, check), scene, *given) == ""
-
-    return proves, {name: mpf(value) for name, value in DESIGNED.items()}
+    near, reason = checker.near_foot, checker.balls.reason_of
+    return lambda check, *given: reason(getattr(near, check), scene, *given) == ""
 
 
 def root_of(what, model, part, values, ends, target=0):
@@ -381,11 +380,11 @@ WORST = {
 def test_which_starts_come_out_and_which_are_lost_is_told_by_the_worst_kappa(model, given):
     """Where a jog goes just as far as the landing scatters: the larger kappa, the farther from the foot that is."""
     kappa, noise, worst = given
-    proves, values = near_foot(model, kappa, noise | {"landing.x": "0.01 in"})
-    for side, part in enumerate(feet(values)):
+    proves = near_foot(model, kappa, noise | {"landing.x": "0.01 in"})
+    for side, part in enumerate(feet(VALUES)):
         foot = float(part[0])
         near, far = (
-            root_of("goes", model, part, values | {"throw.kappa": mpf(k)}, (0.01, 0.1), mpf("0.01"))[1] - foot
+            root_of("goes", model, part, VALUES | {"throw.kappa": mpf(k)}, (0.01, 0.1), mpf("0.01"))[1] - foot
             for k in worst
         )
         for by in (-1e-3, -1e-6, 1e-6, 1e-3):
@@ -397,11 +396,9 @@ def test_which_starts_come_out_and_which_are_lost_is_told_by_the_worst_kappa(mod
 @pytest.mark.parametrize("model", MODELS)
 def test_near_the_foot_only_jogs_count(model):
     """No start counts beyond the place where the branch changes at the least kappa, at 50 digits."""
-    (jogs, values), (short, _) = (
-        near_foot(model, ["20 in", "27 in"], {"landing.x": landing}) for landing in ("0.01 in", "3 in")
-    )
-    for side, part in enumerate(feet(values)[:2]):
-        _, x = root_of("decides", model, part, values | {"throw.kappa": mpf(20)}, (0.3, 0.8))
+    jogs, short = (near_foot(model, ["20 in", "27 in"], {"landing.x": by}) for by in ("0.01 in", "3 in"))
+    for side, part in enumerate(feet(VALUES)[:2]):
+        _, x = root_of("decides", model, part, VALUES | {"throw.kappa": mpf(20)}, (0.3, 0.8))
         foot = float(part[0])
         for by in (-1.5, 1e-6, 1.0):
             assert jogs("check_outward", side, x + by, 1.0) is (by < 0)
@@ -503,10 +500,7 @@ def test_throws_by_angle_hold_those_at_50_digits(model):
     for side, p in product(range(3), random.uniform(0.05, 2.5, 6).tolist()):
         thrown = box.throw(side, arb(p), arb(p, 1e-4))
         for _ in range(4):
-            values = {
-                name: mpf(value) + mpf(WIDTHS[name]) * random.choice([-1, 1])
-                for name, value in DESIGNED.items()
-            }
+            values = {k: v + mpf(WIDTHS[k]) * random.choice([-1, 1]) for k, v in VALUES.items()}
             own, at = feet(values), mpf(p) + mpf(1e-4 * random.uniform(-1, 1))
             shift = own[side][0] + own[(side + 1) % 3][2] - own[(side + 1) % 3][0]
             start, jog, flip, decides = by_hand(model, own[side], shift, values, at)
@@ -522,12 +516,8 @@ def test_an_angle_holds_the_roots_of_all_scenes_of_a_box(model):
     """Those at the corners, at 50 digits, from a good guess and from bad ones, which may give no angle."""
     widths = {"throw.kappa": Fraction(2), "arm.surface_height": Fraction(1, 50)}
     _, box = box_of(model, 0.0, widths)
-    values = {name: mpf(value) for name, value in DESIGNED.items()}
-    scenes = [
-        values
-        | {name: values[name] + sign * mpf(widths[name]) for name, sign in zip(widths, signs, strict=True)}
-        for signs in product((-1, 1), repeat=2)
-    ]
+    ends = [[(name, VALUES[name] + sign * mpf(w)) for sign in (-1, 1)] for name, w in widths.items()]
+    scenes = [VALUES | dict(corner) for corner in product(*ends)]
     for side, (what, number) in product((0, 1), (("begins", 9), ("decides", 0))):
         target = checker.moving_ends.Moving(arb(number), arb(number), [arb(0)] * 2)
         roots = [root_of(what, model, feet(one)[side], one, (0.3, 0.8), number)[0] for one in scenes]
@@ -536,6 +526,85 @@ def test_an_angle_holds_the_roots_of_all_scenes_of_a_box(model):
             assert angle or factor != 1.0
             for root in roots if angle else ():
                 held(angle.over, root)
+
+
+# kappa, height of the surface, angle, and whether throws rise there, on every side
+RISING = [
+    ("exact", "signed", 6, -0.2, 2.0, True),
+    ("small-angle", "signed", 25, -0.2, 0.5, True),
+    ("exact", "signed", 6, -0.2, 3.6, False),
+    ("exact", "energy", 6, -0.2, 4.2, False),
+    ("small-angle", "energy", 25, 13, 0.5, False),
+    ("small-angle-2", "signed", 25, 13, 0.5, False),
+]
+
+
+def box_with(model, kappa, height):
+    """A box of parameters with kappa from a number on, and the numbers at its end."""
+    tree = written("paper-designed", model) | {"throw": {"kappa": [f"{kappa} in", f"{kappa}.001 in"]}}
+    tree["arm"]["surface_height"] = f"{height} in"
+    box = checker.bands.parameters_of(checker.scene.read_scene(tree, None))
+    return box, VALUES | {"throw.kappa": mpf(kappa), "arm.surface_height": mpf(height)}
+
+
+@pytest.mark.parametrize(("flight", "flip", "kappa", "height", "p", "rises"), RISING)
+def test_a_chain_is_followed_only_where_throws_rise(flight, flip, kappa, height, p, rises):
+    """Where they fall a start before its end is thrown farther, as one a little before shows."""
+    box, values = box_with((flight, flip), kappa, height)
+    for side, part in enumerate(feet(values)):
+        before, (x, jog, *_) = (by_hand((flight, flip), part, 0, values, mpf(q)) for q in (p - 0.01, p))
+        assert (jog > before[1]) is rises
+        for branch in (0, 1):
+            assert (box.place((float(x), (side, branch, 1))) is not None) is rises
+
+
+def test_a_chain_beyond_places_where_throws_fall_bounds_no_image():
+    """Throws rise up to the angle 2.7 and again from 4.9 on: from there jogs end nearer than from 2.7."""
+    model, bands = ("exact", "signed"), checker.bands
+    box, values = box_with(model, 6, -0.2)
+    last, beyond = (by_hand(model, feet(values)[0], 0, values, mpf(p))[:2] for p in (2.7, 4.9))
+    jog, end = float(last[1]), float(beyond[0])
+    assert beyond[1] < jog - 0.5
+    assert box.highest((end, (0, 0, 1))) < jog - 0.5
+    own = [bands.Interval(0, (6.0, float(last[0])), (2.0, 2.7)), bands.Interval(0, (1.8, 28.0), (0.1, 3.0))]
+    band = bands.Band(0, [(6.0,)], [(end,)])
+    image = bands.image_of_band(box, bands.Image(0, 1, 0, 0, None, None), band, own)
+    assert all(box.highest(chain) >= jog for chain in image.upper)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_branch_changes_in_one_direction(model):
+    """To flips, or to jogs, as what decides says at both ends of a range of angles."""
+    (_, box), seen = box_of(model, 0.0, {"throw.kappa": Fraction(1, 1000)}), set()
+    for side, part in enumerate(feet(VALUES)):
+        flips = [by_hand(model, part, 0, VALUES, mpf(k) / 10)[3] > 0 for k in range(2, 20)]
+        for k, rises in product(range(17), (True, False)):
+            change = checker.moving_ends.Change(side, 0.1 * k + 0.2, 0.1 * k + 0.3, rises)
+            right = flips[k] != flips[k + 1] and flips[k + 1] is rises
+            assert (box.angle((change,), side) is not None) is right
+            seen |= {rises} if right else set()
+    assert (False in seen) is (model[0] != "exact" and model[1] == "signed")
+
+
+def test_a_part_of_a_band_is_empty_only_if_it_is_for_all_scenes():
+    """Flips begin and jogs end where the branch changes at either end of kappa; a point is not empty."""
+    bands, model = checker.bands, ("exact", "signed")
+    _, box = box_of(model, 0.0, {"throw.kappa": Fraction(1, 10)})
+    first, last = (
+        root_of("decides", model, feet(VALUES)[0], VALUES | {"throw.kappa": kappa}, (0.3, 0.8))[1]
+        for kappa in (VALUES["throw.kappa"] - mpf("0.1"), VALUES["throw.kappa"] + mpf("0.1"))
+    )
+    change, own = checker.moving_ends.Change(0, 0.6, 0.8, True), bands.Interval(0, (5.0, 15.0), (0.2, 1.2))
+
+    def is_empty(begin, end, lower, upper):
+        image, band = bands.Image(0, 1, 0, 0, begin, end), bands.Band(0, [(lower,)], [(upper,)])
+        return bands.image_of_band(box, image, band, [own, own]) is None
+
+    for by in (-0.01, -1e-6, 1e-6, 0.01):
+        assert is_empty(change, None, 5.0, first + by) is (by == -0.01)
+        assert is_empty(None, change, last + by, 15.0) is (by == 0.01)
+    assert not is_empty(None, None, 9.0, 9.0)
+    assert is_empty(None, None, 9.1, 9.0)
 
 
 @pytest.mark.parametrize("landing", [0.0, 0.02])
