@@ -31,7 +31,7 @@ from .means import Mesh
 from .steps import Chain
 
 FLIPS, SIDE = "flips", "side"
-SIGNS = (-1.0, 1.0)  # of the lower end, and of the upper
+END_SIGNS = (-1.0, 1.0)  # of the lower end, and of the upper
 Gain = Callable[[Array], tuple[Array, Array]]
 
 
@@ -188,7 +188,7 @@ def check_long_run(c: LongRun, progress: Progress) -> None:
     check_starts_stay(c.setting.starts, chain.mesh, kept)
     for k, one in enumerate(c.counted):
         with about(f"average {k}"):
-            for sign, u, end in zip(SIGNS, one.functions, one.bounds, strict=True):
+            for sign, u, end in zip(END_SIGNS, one.functions, one.bounds, strict=True):
                 check_end(sign, u, end, most_gain(chain, kept, one.side, sign))
     if progress is not None:
         progress(work, work)

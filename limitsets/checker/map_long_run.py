@@ -20,9 +20,9 @@ from .brackets import Place
 from .file import Arrays, read_box, read_side, require, rows, table
 from .landings import upper
 from .laws import Law, uniform_law
-from .long_run import SIGNS, Gain, check_end, check_starts_stay, kept_cells, nodes_of
+from .long_run import END_SIGNS, Gain, check_end, check_starts_stay, kept_cells, nodes_of
 from .means import INFLATE
-from .noisy_map import Piece, chain_of_map
+from .noisy_map import BranchOfCell, chain_of_map
 from .observable import (
     Allowed,
     Averaged,
@@ -49,6 +49,11 @@ class LongRunOfMap(NamedTuple):
     starts: list[Place]
     edges: list[Array]
     functions: list[Averaged]  # `lower` and `upper` are the functions u
+
+    @property
+    def cells(self) -> int:
+        """How many there are, on all sides."""
+        return sum(len(each) - 1 for each in self.edges)
 
 
 # ----------------------------------------------------------------
@@ -112,7 +117,7 @@ class Majorant(NamedTuple):
 
 
 def majorants(
-    the_map: Map, chain: Chain, pieces: list[Piece], functions: list[Averaged]
+    the_map: Map, chain: Chain, pieces: list[BranchOfCell], functions: list[Averaged]
 ) -> list[list[Majorant]]:
     """Bound what is counted from above, by function and sign: its negative for the lower end."""
     ranges = the_map.piece([]).balls
@@ -143,7 +148,7 @@ def majorants(
     ]
 
 
-def on_cell(program: Program, piece: Piece, ends: tuple[float, float], ranges: list[Arb]) -> OnCell:
+def on_cell(program: Program, piece: BranchOfCell, ends: tuple[float, float], ranges: list[Arb]) -> OnCell:
     """Give a cell, or one of its ends, as functions take it."""
     middle, alone = (arb(ends[0]) + arb(ends[1])) / 2, ends[0] == ends[1]
     return OnCell(
@@ -166,7 +171,7 @@ def rows_of(bounds: Observed, at: OnCell, ends: list[OnCell]) -> tuple[list[floa
     return [-(min(one[2], most) - more) for one in own], above
 
 
-def pole(program: Program, piece: Piece, ranges: list[Arb], sign: int) -> float:
+def pole(program: Program, piece: BranchOfCell, ranges: list[Arb], sign: int) -> float:
     """Bound the integral of the positive part of ln |f'| over a cell (1), or of its negative (0).
 
     From above it is at most |I| ln(1 + the mean of |f'|), by Jensen's inequality.  From below: where |f''| >= m,
@@ -176,7 +181,7 @@ def pole(program: Program, piece: Piece, ranges: list[Arb], sign: int) -> float:
     length = arb(piece.ends[1]) - arb(piece.ends[0])
     least, mean = ZERO, piece.slope
     if not piece.slope.is_finite():
-        least, mean = beside_root(program, [x, *ranges], length)
+        least, mean = slope_beside_root(program, [x, *ranges], length)
     if sign:
         return upper(length * (1 + mean.abs_upper()).log())
     if least > 0:
@@ -185,7 +190,7 @@ def pole(program: Program, piece: Piece, ranges: list[Arb], sign: int) -> float:
     return upper(length * (1 + (2 / (bend * length)).max(ONE).log())) if bend > 0 else math.inf
 
 
-def beside_root(program: Program, inputs: list[Arb], length: Arb) -> tuple[Arb, Arb]:
+def slope_beside_root(program: Program, inputs: list[Arb], length: Arb) -> tuple[Arb, Arb]:
     """Enclose the least |f'| on a cell that holds the zero of one cube root's argument, and bound the mean of |f'|.
 
     f' = Q + P r with r the slope of the root, which has one sign, is unbounded, and whose integral is the root's rise.
@@ -208,26 +213,39 @@ def beside_root(program: Program, inputs: list[Arb], length: Arb) -> tuple[Arb, 
 # The inequality.
 
 
-def gain_of(chain: Chain, kept: Array, counted: Majorant, law: Law) -> Gain:
-    """Give a function that bounds K(g + u) at the nodes of the cells that are kept; and lists these nodes."""
+class GainOfEnd(NamedTuple):
+    """What bounds K(g + u), or K(u - g), at the nodes of N, and the largest size of what stands for g."""
+
+    bound: Gain
+    size: float
+
+
+def gains_of(the_map: Map, c: LongRunOfMap) -> tuple[Chain, Array, list[list[GainOfEnd]]]:
+    """Prove the steps: the chain, the cells of N by their left nodes, what bounds each function and its negative."""
+    chain, pieces = chain_of_map(the_map, c.edges, c.law)
+    kept = kept_cells(chain, c.law)
+    prove(bool(kept.any()), "from every cell some step may lead out")
     nodes, free = nodes_of(kept), np.full(len(chain.mesh.place), -np.inf)
-    more = counted.excess * law.most * INFLATE
 
-    def gain(u: Array) -> tuple[Array, Array]:
-        return nodes, chain.above(u + counted.values, free, more)[nodes]
+    def gain(counted: Majorant) -> GainOfEnd:
+        more = counted.excess * c.law.most * INFLATE
 
-    return gain
+        def bound(u: Array) -> tuple[Array, Array]:
+            return nodes, chain.above(u + counted.values, free, more)[nodes]
+
+        return GainOfEnd(bound, float(np.abs(counted.values).max()))
+
+    counted = majorants(the_map, chain, [piece for piece in pieces if kept[piece.at]], c.functions)
+    return chain, kept, [[gain(of) for of in pair] for pair in counted]
 
 
 def check_long_run_of_map(the_map: Map, c: LongRunOfMap) -> None:
     """Check the claim."""
-    chain, pieces = chain_of_map(the_map, c.edges, c.law)
-    kept = kept_cells(chain, c.law)
+    chain, kept, gains = gains_of(the_map, c)
     check_starts_stay(c.starts, chain.mesh, kept)
-    counted = majorants(the_map, chain, [piece for piece in pieces if kept[piece.at]], c.functions)
     for k, one in enumerate(c.functions):
         with about(f"function {k}"):
             for sign, u, end, of in zip(
-                SIGNS, (one.lower, one.upper), one.bounds[0], counted[k], strict=True
+                END_SIGNS, (one.lower, one.upper), one.bounds[0], gains[k], strict=True
             ):
-                check_end(sign, u, end, gain_of(chain, kept, of, c.law), 4.0 + float(np.abs(of.values).max()))
+                check_end(sign, u, end, of.bound, 4.0 + of.size)

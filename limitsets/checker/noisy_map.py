@@ -21,10 +21,12 @@ from .means import INFLATE, Scatter, Spread, mean_rows
 from .steps import Chain, Parts
 
 NARROW_OF_MAP = 2.0**-30  # cells below this share of the largest place count as jumps
-ROOM = 8.0  # so many times as far out as places and the noise reach images may lie: what is there is off all cells
+FAR_OF_MAP = (
+    8.0  # images may lie so many times as far out as places and the noise: what is there is off all cells
+)
 
 
-class Piece(NamedTuple):
+class BranchOfCell(NamedTuple):
     """A cell on one of its branches: its left node, side and branch, its ends, f' and f'' on the cell."""
 
     at: int
@@ -35,10 +37,10 @@ class Piece(NamedTuple):
     bend: Arb
 
 
-class Step(NamedTuple):
+class StepOfMap(NamedTuple):
     """Where steps from a cell lead on one branch: the side, the images of its ends, and a range of all images."""
 
-    piece: Piece
+    piece: BranchOfCell
     to: int
     images: tuple[Arb, Arb]
     range: Pair
@@ -46,12 +48,12 @@ class Step(NamedTuple):
 
 def steps_from(
     the_map: Map, side: int, at: int, ends: Pair, known: dict[tuple[int, int, float], Arb]
-) -> list[Step]:
+) -> list[StepOfMap]:
     """Enclose the steps from a cell, on each branch that is possible; none where one is not enclosed.
 
     `known` keeps images of nodes, by side, branch and place.
     """
-    piece, steps = the_map.piece([ends]), list[Step]()
+    piece, steps = the_map.piece([ends]), list[StepOfMap]()
     for branch in possible(the_map, side, piece)[0]:
         program, (x, *ranges) = the_map.image[side, branch], piece.balls
         image, slope, bend = program.bend([x, *ranges])
@@ -66,17 +68,17 @@ def steps_from(
         if not (image.is_finite() and first.is_finite() and last.is_finite()):
             return []
         lo, hi = -upper(-image), upper(image)
-        own = Piece(at, side, branch, ends, slope, bend)
-        steps.append(Step(own, the_map.shape.to[side, branch], (first, last), (lo, hi)))
+        own = BranchOfCell(at, side, branch, ends, slope, bend)
+        steps.append(StepOfMap(own, the_map.shape.to[side, branch], (first, last), (lo, hi)))
     return steps
 
 
-def chain_of_map(the_map: Map, edges: list[Array], law: Law) -> tuple[Chain, list[Piece]]:
+def chain_of_map(the_map: Map, edges: list[Array], law: Law) -> tuple[Chain, list[BranchOfCell]]:
     """Prove the steps from the cells between nodes; with the cells of the chain on their branches."""
     size = max(float(np.abs(each).max()) for each in edges) + float(law.reach)
-    mesh = mesh_of(edges, OUTERMOST * ROOM * 2.0 ** math.ceil(math.log2(size)))
+    mesh = mesh_of(edges, OUTERMOST * FAR_OF_MAP * 2.0 ** math.ceil(math.log2(size)))
     scatter = Scatter(mesh, law, NARROW_OF_MAP)
-    parts, pieces = Parts(), list[Piece]()
+    parts, pieces = Parts(), list[BranchOfCell]()
     places: dict[int, tuple[int, Arb]] = {}  # by node where the step from there leads
     for side, (first, end) in enumerate(itertools.pairwise(mesh.first.tolist())):
         known: dict[tuple[int, int, float], Arb] = {}

@@ -314,6 +314,7 @@ def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report)
         "boxes": [outcome._asdict() for outcome in outcomes],
     }
     report.cells = sum(len(part.cells.rank) for part in file.parts if part.cells is not None)
+    report.cells += sum(part.long_run.cells for part in file.parts if part.long_run is not None)
     arithmetic = f"the ball arithmetic of python-flint {flint.__version__} (Arb), numpy and Python"
     report.relied_on = ["exact arithmetic of these formulas (no rounding of a computer's orbits)", arithmetic]
     for k, outcome in enumerate(outcomes):

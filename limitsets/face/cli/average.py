@@ -27,6 +27,7 @@ def average(
     set_: Words = None,
     domain: str | None = None,
     periodic: bool = False,
+    noise: float | None = None,
     cells: Annotated[int | None, limits(min=1)] = None,
     no_recheck: bool = False,
 ) -> Answer:
@@ -48,6 +49,9 @@ def average(
         Of a map: a range.
     periodic
         Of a map: it is taken modulo the width of the domain.
+    noise : LENGTH
+        Of a map: each step lands evenly within this distance of the image; then bounds hold from every start, almost
+        surely, and the map need not stretch.
     cells : N
         Cells, 8192 by default, of a map 10 000: the bounds come nearer as 1/N.
     out : FILE
@@ -57,10 +61,10 @@ def average(
     chosen = subject(scene, set_)
     if isinstance(chosen, MapOfFile):
         line = ls.grid(domain_of(chosen, domain), cells=cells or CELLS, periodic=periodic)
-        how: dict[str, Any] = {"map": chosen.lower, "grid": line, "upper": chosen.upper}
+        how: dict[str, Any] = {"map": chosen.lower, "grid": line, "upper": chosen.upper, "noise": noise}
         file = with_ending(run.out or Path(f"{chosen.name}{KIND}.proof.zip"))
     else:
-        of_scene_alone(chosen, {"--domain": domain, "--periodic": periodic or None})
+        of_scene_alone(chosen, {"--domain": domain, "--periodic": periodic or None, "--noise": noise})
         how = {"map": chosen, "cells": cells}
         file = own_file(chosen, KIND) if run.out is None else with_ending(run.out)
     with saved(file):  # refuses a place that cannot be written before anything is proved

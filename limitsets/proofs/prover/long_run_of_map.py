@@ -25,8 +25,10 @@ from limitsets.proofs.prover.averages_of_map import asked_of_map, cut_at_changes
 from limitsets.proofs.prover.certificate import Saved, require_checker
 from limitsets.proofs.prover.certificate_of_map import Part, parameters_of, write_map
 from limitsets.proofs.prover.programs import periods_of, recorded_map
+from limitsets.proofs.prover.proof import Claim
 from limitsets.proofs.prover.recording import decimal
 from limitsets.systems.cells import Grid
+from limitsets.systems.maps import kind_of
 
 if TYPE_CHECKING:
     from limitsets.checker.any_map import Map as CheckedMap
@@ -64,8 +66,6 @@ class LongRunOfMap(Saved):
         The claim `long-run` as a certificate has it.
     seconds : float
         Time it took.
-    how : str
-        "proved".
     """
 
     map: Any
@@ -77,7 +77,16 @@ class LongRunOfMap(Saved):
     section: dict[str, Any]
     arrays: Arrays
     seconds: float
-    how: str = "proved"
+
+    @property
+    def claims(self) -> tuple[Claim, ...]:
+        """The one claim, which is proved."""
+        return (Claim("long-run", "proved", "", self.section),)
+
+    @property
+    def average(self) -> LongRunOfMap:
+        """The answer itself: it is asked for as averages without noise are."""
+        return self
 
     @property
     def lo(self) -> float:
@@ -95,25 +104,43 @@ class LongRunOfMap(Saved):
             (name.replace("_", " "), *outward(lo, hi), hi - lo) for name, (lo, hi) in self.numbers.items()
         ]
         heads = ("average", Column("lo", show=".12g"), Column("hi", show=".12g"), Column("width", show=".2g"))
-        said = f"{self.how}: from every start in these places, almost surely, as steps go on for ever"
-        named = f"{type(self.map).__name__}: long-run averages, noise {self.noise:g}"
-        places = [(side, (lo, hi)) for side, lo, hi in self.starts]
-        starts = Table(("side", Column("x", show=".6g", ends=True)), places, "Starts", "no step leads out")
-        return Table(heads, rows, named, said), starts
+        said = f"proved: from every start in {in_words(self.starts)}, almost surely, averages over ever more steps end "
+        said += f"between lo and hi, where steps land within {self.noise:g} of the image, evenly"
+        return (Table(heads, rows, "Averages along orbits with noise", said),)
 
-    def to_json(self) -> dict[str, Any]:
-        """Give the bounds as JSON takes them."""
-        return as_table(
-            **picked(self, "how", "noise", "starts", "seconds"),
+    def __str__(self) -> str:
+        return self.table().text()
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Give the claim as plain tables for JSON, a list of one, as other proofs of a map do."""
+        rows = [
+            {"name": name, "component": None, "lo": lo, "hi": hi} for name, (lo, hi) in self.numbers.items()
+        ]
+        one = as_table(
+            **picked(self.claims[0], "claim", "verdict"),
+            of=", ".join(kind_of(self.map).formulas),
             map=type(self.map).__name__,
             parameters=[end._asdict() for end in (self.map, self.upper)],
             cells=self.grid.n_cells,
-            averages={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.numbers.items()},
+            noise=self.noise,
+            starts=self.starts,
+            section=self.section,
+            averages=rows,
+            timings={"certify": self.seconds},
         )
+        return [one]
 
     def _write(self, path: str | Path, **how: Any) -> None:
         part = Part((self.map, self.upper), {"long-run": self.section}, self.arrays)
         write_map(path, self.grid.domain, [part], goal=None, **how)
+
+
+def in_words(starts: Sequence[tuple[int, float, float]]) -> str:
+    """Name places; the side where there are several."""
+    several = len({side for side, _, _ in starts}) > 1
+    return ", ".join(
+        f"{lo:.9g} to {hi:.9g}" + (f" on side {side}" if several else "") for side, lo, hi in starts
+    )
 
 
 def long_run_of_map(
@@ -137,49 +164,40 @@ def long_run_of_map(
     from limitsets.checker.any_map import Map, read_map, read_parameters
     from limitsets.checker.balls import PRECISION, UnprovedError
     from limitsets.checker.laws import uniform_law
-    from limitsets.checker.long_run import SIGNS, kept_cells
-    from limitsets.checker.map_long_run import ENDS, gain_of, majorants
-    from limitsets.checker.noisy_map import chain_of_map
+    from limitsets.checker.long_run import END_SIGNS
+    from limitsets.checker.map_long_run import ENDS, LongRunOfMap as Claimed, gains_of
     from limitsets.checker.observable import Allowed, read_function
 
     asked = asked_of_map(of, lower, grid)
     fine = cut_at_changes(lower, upper, grid, asked.jumps, turns=True)
-    edges = [edges for (edges,) in fine.edges]
-    unknown = [np.zeros(0)] * 3  # the functions u that are to be found
-    law = uniform_law(Fraction(decimal(noise)), 1)
     listed: list[dict[str, Any]] = [
         {"of": one.section} | {end: [(0.0).hex()] for end in ENDS} for one in asked.functions
     ]
     with flint.ctx.workprec(PRECISION):
         shape = read_map(recorded_map(lower, grid.sides) | {"periodic": periods_of(grid.domain)})
         the_map = Map(shape, read_parameters(parameters_of(lower, upper), shape.names, "the map"))
-        allowed = Allowed(shape.sides, shape.branches, shape.names)
+        allowed, unknown = Allowed(shape.sides, shape.branches, shape.names), [np.zeros(0)] * 3
         functions = [read_function(one, [0], allowed, "the function", unknown) for one in listed]
         tell("cells", 0, 1)
-        jumps = [[x for s, x in asked.jumps if s == side] for side in range(grid.sides)]
-        edges = [refined(the_map, side, *each) for side, each in enumerate(zip(edges, jumps, strict=True))]
-        chain, pieces = chain_of_map(the_map, edges, law)
-        kept = kept_cells(chain, law)
-        if not kept.any():
-            remedy = "widen the grid, or lower the noise"
-            raise AnswerError("the noise", noise, "so small that steps stay on some cells", remedy)
+        edges = [refined(the_map, side, axes[0], asked.jumps) for side, axes in enumerate(fine.edges)]
+        law = uniform_law(Fraction(decimal(noise)), 1)
         try:
-            counted = majorants(the_map, chain, [each for each in pieces if kept[each.at]], functions)
+            chain, kept, gains = gains_of(the_map, Claimed("", law, [], edges, functions))
         except UnprovedError as error:
-            raise AnswerError("the function to average", of, "one with a bound", str(error)) from None
-        columns = np.zeros((len(ENDS), len(chain.mesh.place), len(listed)))
-        for k, pair in enumerate(counted):
-            for sign, majorant, end, column in zip(SIGNS, pair, ENDS, columns, strict=True):
-                tell(asked.functions[k].name, 2 * k + (sign > 0.0), 2 * len(listed))
-                bound, column[:, k] = settled(
-                    gain_of(chain, kept, majorant, law), chain.mesh.place, chain.mesh.first
-                )
-                listed[k] = listed[k] | {end: [(sign * (bound + ALLOWANCE)).hex()]}
+            allow = "so small that steps stay on some cells, where what is averaged has a bound"
+            raise AnswerError(
+                "the noise", noise, allow, f"widen the grid, or lower the noise: {error}"
+            ) from None
+        mesh, columns = chain.mesh, np.zeros((len(ENDS), len(chain.mesh.place), len(listed)))
+        for k, (sign, word) in itertools.product(range(len(listed)), enumerate(ENDS)):
+            tell(asked.functions[k].name, 2 * k + sign, 2 * len(listed))
+            bound, columns[sign, :, k] = settled(gains[k][sign].bound, mesh.place, mesh.first)
+            listed[k][word] = [(END_SIGNS[sign] * (bound + ALLOWANCE)).hex()]
     arrays = {f"nodes.{side}": each for side, each in enumerate(edges)} | {
         f"long-run.{end}": column if len(listed) > 1 else column[:, 0]
         for end, column in zip(ENDS, columns, strict=True)
     }
-    starts = stretches(kept, chain.mesh.place, chain.mesh.first)
+    starts = stretches(kept, mesh.place, mesh.first)
     section = {
         "landing": decimal(noise),
         "starts": [{"side": side, "box": [[lo.hex(), hi.hex()]]} for side, lo, hi in starts],
@@ -191,11 +209,12 @@ def long_run_of_map(
         shares = {"share", "steps"} & set(one.section)  # these lie between 0 and 1 by themselves
         numbers[one.name] = (max(lo, 0.0), min(hi, 1.0)) if shares else (lo, hi)
     return LongRunOfMap(
-        lower, upper, fine, noise, tuple(starts), numbers, section, arrays, time.perf_counter() - begun
-    )
+        lower, upper, fine, noise, tuple(starts), numbers=numbers, section=section, arrays=arrays,
+        seconds=time.perf_counter() - begun,
+    )  # fmt: skip
 
 
-def refined(the_map: CheckedMap, side: int, edges: Array, jumps: Sequence[float]) -> Array:
+def refined(the_map: CheckedMap, side: int, edges: Array, jumps: Sequence[tuple[int, float]]) -> Array:
     """Cut cells on which the slope varies by a half or has no bounds, and those with an image longer than most.
 
     Near a pole of ln |f'| cells become the shorter the nearer it is; small ones, of changes and turns, stay.  Beside
@@ -218,13 +237,9 @@ def refined(the_map: CheckedMap, side: int, edges: Array, jumps: Sequence[float]
                 continue
             cells.append((lo, hi, most * (hi - lo) if math.isfinite(most) else 0.0))
     lo, hi, long = np.array(cells).T
-    parts = (
-        np.maximum(np.ceil(long / (LONG * long.mean())), 1.0).astype(int)
-        if long.any()
-        else np.ones(len(lo), int)
-    )
+    parts = np.maximum(np.ceil(long / max(LONG * float(long.mean()), tiny)), 1.0).astype(int)
     inner = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(lo, hi, parts.tolist(), strict=True)]
-    beside = np.array([x + k * tiny for x in jumps for k in (-1, 1)])
+    beside = np.array([x + k * tiny for s, x in jumps if s == side for k in (-1, 1)])
     return np.unique(np.concatenate([*inner, hi[-1:], beside[(beside > edges[0]) & (beside < edges[-1])]]))
 
 
