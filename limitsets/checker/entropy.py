@@ -30,6 +30,7 @@ import numpy as np
 from .balls import Arb, Array, Pair, floats_around, prove
 from .file import Arrays, hex_float, require, rounded
 from .labels import Labelled
+from .observable import Allowed
 
 ENTROPY_KEYS = "lower upper"
 MOST_INTERVALS, MOST_LAPS = 20_000, 1_000
@@ -48,7 +49,7 @@ class Entropy(NamedTuple):
 
 
 def read_entropy(
-    section: dict[str, Any], arrays: Arrays, prefix: str, sides: int, where: str = "section of entropy"
+    section: dict[str, Any], arrays: Arrays, prefix: str, allowed: Allowed, where: str
 ) -> Entropy:
     """Read the claim `entropy`."""
     lower, upper = (hex_float(section[key], f"{where}: {key}") for key in ENTROPY_KEYS.split())
@@ -56,7 +57,9 @@ def read_entropy(
     both = [arrays.read(f"{prefix}entropy.{word}", "<f8", 4) for word in ("covered", "met")]
     for one in both:
         require(len(one) <= MOST_INTERVALS, f"{where}: there are more than {MOST_INTERVALS} intervals")
-        fits = np.isin(one[:, 0], range(sides)) & np.isfinite(one).all(axis=1) & (one[:, 1] <= one[:, 2])
+        fits = (
+            np.isin(one[:, 0], range(allowed.sides)) & np.isfinite(one).all(axis=1) & (one[:, 1] <= one[:, 2])
+        )
         require(bool(fits.all()), f"{where}: a row is no interval of a side")
         fits = (one[:, 3] >= LEAST_NUMBER) & (one[:, 3] <= MOST_NUMBER)
         require(bool(fits.all()), f"{where}: the number of an interval is not between 2^-200 and 2^200")

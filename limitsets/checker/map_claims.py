@@ -39,12 +39,11 @@ def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[Fail
         failed |= check_cells(part, number, file, cycles, crew)
         if "almost-every" in part.claims and "almost-every" not in failed:
             failed |= failing(["almost-every"], check_weights, the_map, part.cells)
-        if part.average is not None and "average" not in failed:
-            failed |= failing(["average"], check_map_average, the_map, part.cells, part.average)
-        if part.entropy is not None and "entropy" not in failed:
-            failed |= failing(["entropy"], check_map_entropy, the_map, part.cells, part.entropy)
-    if part.long_run is not None:
-        failed |= failing(["long-run"], check_long_run_of_map, the_map, part.long_run)
+        for name, check in (("average", check_map_average), ("entropy", check_map_entropy)):
+            if name in part.of_line and name not in failed:
+                failed |= failing([name], check, the_map, part.cells, part.of_line[name])
+    if "long-run" in part.of_line:
+        failed |= failing(["long-run"], check_long_run_of_map, the_map, part.of_line["long-run"])
     return failed, cycles
 
 

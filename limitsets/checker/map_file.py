@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from .any_map import Shape, read_map, read_parameters
 from .balls import Pair
-from .entropy import ENTROPY_KEYS, Entropy, read_entropy
+from .entropy import ENTROPY_KEYS, read_entropy
 from .file import (
     Arrays,
     hex_float,
@@ -23,10 +23,10 @@ from .file import (
 )
 from .map_cells import MapCells
 from .map_cycles import Begins, Listed, read_begins, read_cycles
-from .map_long_run import OF_LONG_RUN, LongRunOfMap, read_long_run_of_map
+from .map_long_run import OF_LONG_RUN, read_long_run_of_map
 from .map_orbits import Every, read_every
 from .map_plane import ParameterAxis, RegionPlace, read_axes, read_region_boxes
-from .observable import KEYS as OF_AVERAGES, Allowed, Average, read_average
+from .observable import KEYS as OF_AVERAGES, Allowed, read_average
 
 CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "cycles": "cycles",
@@ -45,6 +45,7 @@ CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "long-run": OF_LONG_RUN,
     "refuted": "",
 }
+OF_LINE = {"average": read_average, "entropy": read_entropy, "long-run": read_long_run_of_map}
 OF_ORBITS = (
     "cycles",
     "all-cycles",
@@ -75,9 +76,7 @@ class Part(NamedTuple):
     max_rank: int
     least: float  # the slope of `expanding`, 0 where that is not claimed
     cells: MapCells | None
-    average: Average | None
-    entropy: Entropy | None
-    long_run: LongRunOfMap | None
+    of_line: dict[str, Any]  # what is read of `average`, `entropy` and `long-run`, those that are claimed
 
 
 class MapFile(NamedTuple):
@@ -162,7 +161,7 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     cells = MapCells(arrays, box["prefix"], shape, **labels) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
     numbers = read_numbers(known, shape, where)
-    average, entropy, long_run = read_on_a_line(known, shape, arrays, box["prefix"], where)
+    of_line = read_of_line(known, shape, arrays, box["prefix"], where)
     return Part(
         parameters,
         known,
@@ -173,28 +172,21 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
         drawn=drawn,
         **numbers,
         cells=cells,
-        average=average,
-        entropy=entropy,
-        long_run=long_run,
+        of_line=of_line,
     )
 
 
-def read_on_a_line(
+def read_of_line(
     known: dict[str, Any], shape: Shape, arrays: Arrays, prefix: str, where: str
-) -> tuple[Average | None, Entropy | None, LongRunOfMap | None]:
-    """Read `average`, `entropy` and `long-run`, None where these are not claimed."""
-    for name in {"average", "entropy"} & set(known):
-        require("converges" not in known, f"{where}: {name} does not stand beside converges")
-        require(shape.dimension == 1, f"{where}: {name} is of one axis")
-    average, entropy, long_run = None, None, None
-    if "average" in known:
-        allowed = Allowed(shape.sides, shape.branches, shape.names)
-        average = read_average(known["average"], arrays, prefix, allowed, where)
-    if "entropy" in known:
-        entropy = read_entropy(known["entropy"], arrays, prefix, shape.sides, where)
-    if "long-run" in known:
-        long_run = read_long_run_of_map(known["long-run"], arrays, prefix, shape, f"{where}: long-run")
-    return average, entropy, long_run
+) -> dict[str, Any]:
+    """Read the claims about averages and entropies of a line, those that are made."""
+    claimed = {name: read for name, read in OF_LINE.items() if name in known}
+    require(shape.dimension == 1 or not claimed, f"{where}: {', '.join(claimed)} is of one axis")
+    both = "converges" in known and {"average", "entropy"} & set(claimed)
+    require(not both, f"{where}: average and entropy do not stand beside converges")
+    require(not (shape.closes and "long-run" in known), f"{where}: long-run is of an axis that ends")
+    allowed = Allowed(shape.sides, shape.branches, shape.names)
+    return {name: read(known[name], arrays, prefix, allowed, where) for name, read in claimed.items()}
 
 
 def read_numbers(known: dict[str, Any], shape: Shape, where: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb
 
-from .any_map import Map, Shape
+from .any_map import Map
 from .balls import ONE, ZERO, Arb, Array, about, prove
 from .brackets import Place
 from .file import Arrays, read_box, read_side, require, rows, table
@@ -61,20 +61,19 @@ class LongRunOfMap(NamedTuple):
 
 
 def read_long_run_of_map(
-    section: dict[str, Any], arrays: Arrays, prefix: str, shape: Shape, where: str
+    section: dict[str, Any], arrays: Arrays, prefix: str, allowed: Allowed, where: str
 ) -> LongRunOfMap:
     """Read the claim of a box of parameters."""
-    require(shape.dimension == 1 and not shape.closes, f"{where}: long-run is of one axis, which ends")
     bound = rational(section["landing"], f"{where}: landing")
     require(0 < bound < 10**6, f"{where}: landing is not above 0, or too large")
-    edges = [arrays.read(f"{prefix}nodes.{side}", "<f8") for side in range(shape.sides)]
+    edges = [arrays.read(f"{prefix}nodes.{side}", "<f8") for side in range(allowed.sides)]
     sound = all(len(e) >= 4 and bool((np.diff(e) > 0).all()) and float(np.abs(e).max()) < 1e6 for e in edges)
     require(
         sound and sum(map(len, edges)) <= MOST_NODES_OF_MAP,
         f"{where}: the nodes do not ascend, or are too many",
     )
     starts = [
-        (read_side(one["side"], shape.sides), Fraction(lo), Fraction(hi))
+        (read_side(one["side"], allowed.sides), Fraction(lo), Fraction(hi))
         for each in rows(section["starts"], f"{where}: starts", 1, 1000)
         for one in (table(each, f"{where}: starts", "side box"),)
         for lo, hi in read_box(one["box"], 1, f"{where}: starts")
@@ -84,7 +83,6 @@ def read_long_run_of_map(
     alike = all(len(column) == sum(len(e) + 2 for e in edges) for column in columns)
     require(alike, f"{where}: a function has not one number for each node")
     by_function = [column.reshape(len(column), -1).T for column in columns]
-    allowed = Allowed(shape.sides, shape.branches, shape.names)
     functions = [
         read_function(
             one, [0], allowed, f"{where}: function {k}", [each[k] for each in by_function] + [np.zeros(0)]

@@ -167,20 +167,17 @@ class Proved:
 
     def averaged(self) -> str:
         """Say what the average of a function is."""
-        average = self.part.average
-        assert average is not None
+        average = self.part.of_line["average"]
         names = {k: component_in_words(self.cells, k) for k in average.components()}
         return average_in_words(average, names, ["take branch 0", "take branch 1"])
 
     def entropic(self) -> str:
         """Say what the entropy is."""
-        assert self.part.entropy is not None
-        return entropy_in_words(self.part.entropy)
+        return entropy_in_words(self.part.of_line["entropy"])
 
     def scattered(self) -> str:
         """Say between which numbers averages lie where steps scatter."""
-        assert self.part.long_run is not None
-        return "\n".join(long_run_of_map_in_words(self.part.long_run))
+        return "\n".join(long_run_of_map_in_words(self.part.of_line["long-run"]))
 
 
 SENTENCES: dict[str, Callable[[Proved], str]] = {

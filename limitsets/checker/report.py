@@ -207,14 +207,11 @@ def read_certificate(header: dict[str, Any], entries: dict[str, memoryview]) -> 
     require(all(len(s.sides) == n_sides for s in scenes), "the boxes do not have the same number of sides")
     cells = [read_cells(arrays, box["prefix"], n_sides) for box in boxes]
     claims, unknown = read_claims(header["claims"], n_sides)
-    if "average" in claims:
-        allowed = Allowed(n_sides, 2, [])
-        average = read_average(claims["average"], arrays, boxes[0]["prefix"], allowed, "section of average")
-        claims["average"] = {"read": average, "cells": cells[0]}
-    if "entropy" in claims:
-        claims["entropy"] = {
-            "read": read_entropy(claims["entropy"], arrays, boxes[0]["prefix"], n_sides, "section of entropy")
-        }
+    allowed = Allowed(n_sides, 2, [])
+    for name, reader in (("average", read_average), ("entropy", read_entropy)):
+        if name in claims:
+            read = reader(claims[name], arrays, boxes[0]["prefix"], allowed, f"section of {name}")
+            claims[name] = {"read": read, "cells": cells[0]}
     arrays.require_no_others()
     return Certificate(
         raw,
@@ -314,7 +311,7 @@ def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report)
         "boxes": [outcome._asdict() for outcome in outcomes],
     }
     report.cells = sum(len(part.cells.rank) for part in file.parts if part.cells is not None)
-    report.cells += sum(part.long_run.cells for part in file.parts if part.long_run is not None)
+    report.cells += sum(part.of_line["long-run"].cells for part in file.parts if "long-run" in part.of_line)
     arithmetic = f"the ball arithmetic of python-flint {flint.__version__} (Arb), numpy and Python"
     report.relied_on = ["exact arithmetic of these formulas (no rounding of a computer's orbits)", arithmetic]
     for k, outcome in enumerate(outcomes):

@@ -200,7 +200,7 @@ def test_the_plane_is_sampled_alone():
 
 
 def test_what_cannot_be_asked_is_refused():
-    with pytest.raises(AnswerError, match="cells to find it on"):
+    with pytest.raises(AnswerError, match="cells to prove it on"):
         ls.entropy(tent(1.7), None)
     with pytest.raises(AnswerError, match="beside a scene"):
         ls.entropy("paper-designed", line())

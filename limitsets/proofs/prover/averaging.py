@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, overload
 
-from limitsets.base import AnswerError, Progress, arguments_checked, shown, shown_in_notebooks
+from limitsets.base import AnswerError, Progress, arguments_checked, shown_in_notebooks
 from limitsets.feeder.scene import Scene, load
 from limitsets.proofs.prover.averages_of_map import asked_of_map, averaged, cut_at_changes
 from limitsets.proofs.prover.averages_of_scene import averages_of_scene
-from limitsets.proofs.prover.certifying import require_none
+from limitsets.proofs.prover.certifying import require_cells, require_map, require_none
 from limitsets.proofs.prover.long_run_of_map import LongRunOfMap, long_run_of_map
 from limitsets.proofs.prover.of_map import certify_map
 from limitsets.proofs.prover.proof import Proof
@@ -121,17 +121,9 @@ def average(
         require_none(
             {"upper": upper, "noise": noise, "grid": grid if twice else None}, "average", "beside a scene"
         )
-        if cells is not None and cells < 1:
-            raise AnswerError("the cells of an average", cells, "1 or more", "leave it out")
+        require_cells(cells, "average")
         return averages_of_scene(load(map), of if grid is None else grid, cells, progress)
-    require_none({"cells": cells}, "average", "beside a map")
-    if not isinstance(map, tuple):
-        raise AnswerError(
-            "the map of an average", shown(map), "a scene, or a map of a line", "make one with limitsets.map"
-        )
-    if not isinstance(grid, Grid):
-        way = "limitsets.average(map, limitsets.grid([(lo, hi)], cells=1000))"
-        raise AnswerError("the grid of an average", shown(grid), "the cells to prove it on", f"pass {way}")
+    require_map(map, grid, cells, "average")
     if grid.dimension != 1:
         raise AnswerError("the grid of an average", f"{grid.dimension} axes", "one", "averages are of a line")
     of = "lyapunov" if of is None else of

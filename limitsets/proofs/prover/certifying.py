@@ -306,6 +306,23 @@ def require_none(given: Mapping[str, Any], function: str, beside: str) -> None:
             raise AnswerError(f"the argument {name} of {function}", shown(value), f"none {beside}", remedy)
 
 
+def require_map(map: Any, grid: Any, cells: int | None, what: str) -> None:  # noqa: A002  # the field's word
+    """Refuse what is no map beside a grid, for a number that is proved of these."""
+    require_none({"cells": cells}, what, "beside a map")
+    if not isinstance(map, tuple):
+        remedy = "make one with limitsets.map"
+        raise AnswerError(f"the map of an {what}", shown(map), "a scene, or a map of a line", remedy)
+    if not isinstance(grid, Grid):
+        way = f"pass limitsets.{what}(map, limitsets.grid([(lo, hi)], cells=1000))"
+        raise AnswerError(f"the grid of an {what}", shown(grid), "the cells to prove it on", way)
+
+
+def require_cells(cells: int | None, what: str) -> None:
+    """Refuse a number of cells that is none."""
+    if cells is not None and cells < 1:
+        raise AnswerError(f"the cells of an {what}", cells, "1 or more", "leave it out")
+
+
 @shown_in_notebooks
 @arguments_checked_as("certify")
 def certify_scene(

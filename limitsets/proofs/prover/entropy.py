@@ -9,13 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
-from limitsets.base import AnswerError, Progress, arguments_checked, shown, shown_in_notebooks, silent
+from limitsets.base import Progress, arguments_checked, shown_in_notebooks, silent
 from limitsets.feeder.scene import Scene, load
 from limitsets.proofs.prover.attraction import attraction
 from limitsets.proofs.prover.averages_of_map import cut_at_changes
 from limitsets.proofs.prover.averages_of_scene import attracting, fine_cells, unfit
 from limitsets.proofs.prover.certificate import DeniedError, require_checker
-from limitsets.proofs.prover.certifying import require_none
+from limitsets.proofs.prover.certifying import require_cells, require_map, require_none
 from limitsets.proofs.prover.cover import cover_on
 from limitsets.proofs.prover.entropies import ROOM, Entropy, both_ends
 from limitsets.proofs.prover.of_map import certify_map
@@ -185,15 +185,7 @@ def entropy(
     tell = progress or silent
     if isinstance(map, Scene | str | Path):
         require_none({"upper": upper, "grid": grid}, "entropy", "beside a scene")
-        if cells is not None and cells < 1:
-            raise AnswerError("the cells of an entropy", cells, "1 or more", "leave it out")
+        require_cells(cells, "entropy")
         return _of_scene(load(map), cells or CELLS, tell)
-    require_none({"cells": cells}, "entropy", "beside a map")
-    if not isinstance(map, tuple):
-        raise AnswerError(
-            "the map of an entropy", shown(map), "a scene, or a map of a line", "make one with limitsets.map"
-        )
-    if not isinstance(grid, Grid):
-        way = "limitsets.entropy(map, limitsets.grid([(lo, hi)], cells=1000))"
-        raise AnswerError("the grid of an entropy", shown(grid), "the cells to find it on", f"pass {way}")
+    require_map(map, grid, cells, "entropy")
     return _of_map(map, grid, upper, tell)
