@@ -23,6 +23,8 @@ SCENES = ("paper-initial-small-angle", "paper-designed-small-angle", "paper-init
 CELLS, FINER = 64_000, (1000, 4000, 16_000, 64_000)
 # Half the width of the noise, and cells on which the exponent is bounded.
 NOISES = {0.01: 4000, 0.003: 4000, 0.001: 8000, 3e-4: 30_000, 1e-4: 80_000, 5e-5: 120_000}
+# Noise at which the exponent is sampled for the curve.
+BETWEEN = np.geomspace(3e-5, 1.5e-2, 28).tolist()
 THROWS = 10**6
 ORBITS, STEPS, SETTLED = 20_000, 500, 100
 
@@ -102,6 +104,12 @@ def slope_of(x: Any) -> Any:
     return np.where(x > 0.3, 19 * (right_of(x) - B) * (1 / x - 10 / 3), below)
 
 
+def outward(lo: float, hi: float, digits: int) -> str:
+    """Write bounds, rounded outward."""
+    scale = 10.0**digits
+    return f"{math.floor(lo * scale) / scale:.{digits}f} to {math.ceil(hi * scale) / scale:.{digits}f}"
+
+
 def figures(numbers: Mapping[str, Any], out: Path) -> None:
     """Draw exponents and entropies of the feeders, how bounds come nearer, and the exponent against the noise."""
     out.mkdir(parents=True, exist_ok=True)
@@ -115,7 +123,7 @@ def figures(numbers: Mapping[str, Any], out: Path) -> None:
             lo, hi = one[word]
             bars.barh(height, lo, 0.3, color=colour, alpha=0.75, label=label if k == 0 else None)
             bars.annotate(
-                f"{lo:.5f} to {hi:.5f}",
+                outward(lo, hi, 6),
                 (lo, height),
                 (3, 0),
                 textcoords="offset points",
@@ -124,7 +132,7 @@ def figures(numbers: Mapping[str, Any], out: Path) -> None:
             )
         bars.plot(one["sampled"], k - 0.17, "k|", ms=11, label="one orbit in floats" if k == 0 else None)
     bars.set_yticks(range(len(rows)), list(rows))
-    bars.set_xlim(0.0, 1.45 * max(one["entropy"][1] for one in rows.values()))
+    bars.set_xlim(0.0, 1.75 * max(one["entropy"][1] for one in rows.values()))
     bars.invert_yaxis()
     bars.set_xlabel("per throw [natural logarithm]")
     bars.legend(
@@ -150,26 +158,31 @@ def figures(numbers: Mapping[str, Any], out: Path) -> None:
     for noise, (lo, hi) in known.items():
         colour = "tab:red" if lo > 0 else "tab:blue" if hi < 0 else "0.6"
         axes.plot([noise, noise], [lo, hi], color=colour, lw=5, solid_capstyle="butt")
-    axes.plot(list(numbers["sampled"]), list(numbers["sampled"].values()), "k.-", lw=0.8, ms=4)
+    curve = axes.plot(list(numbers["sampled"]), list(numbers["sampled"].values()), "k", lw=0.8)
     axes.set_xscale("log")
     axes.set_xlabel("half the width of the noise")
     axes.set_ylabel("Lyapunov exponent per step")
-    handles = [plt.Line2D([], [], color=c, lw=5) for c in ("tab:red", "tab:blue")]
-    words = ["proved: above 0, chaos", "proved: below 0, order", "random orbits in floats"]
-    axes.legend([*handles, plt.Line2D([], [], color="k", marker=".", lw=0.8)], words, fontsize=8)
+    handles = [plt.Line2D([], [], color=c, lw=5) for c in ("tab:red", "tab:blue", "0.6")]
+    words = ["proved: above 0, chaos", "proved: below 0, order", "proved bounds, sign open"]
+    axes.legend([*handles, *curve], [*words, "random orbits in floats"], fontsize=8)
     figure.savefig(out / "order.png", dpi=130)
     plt.close(figure)
 
 
 def main(
-    out: Path = HERE, cells: int = CELLS, noises: Mapping[float, int] = NOISES, finer: Sequence[int] = FINER
+    out: Path = HERE,
+    cells: int = CELLS,
+    names: Sequence[str] = SCENES,
+    noises: Mapping[float, int] = NOISES,
+    finer: Sequence[int] = FINER,
+    between: Sequence[float] = BETWEEN,
 ) -> dict[str, Any]:
     """Run the study, write its figures, and return its numbers."""
     numbers = {
-        "feeders": feeders(cells),
+        "feeders": feeders(cells, names),
         "widths": widths(finer),
         "order": order(noises),
-        "sampled": {noise: sampled(noise) for noise in noises},
+        "sampled": {noise: sampled(noise) for noise in sorted({*noises, *between})},
     }
     figures(numbers, out)
     return numbers
@@ -179,15 +192,11 @@ def table(numbers: Mapping[str, Any]) -> str:
     """Write the numbers as Markdown tables."""
     lines = ["| scene | Lyapunov exponent | flips per throw | entropy |", "|---|---|---|---|"]
     for name, one in numbers["feeders"].items():
-        (lo, hi), (few, many), (least, most) = (
-            one[word] for word in ("lyapunov", "flips_per_throw", "entropy")
-        )
-        lines.append(
-            f"| {name} | {lo:.6f} to {hi:.6f} | {few:.5f} to {many:.5f} | {least:.9f} to {most:.9f} |"
-        )
+        each = ((one["lyapunov"], 7), (one["flips_per_throw"], 5), (one["entropy"], 9))
+        lines.append(f"| {name} | {' | '.join(outward(*ends, digits) for ends, digits in each)} |")
     lines += ["", "| noise | exponent, proved | random orbits |", "|---|---|---|"]
     for noise, (lo, hi) in numbers["order"].items():
-        lines.append(f"| {noise:g} | {lo:.4f} to {hi:.4f} | {numbers['sampled'][noise]:.4f} |")
+        lines.append(f"| {noise:g} | {outward(lo, hi, 4)} | {numbers['sampled'][noise]:.4f} |")
     return "\n".join(lines)
 
 

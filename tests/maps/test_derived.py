@@ -116,7 +116,8 @@ def test_boxes_and_slopes_hold_the_exact_ones(kernel):
             for x, value in zip(at[1:], values[1:], strict=True):
                 ratio = (value - values[0]) / (exact(x) - exact(at[0]))
                 assert not ratio.is_finite() or ratio.overlaps(slope)
-    assert lost < (60 if kernel is not _powers else 320)  # poles, and what is not defined, are nobody's image
+    # poles, what is not defined, and where the slope is infinite are nobody's image
+    assert lost < (70 if kernel is not _powers else 320)
 
 
 def test_boxes_of_monotone_cells_are_the_range():

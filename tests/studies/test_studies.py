@@ -194,6 +194,40 @@ def test_too_few_throws_are_said_to_be_too_few(effects_in_engine, tmp_path):
     assert (tmp_path / "effects.png").stat().st_size > 20_000
 
 
+@pytest.fixture(scope="module")
+def chaos(tmp_path_factory):
+    few = {"names": ("paper-designed",), "cells": 4000, "finer": (500, 2000), "between": ()}
+    return of_study("15_chaos", tmp_path_factory, noises={0.01: 2000, 0.003: 4000}, **few)
+
+
+def test_chaos_and_order_as_expected(chaos):
+    _, numbers, out = chaos
+    expected = expected_of("15_chaos")
+    assert all((out / name).stat().st_size > 20_000 for name in ("feeders.png", "order.png"))
+    (name,) = numbers["feeders"]
+    for word, (lo, hi) in expected["feeders"][name].items():
+        least, most = numbers["feeders"][name][word]
+        assert least <= hi  # both hold the number
+        assert lo <= most
+        assert most - least < 2e-3
+    assert numbers["widths"][2000] < 0.4 * numbers["widths"][500]
+    for noise, (lo, hi) in numbers["order"].items():
+        least, most = expected["order"][f"{noise:g}"]
+        assert lo <= most
+        assert least <= hi < 0.0
+        assert lo - 0.004 < numbers["sampled"][noise] < hi + 0.004  # of 1e7 steps, which are correlated
+
+
+def test_the_tables_of_chaos_are_those_expected():
+    expected, text = expected_of("15_chaos"), readme_of("15_chaos")
+    digits = {"lyapunov": 7, "flips_per_throw": 5, "entropy": 9}
+    for name, row in expected["feeders"].items():
+        told = [f"{row[word][0]:.{count}f} to {row[word][1]:.{count}f}" for word, count in digits.items()]
+        assert f"| {name} | {' | '.join(told)} |" in text
+    for noise, (lo, hi) in expected["order"].items():
+        assert f"| {noise} | {lo:.4f} to {hi:.4f} |" in text
+
+
 # ----------------------------------------------------------------
 # Every notebook runs from top to bottom, and shows what is stored in it.
 
