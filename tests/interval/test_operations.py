@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 
 import limitsets.numbers.interval as iv
 from limitsets import interval
-from limitsets.numbers.interval import Interval, elementary as e_of_sine_bound, exponential as e
+from limitsets.numbers.interval import Interval, arithmetic, elementary as e_of_sine_bound, exponential as e
 from limitsets.numbers.interval.number import (
     ends_of,
     larger,
@@ -100,6 +100,21 @@ def test_unary_operations_against_rationals(a):
         assert excess_is_small(root, low, high)
     else:
         assert math.isnan(interval.sqrt(a)[1])
+
+
+@given(a=intervals())
+def test_cube_roots_against_rationals(a):
+    lo, hi = arithmetic.cbrt(a)
+    for end, root, sign in ((a[0], lo, -1), (a[1], hi, 1)):
+        assert math.isinf(root) or sign * (Fraction(root) ** 3 - Fraction(end)) >= 0
+        if end == 0.0 or abs(end) > 1e-290:  # below, a cube in floats has no digits
+            nearly = math.copysign(abs(end) ** (1.0 / 3.0), end)
+            assert sign * (root - nearly) <= 2.0**-40 * abs(nearly)
+
+
+def test_cube_roots_of_ends_that_are_infinite_or_none():
+    assert arithmetic.cbrt((-math.inf, math.inf)) == (-math.inf, math.inf)
+    assert all(math.isnan(end) for end in arithmetic.cbrt((math.nan, math.nan)))
 
 
 reals = st.one_of(st.floats(-10.0, 10.0), st.floats(-131072.0, 131072.0), st.floats(-1e-8, 1e-8))

@@ -6,7 +6,6 @@ Bodies are free of branches, so that loops over arrays of intervals vectorise.
 from __future__ import annotations
 
 import math
-import sys
 from typing import TypeAlias
 
 import numpy as np
@@ -18,8 +17,8 @@ Ends: TypeAlias = tuple[float, float]
 """``(lo, hi)`` with lo <= hi, either of which may be infinite; (nan, nan) is the empty set."""
 
 
-# By which share a cube root in floats is off at most where its cubes enclose the number, and beyond that near 0.
-OF_ROOT, TINY = 2.0**-50, sys.float_info.min
+# By which share the ends of a cube root are wider than a root in floats.
+OF_ROOT = 2.0**-48
 
 
 @proof_kernel
@@ -177,6 +176,7 @@ def sqrt(a: Ends) -> Ends:
 def cbrt(a: Ends) -> Ends:
     """Cube root: a little beyond a root in floats, if the cubes of the two ends are proved to enclose a."""
     lo, hi = np.cbrt(a[0]), np.cbrt(a[1])
-    lo, hi = lo - (OF_ROOT * abs(lo) + TINY), hi + (OF_ROOT * abs(hi) + TINY)
-    low, high = power((lo, lo), 3)[1] <= a[0], power((hi, hi), 3)[0] >= a[1]
+    lo, hi = lo - OF_ROOT * abs(lo), hi + OF_ROOT * abs(hi)
+    low = (a[0] == 0.0) | (power((lo, lo), 3)[1] <= a[0])
+    high = (a[1] == 0.0) | (power((hi, hi), 3)[0] >= a[1])
     return or_empty(holds(a), lo if low else -math.inf, hi if high else math.inf)

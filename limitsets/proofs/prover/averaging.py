@@ -112,6 +112,10 @@ def average(
     >>> lo, hi = proof.average.bounds[0]
     >>> lo < math.log(2.6) < hi, hi - lo < 1e-9
     (True, True)
+    >>> def halved(x): return 0.5 * x
+    >>> noisy = ls.average(ls.map(halved), ls.grid([(-1.0, 1.0)], cells=50), noise=0.25)
+    >>> noisy.lo < -math.log(2.0) < noisy.hi, noisy.hi - noisy.lo < 1e-6
+    (True, True)
     >>> flips = ls.average("paper-designed", of="flips_per_throw", cells=1000).average
     >>> flips.lo < 0.31916 < flips.hi < flips.lo + 0.01
     True
