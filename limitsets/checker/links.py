@@ -326,10 +326,10 @@ def turn_of(
     """
     least, most = both_ends(slope)
     bow = upper(abs(bend)) * h * h * 0.125 * INFLATE if bend.is_finite() else math.inf
-    if not (math.isfinite(least) and math.isfinite(most) and math.isfinite(bow)):
-        return None
     length, scale, eighth = max(-least, most) * h, h * 0.25 * weight * INFLATE, weight * 0.125 * INFLATE
-    return at, least * scale, most * scale, *where, length**2 * eighth, eighth, weight * bow
+    if not (math.isfinite(bow) and math.isfinite(length * length)):
+        return None
+    return at, least * scale, most * scale, *where, length * length * eighth, eighth, weight * bow
 
 
 def chain_of(

@@ -84,7 +84,8 @@ def long_run_in_words(c: LongRun) -> list[str]:
     """Put the claim in words, from the numbers that were checked."""
     starts = places_in_words(c.setting.starts, c.setting.scene.unit)
     lines = [
-        "long-run: averages over n throws, as n grows, from every start below almost surely; and every stationary law",
+        "long-run: averages over n throws, as n grows, from every start below almost surely; and of every",
+        "    stationary law on cells that no throw leaves",
         "    all deviations are independent of each other",
         f"    starts, in cells that no throw leaves: {starts}",
     ]
@@ -124,6 +125,9 @@ def kept_cells(chain: Chain, law: Law) -> Array:
 def check_starts_stay(starts: list[Place], mesh: Mesh, kept: Array) -> None:
     """Check that cells that throws do not leave hold all starts."""
     for side, lo, hi in starts:
+        nodes = mesh.place[mesh.first[side] + 1 : mesh.first[side + 1] - 1]
+        within = Fraction(float(nodes[0])) <= lo and hi <= Fraction(float(nodes[-1]))
+        prove(within, f"side {side}: starts lie beyond the nodes")
         for cell in range(int(mesh.first[side]), int(mesh.first[side + 1]) - 1):
             a, b = Fraction(float(mesh.place[cell])), Fraction(float(mesh.place[cell + 1]))
             where = f"side {side}, x in [{float(a)!r}, {float(b)!r}]: "

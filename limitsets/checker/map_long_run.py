@@ -38,7 +38,7 @@ from .steps import Chain
 
 OF_LONG_RUN = "landing starts functions"
 ENDS = ("lower", "upper")
-MOST_NODES_OF_MAP = 2_000_000
+MOST_NODES_OF_MAP, FARTHEST = 2_000_000, 2.0**100
 
 
 class LongRunOfMap(NamedTuple):
@@ -65,9 +65,11 @@ def read_long_run_of_map(
 ) -> LongRunOfMap:
     """Read the claim of a box of parameters."""
     bound = rational(section["landing"], f"{where}: landing")
-    require(0 < bound < 10**6, f"{where}: landing is not above 0, or too large")
+    require(0 < bound < FARTHEST, f"{where}: landing is not above 0, or too large")
     edges = [arrays.read(f"{prefix}nodes.{side}", "<f8") for side in range(allowed.sides)]
-    sound = all(len(e) >= 4 and bool((np.diff(e) > 0).all()) and float(np.abs(e).max()) < 1e6 for e in edges)
+    sound = all(
+        len(e) >= 4 and bool((np.diff(e) > 0).all()) and float(np.abs(e).max()) < FARTHEST for e in edges
+    )
     require(
         sound and sum(map(len, edges)) <= MOST_NODES_OF_MAP,
         f"{where}: the nodes do not ascend, or are too many",
@@ -96,11 +98,11 @@ def long_run_of_map_in_words(c: LongRunOfMap) -> Iterator[str]:
     """Put the claim in words."""
     places = ", ".join(f"[{float(lo)!r}, {float(hi)!r}] of side {side}" for side, lo, hi in c.starts)
     yield f"steps land within {c.landing} of f(x), evenly and independent of each other; from every start in {places}"
-    yield "almost surely averages over n steps, as n grows, lie in the end between the two"
+    yield "almost surely averages over n steps, counted from the first landing on, lie in the end between the two"
     for one in c.functions:
         lo, hi = known_bounds(one, 0)
         yield f"    {lo!r} to {hi!r}: {function_in_words(one, ['take branch 0', 'take branch 1'])}"
-    yield "    means over stationary laws lie there too"
+    yield "    means over stationary laws on cells that no step leaves lie there too"
 
 
 # ----------------------------------------------------------------
@@ -177,7 +179,7 @@ def pole(program: Program, piece: BranchOfCell, ranges: list[Arb], sign: int) ->
     """
     x = arb(piece.ends[0]).union(arb(piece.ends[1]))
     length = arb(piece.ends[1]) - arb(piece.ends[0])
-    least, mean = ZERO, piece.slope
+    least, mean = piece.slope.abs_lower(), piece.slope
     if not piece.slope.is_finite():
         least, mean = slope_beside_root(program, [x, *ranges], length)
     if sign:

@@ -9,15 +9,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .balls import Array
+from .balls import Array, prove
 from .laws import Law
 
 PAD = 2.0**-40  # more than the roundings of a place, as a share of the largest place
 NARROW = (
     2.0**-20
-)  # cells below this share of the largest place are those where a function may jump, of a scene
+)  # cells below this share of the largest place are those where a function of a scene may jump
 INFLATE = 1.0 + 2.0**-30  # against the roundings of the few operations that make a coefficient or add it up
 FINER = 4  # cells of W for each cell of V
+FINEST = 500.0  # so many of them at most for each reach of the scatter
+MOST_FINER, MOST_MET = 1e7, 5e7  # cells of W, and cells of V that all its nodes meet: memory
 AT_ONCE = 50_000  # ranges shared out to cells at a time
 
 
@@ -213,10 +215,12 @@ class Scatter:
             weights = np.tile(law.weights, len(some))
             return Spread(np.repeat(some, strata), weights, np.repeat(side[some], strata), lo, hi)
 
-        chunks = np.array_split(np.arange(len(y)), len(y) * strata // AT_ONCE + 1)
-        self.rows = mean_rows(len(y), coarse, map(spread, chunks))
         reach = float(law.reach)
         self.whole = coarse.within(side, y - reach, y + reach)
+        met = int((self.whole.last - self.whole.first + 1).sum()) + len(y) * strata
+        prove(met < MOST_MET, "landings scatter over too many cells")
+        chunks = np.array_split(np.arange(len(y)), len(y) * strata // AT_ONCE + 1)
+        self.rows = mean_rows(len(y), coarse, map(spread, chunks))
         # the places y + e are rounded: the ends of a stratum move the mean by its density times that
         densities = float((law.weights / np.diff(law.cuts)).sum())
         self.off = self.rows.off + 4.0 * densities * 2.0**-52 * (coarse.size() + reach)
@@ -267,11 +271,13 @@ def finer_mesh(coarse: Mesh, law: Law, narrow: float) -> Mesh:
         width = np.diff(inner)
         close = np.flatnonzero(width < narrow * coarse.size())
         step = max(float(np.median(width)), (inner[-1] - inner[0]) / (4 * len(inner))) / FINER
+        step = max(step, reach / FINEST)  # the mean varies at the scale of the scatter
         jumps = np.concatenate([inner[close], inner[close + 1]])
         around = np.concatenate([jumps, jumps - pad, jumps + pad])
         special = np.unique(around[:, None] + bends)
         special = special[np.diff(special, prepend=-np.inf) > 0.25 * pad]  # the same but for roundings
         lo, hi = inner[0] - reach - 4.0 * pad, inner[-1] + reach + 4.0 * pad
+        prove(float(hi - lo) < MOST_FINER * float(step), "landings scatter over too many cells")
         even = np.linspace(lo, hi, int(np.ceil((hi - lo) / step)) + 1)
         at = np.searchsorted(special, np.stack([even - 0.1 * step, even + 0.1 * step]))
         even = even[(at[0] == at[1]) | (even == lo) | (even == hi)]  # none close to a special place

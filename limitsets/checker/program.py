@@ -153,6 +153,12 @@ def cube_root(x: Arb) -> Arb:
     return lo.union(hi)
 
 
+def slope_of_cube_root(_: Arb, v: Arb) -> Arb:
+    """Enclose the slope by its ends: the ball of a square of a wide ball reaches 0."""
+    near, far = v.abs_lower(), v.abs_upper()
+    return (1 / (3 * near * near)).union(1 / (3 * far * far)) if near > 0 else NAN
+
+
 def flat_unless_at_kink(x: Arb, _: Arb) -> Arb:
     """Return the second derivative of |x|; nan where the kink may lie."""
     return ZERO if sign(x).is_exact() else NAN
@@ -168,7 +174,7 @@ UNARY: dict[str, tuple[Function, Slope, Slope]] = {
     "neg": (operator.neg, lambda _, __: -ONE, lambda _, __: ZERO),
     "abs": (magnitude, lambda x, _: sign(x), flat_unless_at_kink),
     "sqrt": (arb.sqrt, lambda _, v: 1 / (2 * v), lambda _, v: -1 / (4 * v * v * v)),
-    "cbrt": (cube_root, lambda _, v: 1 / (3 * v * v), lambda _, v: -2 / (9 * power(v, 5))),
+    "cbrt": (cube_root, slope_of_cube_root, lambda _, v: -2 / (9 * power(v, 5))),
     "exp": (arb.exp, lambda _, v: v, lambda _, v: v),
     "log": (arb.log, lambda x, _: 1 / x, lambda x, _: -1 / (x * x)),
     "sin": (arb.sin, lambda x, _: x.cos(), lambda _, v: -v),

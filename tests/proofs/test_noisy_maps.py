@@ -314,8 +314,11 @@ FORGED = {
     "a narrower lower end": (narrower("lower"), "function 1: the lower end"),
     "more noise": (lambda f: section_of(f).update(landing="0.3"), "the upper end"),
     "noise that leads out": (lambda f: section_of(f).update(landing="0.6"), "some step may lead out"),
+    "starts beyond the far nodes": (  # a hostile reader's: no cell that is not kept meets them
+        lambda f: section_of(f)["starts"][0].update(box=[[1e6.hex(), 2e6.hex()]]), "beyond the nodes",
+    ),
     "starts beyond the cells": (
-        lambda f: section_of(f)["starts"][0].update(box=[[(-1.0).hex(), (1.5).hex()]]), "no throw leads out",
+        lambda f: section_of(f)["starts"][0].update(box=[[(-1.0).hex(), (1.5).hex()]]), "beyond the nodes",
     ),
     "another function": (lambda f: f.arrays["0.long-run.upper"].__setitem__((slice(40, 60), 1), 3.0), "the upper end"),
 }  # fmt: skip
@@ -356,3 +359,65 @@ def test_bad_files_are_refused(case, saved, tmp_path):
     forged = opened(saved)
     BAD[case](forged)
     assert ls.recheck(forged.seal().write(tmp_path / "forged.zip")).verdict == "bad file"
+
+
+MADNESS = {
+    "nodes a hair apart, and wide noise": lambda f: (
+        section_of(f).update(landing="999999"),
+        f.arrays.update({"0.nodes.0": np.arange(101) * 1e-9}),
+    ),
+    "nodes that are no normal numbers": lambda f: f.arrays.update({"0.nodes.0": np.arange(101) * 1e-320}),
+}
+
+
+@pytest.mark.parametrize("case", MADNESS)
+def test_files_that_ask_for_all_memory_fail_at_once(case, saved, tmp_path):
+    forged = opened(saved)
+    MADNESS[case](forged)
+    assert ls.recheck(forged.seal().write(tmp_path / "forged.zip")).verdict == "failed"
+
+
+def by_share(x, a):
+    return a * x
+
+
+REFUSED = {
+    "noise as wide as the grid": ({}, 1e6, r"the noise is 1000000"),
+    "noise that no decimal writes": ({}, 1e-300, r"the noise is 1e-300"),
+    "corners the wrong way": ({"upper": ls.map(by_share, a=0.4)}, 0.1, r"upper corner of a is 0.4"),
+    "an upper corner of another map": ({"upper": ls.map(half)}, 0.1, r"upper"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_asked_is_told_in_a_line(case):
+    how, noise, words = REFUSED[case]
+    with pytest.raises(AnswerError, match=words):
+        ls.average(ls.map(by_share, a=0.5), ls.grid([(-1.0, 1.0)], cells=20), noise=noise, **how)
+
+
+def test_a_slope_of_either_sign_over_a_range_is_answered():
+    wide = ls.average(
+        ls.map(by_share, a=-0.5),
+        ls.grid([(-1.0, 1.0)], cells=40),
+        itself,
+        upper=ls.map(by_share, a=0.5),
+        noise=0.02,
+    )
+    assert wide.lo < 0.0 < wide.hi
+
+
+def rooted(x):
+    return 0.5 * np.cbrt(x - 0.3) - 0.6 * np.cbrt(x + 0.4)
+
+
+@pytest.mark.parametrize("cells", [300, 301])
+def test_a_node_beside_the_zero_of_a_cube_root_is_no_obstacle(cells):
+    answer = ls.average(ls.map(rooted), ls.grid([(-1.2, 1.2)], cells=cells), noise=0.1)
+    rng = np.random.default_rng(0)
+    x, total = rng.uniform(-1.0, 1.0, 20_000), 0.0
+    for _ in range(300):
+        x = rooted(x) + rng.uniform(-0.1, 0.1, x.size)
+        slope = 0.5 / (3 * np.cbrt(x - 0.3) ** 2) - 0.6 / (3 * np.cbrt(x + 0.4) ** 2)
+        total += np.log(np.abs(slope)).mean()
+    assert answer.lo - 0.02 < total / 300 < answer.hi + 0.02

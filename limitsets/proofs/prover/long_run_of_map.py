@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limitsets.base import AnswerError, Column, Progress, Table, as_table, picked, silent
+from limitsets.base import AnswerError, Column, Progress, Table, as_table, picked, shown, silent
 from limitsets.base.arrays import Array, Arrays, Ints, Mask
 from limitsets.proofs.prover.averages import outward
 from limitsets.proofs.prover.averages_of_map import asked_of_map, cut_at_changes
@@ -29,19 +29,22 @@ from limitsets.proofs.prover.proof import Claim
 from limitsets.proofs.prover.recording import decimal
 from limitsets.systems.cells import Grid
 from limitsets.systems.maps import kind_of
+from limitsets.systems.maps.contract import require_corners
 
 if TYPE_CHECKING:
     from limitsets.checker.any_map import Map as CheckedMap
 
-# Cells are cut, each so often at most, where the slope varies by more than this factor, but for cells below this share
-# of a side; and where an image is longer than the mean by this factor.
-MOST_CUTS, VARIES, TINY, LONG = 400, 1.5, 2.0**-33, 2.0
+# Cells are cut, each so often at most, and all together, where the slope varies by more than this factor, but for cells
+# below this share of a side; and where an image is longer than the mean by this factor.
+MOST_CUTS, MOST_IN_ALL, VARIES, TINY, LONG = 400, 2000, 1.5, 2.0**-33, 2.0
 # Steps at most, and by how much the gain of a step may still differ between nodes.
 MOST_STEPS, STILL = 3000, 1e-6
 # They end too where so many steps bring the bound nearer by less than this share of that difference.
 PATIENCE, SOON = 100, 1e-3
 # A step goes so far towards what it gains, so that nothing swings.
 DAMPED = 0.8
+# The least noise, and the farthest place.
+LEAST, FARTHEST = 1e-90, 2.0**100
 # A certificate claims bounds that are wider by this, for the roundings of another machine's sums.
 ALLOWANCE = 1e-9
 
@@ -154,8 +157,15 @@ def long_run_of_map(
         Noise that is not above 0, an axis that closes, functions without a bound, or cells that steps leave.
     """
     begun, tell = time.perf_counter(), progress or silent
-    if not 0.0 < noise < math.inf:
-        raise AnswerError("the noise", noise, "a number above 0", "leave it out for averages without noise")
+    require_corners(lower, upper)
+    widest = float((grid.domain.hi - grid.domain.lo).max())
+    if not LEAST <= noise < 0.5 * widest:
+        room = f"at least {LEAST}, and below {0.5 * widest:.6g}, half of the grid"
+        raise AnswerError("the noise", noise, room, "leave it out for averages without noise")
+    if not float(np.abs([grid.domain.lo, grid.domain.hi]).max()) < FARTHEST:
+        raise AnswerError(
+            "the grid", shown(grid), f"numbers below {FARTHEST:.6g}", "choose another unit of x"
+        )
     if grid.domain.closes:
         raise AnswerError("the grid", "an axis that closes", "one that ends", "noise is of lines that end")
     require_checker()
@@ -223,19 +233,22 @@ def refined(the_map: CheckedMap, side: int, edges: Array, jumps: Sequence[tuple[
     from limitsets.checker.any_map import possible
 
     tiny, cells = TINY * (edges[-1] - edges[0]), list[tuple[float, float, float]]()
+    left = MOST_IN_ALL + edges.size
     for ends in itertools.pairwise(edges.tolist()):
-        stack, cuts = [ends], 0
+        stack, cuts = [ends], min(MOST_CUTS, left)
+        left -= cuts
         while stack:
             lo, hi = stack.pop()
             piece = the_map.piece([(lo, hi)])
             branches = possible(the_map, side, piece)[0]
             slope = the_map.image[side, branches[0]].bend(piece.balls)[1]
             least, most = (float(each) for each in (slope.abs_lower(), slope.abs_upper()))
-            if len(branches) == 1 and cuts < MOST_CUTS and hi - lo > tiny and not most <= VARIES * least:
+            if len(branches) == 1 and cuts > 0 and hi - lo > tiny and not most <= VARIES * least:
                 stack += [(0.5 * (lo + hi), hi), (lo, 0.5 * (lo + hi))]
-                cuts += 1
+                cuts -= 1
                 continue
             cells.append((lo, hi, most * (hi - lo) if math.isfinite(most) else 0.0))
+        left += cuts
     lo, hi, long = np.array(cells).T
     parts = np.maximum(np.ceil(long / max(LONG * float(long.mean()), tiny)), 1.0).astype(int)
     inner = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(lo, hi, parts.tolist(), strict=True)]
