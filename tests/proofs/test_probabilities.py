@@ -209,6 +209,7 @@ def test_bounds_of_a_step_are_not_below_the_exact_sums():
         step = SimpleNamespace(
             mesh=means.Mesh(np.arange(4.0), np.array([0, 4])),
             scatter=None,
+            narrow=means.NARROW,
             beyond=0.0,
             rows=SimpleNamespace(times=lambda values: np.full(4, mean), off=np.zeros(4)),  # noqa: B023  # called here
             nodes=SimpleNamespace(
