@@ -19,7 +19,7 @@ NARROW = (
 INFLATE = 1.0 + 2.0**-30  # against the roundings of the few operations that make a coefficient or add it up
 FINER = 4  # cells of W for each cell of V
 FINEST = 500.0  # so many of them at most for each reach of the scatter
-MOST_FINER, MOST_MET = 1e7, 5e7  # cells of W, and cells of V that all its nodes meet: memory
+MOST_FINER, MOST_OVERLAPS = 1e7, 5e7  # cells of W, and cells of V that all its nodes meet: memory
 AT_ONCE = 50_000  # ranges shared out to cells at a time
 
 
@@ -218,7 +218,7 @@ class Scatter:
         reach = float(law.reach)
         self.whole = coarse.within(side, y - reach, y + reach)
         met = int((self.whole.last - self.whole.first + 1).sum()) + len(y) * strata
-        prove(met < MOST_MET, "landings scatter over too many cells")
+        prove(met < MOST_OVERLAPS, "landings scatter over too many cells")
         chunks = np.array_split(np.arange(len(y)), len(y) * strata // AT_ONCE + 1)
         self.rows = mean_rows(len(y), coarse, map(spread, chunks))
         # the places y + e are rounded: the ends of a stratum move the mean by its density times that
