@@ -126,21 +126,19 @@ def majorants(
     excess = np.zeros((len(functions), 2))
     for piece in pieces:
         program = the_map.image[piece.side, piece.branch]
-        at, ends = (
-            on_cell(program, piece, piece.ends, ranges),
-            [on_cell(program, piece, (x, x), ranges) for x in piece.ends],
-        )
+        at = on_cell(program, piece, piece.ends, ranges)
+        ends = [on_cell(program, piece, (x, x), ranges) for x in piece.ends]
         for k, (one, bounds) in enumerate(zip(functions, observed, strict=True)):
             for sign, row in enumerate(rows_of(bounds, at, ends)):
-                nodes = [piece.at, piece.at + 1]
                 if not np.isfinite(row).all():
-                    with about(f"side {piece.side}, x in [{piece.ends[0]!r}, {piece.ends[1]!r}]"):
-                        excess[k, sign] += (
-                            pole(program, piece, ranges, sign) if one.word == "lyapunov" else math.inf
-                        )
-                        prove(math.isfinite(excess[k, sign]), "what is averaged has no bound there")
+                    much = pole(program, piece, ranges, sign) if one.word == "lyapunov" else math.inf
+                    where = f"side {piece.side}, x in {list(piece.ends)!r}"
+                    prove(math.isfinite(much), f"{where}: what is averaged has no bound there")
+                    excess[k, sign] += much
                     row = [0.0, 0.0]
-                values[k, sign, nodes] = np.maximum(values[k, sign, nodes], row)
+                values[k, sign, [piece.at, piece.at + 1]] = np.maximum(
+                    values[k, sign, piece.at : piece.at + 2], row
+                )
     values[np.isneginf(values)] = 0.0
     return [
         [Majorant(v, float(much) * INFLATE) for v, much in zip(*pair, strict=True)]

@@ -158,6 +158,7 @@ def figures(numbers: Mapping[str, Any], out: Path) -> None:
     for noise, (lo, hi) in known.items():
         colour = "tab:red" if lo > 0 else "tab:blue" if hi < 0 else "0.6"
         axes.plot([noise, noise], [lo, hi], color=colour, lw=5, solid_capstyle="butt")
+        axes.plot(noise, 0.5 * (lo + hi), ".", color=colour, ms=8)
     curve = axes.plot(list(numbers["sampled"]), list(numbers["sampled"].values()), "k", lw=0.8)
     axes.set_xscale("log")
     axes.set_xlabel("half the width of the noise")

@@ -43,8 +43,8 @@ MOST_STEPS, STILL = 3000, 1e-6
 PATIENCE, SOON = 100, 1e-3
 # A step goes so far towards what it gains, so that nothing swings.
 DAMPED = 0.8
-# The least noise, and the farthest place.
-LEAST, FARTHEST = 1e-90, 2.0**100
+# The least noise.
+LEAST = 1e-90
 # A certificate claims bounds that are wider by this, for the roundings of another machine's sums.
 ALLOWANCE = 1e-9
 
@@ -107,8 +107,10 @@ class LongRunOfMap(Saved):
             (name.replace("_", " "), *outward(lo, hi), hi - lo) for name, (lo, hi) in self.numbers.items()
         ]
         heads = ("average", Column("lo", show=".12g"), Column("hi", show=".12g"), Column("width", show=".2g"))
-        said = f"proved: from every start in {in_words(self.starts)}, almost surely, averages over ever more steps end "
-        said += f"between lo and hi, where steps land within {self.noise:g} of the image, evenly"
+        said = (
+            f"proved: from every start in {in_words(self.starts)}, almost surely, averages over ever more steps end "
+            f"between lo and hi, where steps land within {self.noise:g} of the image, evenly"
+        )
         return (Table(heads, rows, "Averages along orbits with noise", said),)
 
     def __str__(self) -> str:
@@ -162,10 +164,6 @@ def long_run_of_map(
     if not LEAST <= noise < 0.5 * widest:
         room = f"at least {LEAST}, and below {0.5 * widest:.6g}, half of the grid"
         raise AnswerError("the noise", noise, room, "leave it out for averages without noise")
-    if not float(np.abs([grid.domain.lo, grid.domain.hi]).max()) < FARTHEST:
-        raise AnswerError(
-            "the grid", shown(grid), f"numbers below {FARTHEST:.6g}", "choose another unit of x"
-        )
     if grid.domain.closes:
         raise AnswerError("the grid", "an axis that closes", "one that ends", "noise is of lines that end")
     require_checker()
@@ -175,9 +173,11 @@ def long_run_of_map(
     from limitsets.checker.balls import PRECISION, UnprovedError
     from limitsets.checker.laws import uniform_law
     from limitsets.checker.long_run import END_SIGNS
-    from limitsets.checker.map_long_run import ENDS, LongRunOfMap as Claimed, gains_of
+    from limitsets.checker.map_long_run import ENDS, FARTHEST, LongRunOfMap as Claimed, gains_of
     from limitsets.checker.observable import Allowed, read_function
 
+    if not float(np.abs([grid.domain.lo, grid.domain.hi]).max()) < FARTHEST:
+        raise AnswerError("the grid", shown(grid), f"numbers below {FARTHEST:.6g}", "choose a unit of x")
     asked = asked_of_map(of, lower, grid)
     fine = cut_at_changes(lower, upper, grid, asked.jumps, turns=True)
     listed: list[dict[str, Any]] = [
