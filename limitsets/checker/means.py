@@ -13,9 +13,8 @@ from .balls import Array, prove
 from .laws import Law
 
 PAD = 2.0**-40  # more than the roundings of a place, as a share of the largest place
-NARROW = (
-    2.0**-20
-)  # cells below this share of the largest place are those where a function of a scene may jump
+# Cells below this share of the largest place are those where a function of a scene may jump.
+NARROW = 2.0**-20
 INFLATE = 1.0 + 2.0**-30  # against the roundings of the few operations that make a coefficient or add it up
 FINER = 4  # cells of W for each cell of V
 FINEST = 500.0  # so many of them at most for each reach of the scatter
