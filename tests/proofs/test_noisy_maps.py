@@ -246,6 +246,10 @@ def wavy(x):
     return 0.9 * np.sin(2.0 * x)
 
 
+def knoll(x):
+    return 0.2 - 0.4 * x * x
+
+
 TWO_WAYS = ls.map(pieces=(falling, rising), margin=from_0_13)
 WAYS = lambda x: np.where(x > 0.13, rising(x), falling(x))  # noqa: E731
 TO_THE_RIGHT = {"share": [{"side": 0, "box": [[(0.0).hex(), (2.0).hex()]]}]}
@@ -258,6 +262,9 @@ STEPS = {  # the map, its image, what is counted, its values, edges
     ),
     "a jump at a node": (
         ls.map(half), half, TO_THE_RIGHT, lambda x: 1.0 * (x > 0.0), np.linspace(-1.0, 1.0, 5),
+    ),
+    "a turn in a very wide cell": (
+        ls.map(knoll), knoll, {"steps": [[0, 0]]}, np.ones_like, np.array([-1.5, -0.8, 0.8, 1.5]),
     ),
     "a slope that turns": (
         ls.map(wavy), wavy, TO_THE_RIGHT, lambda x: 1.0 * (x > 0.0), np.linspace(-1.6, 1.6, 8),
