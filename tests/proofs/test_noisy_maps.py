@@ -247,7 +247,7 @@ def wavy(x):
 
 
 def knoll(x):
-    return 0.2 - 0.4 * x * x
+    return 0.1 - 0.2 * x * x
 
 
 TWO_WAYS = ls.map(pieces=(falling, rising), margin=from_0_13)
