@@ -16,8 +16,9 @@ from limitsets.base.errors import AnswerError
 from limitsets.checker.any_map import Map, read_map
 from limitsets.checker.balls import PRECISION
 from limitsets.checker.laws import uniform_law
+from limitsets.checker.links import turn_of
 from limitsets.checker.map_long_run import LongRunOfMap, gains_of, pole
-from limitsets.checker.noisy_map import BranchOfCell
+from limitsets.checker.noisy_map import BranchOfCell, steps_from
 from limitsets.checker.observable import Allowed, read_function
 from limitsets.proofs.prover.long_run_of_map import settled
 from tests.proofs.forge import opened
@@ -298,6 +299,16 @@ def test_a_step_is_bounded_at_every_place_of_wide_cells(case, seed):
             mean = (sign * counted(landings) + np.interp(landings, chain.mesh.place, u)).mean(axis=1)
             # of 4000 places the mean is off by less than 1e-3, beside a pole too
             assert (np.interp(x, chain.mesh.place[nodes], bound) > mean - 1e-3).all()
+
+
+def test_the_range_of_a_step_holds_a_turn_inside_the_cell_and_its_bow():
+    # 0.1 - 0.2 x^2 on [-0.8, 0.8]: from -0.028 to 0.1, 0.128 above its chord in the middle
+    with flint.ctx.workprec(PRECISION):
+        (step,) = steps_from(checked(ls.map(knoll)), 0, 1, (-0.8, 0.8), {})
+        row = turn_of(1, 1.6, step.piece.slope, step.piece.bend, (0, *step.range))
+    assert step.range[0] <= -0.028
+    assert step.range[1] >= 0.1
+    assert 0.128 <= row[-1] < 0.13
 
 
 # ---------------------------------------------------------------- poles
