@@ -19,7 +19,7 @@ from limitsets.face.report.pages import as_html, bands, page, starts_words, verd
 from limitsets.face.report.writing import FIGURES, audit_page, write, write as write_report
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scattering import Gaussian, Scattering
-from limitsets.parameters.analysis import GoalOutcome
+from limitsets.parameters.analysis import GoalOutcome, proved_averages
 from tests.assembly.pairs import both_own
 from tests.browsers import Page, browser
 from tests.cli.command import run
@@ -80,6 +80,44 @@ def test_everything_is_written(source, tmp_path):
         assert all(f"{point.x:.6f}" in text for point in points)
     for word in ("nan", "None", "inf ", "{", "}"):
         assert word not in text
+
+
+# Exponent and flips per throw: bounds on 128 000 cells, made apart from this package, and 6e7 throws in floats.
+KNOWN = {"lyapunov": 0.205679, "flips_per_throw": 0.319163}
+
+
+def test_averages_stand_with_their_proved_bounds():
+    found = analysed("paper-designed")
+    (bounds,) = averages = proved_averages(found.scene, found.extents)
+    text = page(found, {}, averages)
+    for name, words_before in (
+        ("lyapunov", "exponent [0-9.]+ per throw"),
+        ("flips_per_throw", "flips per throw"),
+    ):
+        lo, hi = map(float, re.search(rf"{words_before} \(proved: (\S+) to (\S+)\)", text).groups())
+        assert lo <= bounds[name][0] < KNOWN[name] < bounds[name][1] <= hi < lo + 6e-4
+    assert "almost every start" in text
+    assert "not proved, but for the bounds" in text
+    without = page(found, {})
+    assert "(proved:" not in without
+    assert "almost every start" not in without
+
+
+@pytest.mark.parametrize("last", [{0: [(27.0, 27.5)]}, {1: [(27.0, 27.5)]}, {0: [(90.0, 91.0)]}])
+def test_bounds_belong_to_the_limit_sets_in_whose_cells_they_are_proved(last):
+    found = analysed("paper-designed")
+    none, some = proved_averages(found.scene, [{2: [(15.0, 17.0)]} | last, *found.extents])
+    assert none == {}
+    assert set(some) == set(KNOWN)
+
+
+@pytest.mark.parametrize("effects", [{"roll": True, "landing": True}, {"spread": "uniform"}])
+def test_no_bounds_of_averages_with_effects(effects):
+    text = ls.load("paper-designed").as_dict() | {
+        "effects": effects,
+        "world": {"scatter": {"speed": "0.1 %"}},
+    }
+    assert proved_averages(ls.load(text), [{0: [(15.0, 19.0)]}]) == [{}]
 
 
 def test_the_goal_in_words():

@@ -28,6 +28,7 @@ from limitsets.feeder.goals import (
 )
 from limitsets.parameters.analysis import Analysis, GoalOutcome, in_limit_sets
 from limitsets.parameters.fitting.misfit import MOST_MISREAD
+from limitsets.proofs.prover.averages import outward
 from limitsets.proofs.prover.parameters import simulated
 
 if TYPE_CHECKING:
@@ -356,6 +357,7 @@ def environment() -> Environment:
         "first_up": lambda text: text[:1].upper() + text[1:],
         "intervals": intervals,
         "percent": percent,
+        "proved": _proved,
     }
     templates.globals |= {
         "next_command": next_command,
@@ -367,6 +369,11 @@ def environment() -> Environment:
         "void_of": void_of,
     }
     return templates
+
+
+def _proved(bounds: Mapping[str, tuple[float, float]], name: str) -> str:
+    """Write the bounds of an average behind the number that was counted; nothing where there are none."""
+    return " (proved: {!r} to {!r})".format(*outward(*bounds[name])) if name in bounds else ""
 
 
 def words(template: str, figures: Mapping[str, str] | None = None, **answers: Any) -> str:
@@ -395,7 +402,11 @@ def words(template: str, figures: Mapping[str, str] | None = None, **answers: An
     )
 
 
-def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
+def page(
+    analysis: Analysis,
+    figures: Mapping[str, str],
+    averages: Sequence[Mapping[str, tuple[float, float]]] = (),
+) -> str:
     """Write the report.
 
     Parameters
@@ -404,6 +415,8 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
         From `limitsets.analyse`.
     figures : mapping of str to str
         File names of the pictures by kind: "part", "limit-set", "map", "basins", "morse", "flight".
+    averages : sequence of mapping of str to (float, float), optional
+        Per limit set the bounds that `limitsets.analysis.proved_averages` gives.
 
     Returns
     -------
@@ -424,7 +437,8 @@ def page(analysis: Analysis, figures: Mapping[str, str]) -> str:
     # an assumption about the throw; no effect lifts it
     assumed.insert(0 if effects.drive else 1, "it does not tip the part")
     broken = in_limit_sets(analysis.other_vertex_first, analysis.extents)
-    return words("report", figures, analysis=analysis, broken=broken, assumed=assumed) + "\n"
+    told = {"analysis": analysis, "broken": broken, "assumed": assumed, "averages": averages}
+    return words("report", figures, **told) + "\n"
 
 
 # ----------------------------------------------------------------

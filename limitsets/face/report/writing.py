@@ -14,7 +14,7 @@ from limitsets.base import AnswerError, LimitsetsError, Progress, as_json, repla
 from limitsets.face import plot
 from limitsets.face.plot.style import stretch
 from limitsets.face.report.pages import as_html, as_uri, page, percent, words
-from limitsets.parameters.analysis import Analysis
+from limitsets.parameters.analysis import Analysis, proved_averages
 from limitsets.proofs.auditing import Audit, Finding
 from limitsets.systems.maps import FLIP
 
@@ -208,15 +208,13 @@ def write(
                     raise
                 continue  # throws too hard for the model have no flight to draw
             yield kind, shown
-        tell("report.md", len(FIGURES), count)
 
-    return laid(
-        folder,
-        drawn(),
-        lambda figures: {"report.md": page(analysis, figures), "analysis.json": as_json(analysis)},
-        form,
-        html=html,
-    )
+    def texts(figures: dict[str, str]) -> dict[str, str]:
+        tell("report.md", len(FIGURES), count)
+        averages = proved_averages(analysis.scene, analysis.extents)
+        return {"report.md": page(analysis, figures, averages), "analysis.json": as_json(analysis)}
+
+    return laid(folder, drawn(), texts, form, html=html)
 
 
 # ----------------------------------------------------------------

@@ -5,7 +5,13 @@ scene's goal and writes JSON.
 """
 
 from limitsets.parameters.analysis.accuracy import Accuracy, Plan, plan_for
-from limitsets.parameters.analysis.checks import GoalOutcome, Starts, in_limit_sets, other_vertex_first
+from limitsets.parameters.analysis.checks import (
+    GoalOutcome,
+    Starts,
+    in_limit_sets,
+    other_vertex_first,
+    proved_averages,
+)
 from limitsets.parameters.analysis.run import Analysis, analyse
 
 __all__ = [
@@ -18,4 +24,5 @@ __all__ = [
     "in_limit_sets",
     "other_vertex_first",
     "plan_for",
+    "proved_averages",
 ]
