@@ -111,7 +111,7 @@ def test_bounds_belong_to_the_limit_sets_in_whose_cells_they_are_proved(last):
     assert set(some) == set(KNOWN)
 
 
-@pytest.mark.parametrize("effects", [{"roll": True, "landing": True}, {"spread": "uniform"}])
+@pytest.mark.parametrize("effects", [{"roll": True, "landing": True}, {"spread": "bounded"}])
 def test_no_bounds_of_averages_with_effects(effects):
     text = ls.load("paper-designed").as_dict() | {
         "effects": effects,
