@@ -57,6 +57,35 @@ NUMBERS = tuple(f"time on side {side}" for side in range(3))
 NUMBERS += ("share of jog", "time beyond", "mean throws", "95 % throws", "fed", "first beyond is wrong")
 
 
+def test_proved_brackets_stand_beside_the_numbers_and_hold_what_is_thrown():
+    """Some parts leave the arm here, so that the mean of those fed is not the mean of all."""
+    scene, noise, goal = load("paper-initial"), Scattering(landing=Uniform(0.4)), (20.0, 2)
+    found = noise_statistics(
+        scene, noise, goal=goal, cells=64, strata=4, sensitivity=False, seconds=0, brackets=100
+    )
+    many = throw_many(scene, noise, goal, starts_from(scene), throws=500_000, parts=10_000)
+    lost = {"lost": (1.0 - many.numbers["fed"], many.errors["fed"])}
+    counted = {name: (each, many.errors[name]) for name, each in many.numbers.items()} | lost
+    long_run = {*(f"time on side {side}" for side in range(3)), "share of jog", "share of flip"}
+    assert set(found.proved) == {"fed", "lost", "95 % throws", "mean throws"} | long_run
+    for name, (lo, hi) in found.proved.items():
+        number, error = counted[name]
+        assert lo - 4.0 * error <= number <= hi + 4.0 * error, name
+        assert lo < hi < lo + (8.0 if "throws" in name else 0.05), name
+    shown = {row[0]: row[-1] for row in found.table().rows}
+    assert shown == dict.fromkeys(found.numbers) | found.proved
+    record = json.loads(json.dumps(found.to_json()))["numbers"]
+    assert {name: each["proved"] for name, each in record.items() if each["proved"]} == {
+        name: list(pair) for name, pair in found.proved.items()
+    }
+
+
+def test_brackets_without_scatter_of_the_landing_have_no_mean():
+    how = {"goal": GOAL, "cells": 64, "strata": 4, "sensitivity": False, "seconds": 0, "brackets": 24}
+    found = noise_statistics("paper-designed", Scattering(speed=Gaussian(0.01)), **how)
+    assert not {"mean throws", "fed", "lost", "time on side 0"} & set(found.proved)
+
+
 @pytest.mark.sweep
 def test_gaussian_noise_against_throws(gaussian):
     scene = ls.load("paper-designed")

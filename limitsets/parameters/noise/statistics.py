@@ -46,6 +46,7 @@ from limitsets.parameters.noise.absorbing import (
     random_starts,
     with_border,
 )
+from limitsets.parameters.noise.brackets import brackets_beside
 from limitsets.parameters.noise.cell_images import InterpolatedPieces, uses_pieces
 from limitsets.parameters.noise.ulam import STRATA, Transfer, transfer
 from limitsets.systems.cells import Grid
@@ -245,7 +246,7 @@ OF_SLOPES = 5.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NoiseStatistics(ChainSolution, Tabled):
-    """Answers about a noisy scene from the transfer operator; approximations between cells, not proved.
+    """Answers about a noisy scene from the transfer operator, approximations between cells; brackets where asked for.
 
     Attributes
     ----------
@@ -281,6 +282,8 @@ class NoiseStatistics(ChainSolution, Tabled):
         safe side as long as it falls with their width; empty where there was no time for it.
     sensitivity : dict of str to dict of str to LevelSensitivity
         By quantity, then by number; without the quantities that there was no time for.
+    proved : dict of str to (float, float)
+        Proved brackets, by number; empty where they were not asked for.
     how : str
         "sampled".
 
@@ -301,13 +304,21 @@ class NoiseStatistics(ChainSolution, Tabled):
     strata: int
     errors: dict[str, float]
     sensitivity: dict[str, dict[str, LevelSensitivity]]
+    proved: dict[str, tuple[float, float]]
     how: str = "sampled"
 
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
-        rows = [(name, value, self.errors.get(name)) for name, value in self.numbers.items()]
+        rows: list[tuple[Any, ...]] = [
+            (name, each, self.errors.get(name)) for name, each in self.numbers.items()
+        ]
         columns = ("of the noise", Column("value", show=".6g"), Column("change on halving", show=".1e"))
-        return (Table(columns, rows, f"{self.scene}: under noise", how_found(self.how)),)
+        said = how_found(self.how)
+        if self.proved:
+            rows = [(*row, self.proved.get(row[0])) for row in rows]
+            columns += (Column("proved", show=".6f", ends=True),)
+            said += "; brackets are proved: of time and shares from every start in attracting cells, almost surely"
+        return (Table(columns, rows, f"{self.scene}: under noise", said),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the answers as JSON takes them: null, never nan."""
@@ -322,7 +333,8 @@ class NoiseStatistics(ChainSolution, Tabled):
             ends=self.feeding.ends,
             arrived=self.feeding.arrived,
             numbers={
-                name: {"value": value, "error": self.errors.get(name)} for name, value in self.numbers.items()
+                name: {"value": value, "error": self.errors.get(name), "proved": self.proved.get(name)}
+                for name, value in self.numbers.items()
             },
             sensitivity=self.sensitivity,
         )
@@ -355,6 +367,7 @@ def noise_statistics(
     strata: int = STRATA,
     offset: float | None = None,
     sensitivity: bool = True,
+    brackets: int | None = None,
     seconds: float = math.inf,
     progress: Progress | None = None,
 ) -> NoiseStatistics:
@@ -376,6 +389,9 @@ def noise_statistics(
         How far beyond a_i random starts begin; by default a twentieth of the arm [length].
     sensitivity : bool
         Compute the derivatives with respect to the noise of each quantity: six more solutions for each.
+    brackets : int, optional
+        Cells per side for proved brackets of the numbers, of noise with uniform or normal laws in the minimal model:
+        a minute for 600, several for 4000.
     seconds : float
         Errors, then the derivatives by each quantity, are begun only if they are likely to be done by then; the first
         solution takes what it takes.
@@ -389,7 +405,7 @@ def noise_statistics(
     Raises
     ------
     AnswerError
-        For a goal that is none on this arm.
+        For a goal that is none on this arm, or brackets of noise of which nothing is proved.
     SceneError
         For a scene without noise where none is passed, or noise that it cannot have.
 
@@ -428,6 +444,9 @@ def noise_statistics(
         scatter=noise,
         errors=errors,
         sensitivity=slopes,
+        proved={}
+        if brackets is None
+        else brackets_beside(problem.scene, noise, problem.goal, problem.starts, brackets, tell),
     )
 
 
