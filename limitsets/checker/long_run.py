@@ -13,7 +13,8 @@ martingales).  So from every start in N, almost surely, the upper limit of the a
 of g over every stationary law on N (integrate).  For the lower end -g is counted, with a function of its own.
 
 Flips lead from each side to the next, around the part: those from the last side to side 0, counted once for each side,
-are all flips up to a constant.  A flip from the last side counts where it lands: K(u + count) on that side.
+are all flips up to a constant.  A flip from the last side counts where it lands: K(u + count) on that side.  For the
+Lyapunov exponent g is the mean of ln |dx'/dx| (`log_slopes`).
 """
 
 from collections.abc import Callable
@@ -27,18 +28,23 @@ from .brackets import Place, Setting, chain_on, places_in_words, read_setting, r
 from .cells import Progress
 from .file import Arrays, hex_float, read_side, require, rounded, rows, section_alone, table
 from .laws import Law
+from .log_slopes import log_slopes
 from .means import Mesh
 from .steps import Chain
 
-FLIPS, SIDE = "flips", "side"
+FLIPS, EXPONENT, SIDE = "flips", "lyapunov", "side"
+OF_WHAT: dict[str | int, str] = {
+    FLIPS: "flips per throw",
+    EXPONENT: "ln |dx'/dx|, whose average is the Lyapunov exponent",
+}
 END_SIGNS = (-1.0, 1.0)  # of the lower end, and of the upper
 Gain = Callable[[Array], tuple[Array, Array]]
 
 
 class Counted(NamedTuple):
-    """What is averaged: flips, or throws from a side; between which numbers; functions u of both ends."""
+    """What is averaged, flips, the exponent or throws from a side; between which numbers; functions u of both ends."""
 
-    side: int | None
+    of: str | int
     bounds: Pair
     functions: tuple[Array, Array]
 
@@ -69,13 +75,15 @@ def read_long_run(header: dict[str, Any], entries: dict[str, memoryview]) -> Lon
     counted = []
     for k, one in enumerate(rows(section["averages"], "averages", 1, 100)):
         known = table(one, "an average", "of lower upper")
-        side = None if known["of"] == FLIPS else read_side(table(known["of"], "of", SIDE)[SIDE], sides)
+        of = known["of"]
+        if of not in (FLIPS, EXPONENT):
+            of = read_side(table(of, "of", SIDE)[SIDE], sides)
         lo, hi = (hex_float(known[key], f"average {k}: {key}") for key in ("lower", "upper"))
         require(lo <= hi, f"average {k}: the ends do not ascend")
         pair = arrays.read(f"{k}.lower", "<f8"), arrays.read(f"{k}.upper", "<f8")
         alike = all(len(u) == sum(len(each) + 2 for each in edges) for u in pair)
         require(alike, "a function has not one number for each node")
-        counted.append(Counted(side, (lo, hi), pair))
+        counted.append(Counted(of, (lo, hi), pair))
     arrays.require_no_others()
     return LongRun(setting, edges, counted)
 
@@ -90,10 +98,11 @@ def long_run_in_words(c: LongRun) -> list[str]:
         f"    starts, in cells that no throw leaves: {starts}",
     ]
     for one in c.counted:
-        what = "flips per throw" if one.side is None else f"share of throws from side {one.side}"
-        # averages of what is 0 or 1 at each throw
-        ends = rounded(max(one.bounds[0], 0.0), up=False), rounded(min(one.bounds[1], 1.0), up=True)
-        lines.append(f"    {what}: between {ends[0]} and {ends[1]}")
+        what = OF_WHAT.get(one.of, f"share of throws from side {one.of}")
+        lo, hi = one.bounds
+        if one.of != EXPONENT:  # averages of what is 0 or 1 at each throw
+            lo, hi = max(lo, 0.0), min(hi, 1.0)
+        lines.append(f"    {what}: between {rounded(lo, up=False)} and {rounded(hi, up=True)}")
     return lines
 
 
@@ -145,20 +154,30 @@ def nodes_of(kept: Array) -> Array:
     return np.unique(np.concatenate([np.flatnonzero(kept), np.flatnonzero(kept) + 1]))
 
 
-def most_gain(chain: Chain, kept: Array, side: int | None, sign: float) -> Gain:
-    """Give a function that bounds sign g + K u at the nodes of the cells that are kept; and lists these nodes."""
+def most_gain(
+    chain: Chain, kept: Array, of: str | int, sign: float, logs: tuple[Array, Array] | None = None
+) -> Gain:
+    """Give a function that bounds sign g + K u at the nodes of the cells that are kept; and lists these nodes.
+
+    `logs`: the bounds of g for the exponent.
+    """
     mesh = chain.mesh
     sides = len(mesh.first) - 1
     own = np.searchsorted(mesh.first, np.arange(len(mesh.place)), side="right") - 1
     nodes = nodes_of(kept)
     free = np.full(len(mesh.place), -np.inf)
+    own_count = np.zeros(len(mesh.place))
+    if of == EXPONENT and logs is not None:
+        own_count = sign * logs[sign > 0]
+    elif of != FLIPS:
+        own_count = sign * (own == of)
 
     def gain(u: Array) -> tuple[Array, Array]:
         above = chain.above(u, free)
-        if side is not None:
-            return nodes, (above + sign * (own == side))[nodes]
-        flipped = chain.above(u + sign * sides * (own == 0), free)
-        return nodes, np.where(own == sides - 1, flipped, above)[nodes]
+        if of == FLIPS:
+            flipped = chain.above(u + sign * sides * (own == 0), free)
+            return nodes, np.where(own == sides - 1, flipped, above)[nodes]
+        return nodes, above[nodes] + own_count[nodes]
 
     return gain
 
@@ -190,9 +209,13 @@ def check_long_run(c: LongRun, progress: Progress) -> None:
     )
     kept = kept_cells(chain, c.setting.noisy.landing)
     check_starts_stay(c.setting.starts, chain.mesh, kept)
+    logs, size = None, 4.0
+    if any(each.of == EXPONENT for each in c.counted):
+        logs = log_slopes(c.setting.noisy, chain.mesh, kept)
+        size += max(float(np.abs(each[nodes_of(kept)]).max(initial=0.0)) for each in logs)
     for k, one in enumerate(c.counted):
         with about(f"average {k}"):
             for sign, u, end in zip(END_SIGNS, one.functions, one.bounds, strict=True):
-                check_end(sign, u, end, most_gain(chain, kept, one.side, sign))
+                check_end(sign, u, end, most_gain(chain, kept, one.of, sign, logs), size)
     if progress is not None:
         progress(work, work)

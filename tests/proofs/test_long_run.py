@@ -9,12 +9,24 @@ import pytest
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
+from flint import ctx
 from limitsets.robust import Gaussian, Scattering, Uniform, long_run_averages
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
+from limitsets.checker.balls import PRECISION
+from limitsets.checker.brackets import mesh_of, read_setting
 from limitsets.checker.horizon import nothing, worst
-from limitsets.checker.long_run import kept_cells, most_gain
+from limitsets.checker.log_slopes import log_slopes
+from limitsets.checker.long_run import (
+    EXPONENT,
+    FLIPS,
+    Counted,
+    LongRun,
+    kept_cells,
+    long_run_in_words,
+    most_gain,
+)
 from limitsets.checker.means import Mesh
 from tests.proofs.forge import Plain, opened, scene
 
@@ -31,11 +43,11 @@ def honest(designed, tmp_path_factory):
     return designed.save(tmp_path_factory.mktemp("long-run") / "designed.proof.zip")
 
 
-def thrown(model, speed, landing, parts=20_000, throws=400, seed=1):
-    """Flips per throw and shares of the sides, of throws in plain floats, from one part at 10 in on side 2 each."""
+def thrown(model, speed, landing, parts=20_000, throws=250, seed=1):
+    """Flips per throw, shares of sides, exponent: of throws in plain floats, each part from 10 in on side 2."""
     rng, m = np.random.default_rng(seed), Plain(scene(model))
     x, side = np.full(parts, 10.0), np.full(parts, 2)
-    flips, shares, counted = 0, np.zeros(3), 0
+    flips, shares, counted, logs = 0, np.zeros(3), 0, 0.0
     for n in range(throws):
         kappa = m.kappa / (1.0 + speed * rng.uniform(-1.0, 1.0, parts)) ** 2
         after, to = np.empty(parts), side.copy()
@@ -47,22 +59,94 @@ def thrown(model, speed, landing, parts=20_000, throws=400, seed=1):
         if n >= 100:  # none of which remembers where it began
             flips, counted = flips + int((to != side).sum()), counted + parts
             shares += np.bincount(side, minlength=3)
+            logs += sum(float(log_slope(m, i, x[side == i], kappa[side == i]).sum()) for i in range(3))
         x, side = after + landing * rng.uniform(-1.0, 1.0, parts), to
-    return flips / counted, shares / counted
+    return flips / counted, shares / counted, logs / counted
+
+
+def log_slope(m, i, x, kappa):
+    """ln |dx'/dx| by a difference of throws in floats, good to 1e-8."""
+    return np.log(np.abs(m.jog(i, x + 1e-4, kappa) - m.jog(i, x - 1e-4, kappa)) / 2e-4)
 
 
 def test_throws_lie_between_the_bounds(designed):
-    flips, shares = thrown("designed", 0.003, 0.02)
-    error = 5.0 / math.sqrt(20_000 * 300)  # of counts that depend on each other little
+    flips, shares, exponent = thrown("designed", 0.003, 0.02)
+    error = 5.0 / math.sqrt(20_000 * 150)  # of counts that depend on each other little
     sampled = {"flips_per_throw": flips} | {
         f"share_of_side_{k}": share for k, share in enumerate(shares.tolist())
     }
     sampled["jogs_per_visit_of_side_2"] = 3.0 * shares[2] / flips - 1.0
+    sampled["lyapunov"] = exponent
     for name, number in sampled.items():
         lo, hi = designed.numbers[name]
         room = error * (100.0 if name.startswith("jogs") else 1.0)
         assert lo - room < number < hi + room, name
-        assert hi - lo < (0.06 if name == "flips_per_throw" else 0.04 if name.startswith("share") else 2.0)
+        most = {"flips_per_throw": 0.06, "lyapunov": 0.006, "jogs_per_visit_of_side_2": 2.0}
+        assert hi - lo < most.get(name, 0.04)
+
+
+WIDE = [("designed", 0.0, 3.0), ("designed", 0.1, 1e-3), ("initial", 0.05, 0.5)]
+
+
+@pytest.mark.parametrize(("model", "reach", "width"), WIDE)
+def test_the_mean_of_the_logarithm_of_slopes_lies_between_its_bounds(model, reach, width):
+    """On wide cells what is not affine counts, and at a node, with cells that hardly add, what the speed bends."""
+    said = {
+        "scene": scene(model),
+        "absorbing": {"none": [[0, "27 in", None]]},
+        "starts": [[2, "9 in", "10 in"]],
+    }
+    said |= {"laws": {"throw.speed": {"uniform": f"{100 * reach} %"}} if reach else {}, "strata": 8}
+    m, rng = Plain(scene(model)), np.random.default_rng(3)
+    delta, weight = np.polynomial.legendre.leggauss(20)
+    with ctx.workprec(PRECISION):
+        setting = read_setting(said)
+        mesh = mesh_of([np.append(np.arange(6.0, 24.0, width)[:40], 30.0)] * 3, 1000.0)
+        kept = np.zeros(len(mesh.place), dtype=bool)
+        kept[[k for k in range(len(kept)) if 6.0 <= mesh.place[k] < 24.0 and mesh.place[k + 1] < 25.0]] = True
+        below, above = log_slopes(setting.noisy, mesh, kept)
+    for cell in np.flatnonzero(kept).tolist():
+        lo, hi = mesh.place[cell : cell + 2]
+        side = int(np.searchsorted(mesh.first, cell, side="right")) - 1
+        for share in (0.0, 1.0, *rng.uniform(0.0, 1.0, 4)):
+            x, kappa = lo + share * (hi - lo), m.kappa / (1.0 + reach * delta) ** 2
+            mean = float(weight @ log_slope(m, side, np.full(20, x), kappa)) / 2.0
+            low, high = (float(each[cell] + share * (each[cell + 1] - each[cell])) for each in (below, above))
+            assert low - 1e-7 < mean < high + 1e-7
+            assert high - low < 0.002 + reach + 0.05 * width
+
+
+def test_the_upper_end_counts_the_upper_logarithms_and_the_lower_end_the_lower_ones():
+    """Two states, each of which follows the other: the exponent is the mean of the logarithms of both."""
+    chain = States([[0.0, 1.0], [1.0, 0.0]])
+    logs = np.repeat([[-0.7, 0.1], [-0.5, 0.9]], 4, axis=1)
+    for sign, exact in ((-1.0, -0.3), (1.0, 0.2)):
+        nodes, gained = most_gain(chain, chain.kept, EXPONENT, sign, tuple(logs))(np.zeros(8))
+        assert nodes.tolist() == [1, 2, 5, 6]
+        assert gained[::2].sum() / 2.0 == pytest.approx(sign * exact, abs=1e-12)
+
+
+def test_an_exponent_below_0_is_printed_so_and_a_share_is_not(designed):
+    zero = np.zeros(0)
+    said = [Counted(of, (-0.25, 1.5), (zero, zero)) for of in (EXPONENT, FLIPS, 2)]
+    lines = long_run_in_words(LongRun(read_setting(designed.chain.section), [], said))[-3:]
+    assert "exponent: between -0.250000000 and 1.500000000" in lines[0]
+    assert "flips per throw: between 0.000000000 and 1.000000000" in lines[1]
+    assert "from side 2: between 0.000000000 and 1.000000000" in lines[2]
+
+
+def test_where_a_slope_may_be_0_nothing_is_bounded():
+    """From below the joint, as from 1 in, no throw is made."""
+    said = {"scene": scene("designed"), "absorbing": {"none": [[0, "27 in", None]]}, "laws": {}, "strata": 8}
+    with ctx.workprec(PRECISION):
+        setting = read_setting(said | {"starts": [[2, "9 in", "10 in"]]})
+        mesh = mesh_of([np.array([1.0, 6.0, 7.0, 30.0])] * 3, 1000.0)
+        kept = np.zeros(len(mesh.place), dtype=bool)
+        kept[[1, 2]] = True
+        below, above = log_slopes(setting.noisy, mesh, kept)
+    assert below[1] == below[2] == -math.inf
+    assert above[1] == above[2] == math.inf
+    assert -1.0 < below[3] < above[3] < 1.0
 
 
 def test_more_cells_bring_the_bounds_nearer(designed):
@@ -161,7 +245,7 @@ def test_functions_bound_random_chains_as_their_stationary_laws_do(seed):
     on = rng.uniform(0.05, 1.0, n)
     rows = [[(1.0 - on[i]) * (j == i) + on[i] * (j == (i + 1) % n) for j in range(n)] for i in range(n)]
     chain, law = States(rows), stationary(rows)
-    for side, exact in [(None, float(law @ on)), *((k, float(law[k])) for k in range(n))]:
+    for side, exact in [(FLIPS, float(law @ on)), *((k, float(law[k])) for k in range(n))]:
         for sign in (-1.0, 1.0):
             gain = most_gain(chain, chain.kept, side, sign)
             # u of the exact solution of g + K u - u = c
@@ -236,6 +320,9 @@ def exchanged(f):
 
 
 FORGED = {
+    "a narrower exponent": (narrower(4, "upper", -0.6), "average 4: the upper end"),
+    "an exponent from above": (narrower(4, "lower", 0.6), "average 4: the lower end"),
+    "another share as the exponent": (lambda f: section(f)["averages"][1].update(of="lyapunov"), "is proved"),
     "a narrower upper end": (narrower(0, "upper", -0.1), "the upper end"),
     "a narrower lower end": (narrower(1, "lower", 0.1), "the lower end"),
     "no function": (with_functions(0, lambda u: 0.0 * u), "is proved"),
@@ -269,12 +356,10 @@ def test_a_forged_average_is_denied(name, honest, tmp_path):
 
 def test_a_function_so_large_that_sums_overflow_proves_nothing(designed):
     """A hostile reader's file: u = -1.8e308 made sums -inf, below any bound."""
-    from limitsets.checker.brackets import read_setting
-
     steps = designed.chain.steps
     kept = kept_cells(steps, read_setting(designed.chain.section).noisy.landing)
     for size in (-1.797e308, 1.797e308, 1e200, np.nan):
-        _, gained = most_gain(steps, kept, None, 1.0)(np.full(kept.size, size))
+        _, gained = most_gain(steps, kept, FLIPS, 1.0)(np.full(kept.size, size))
         assert np.isnan(gained).all()
     assert np.isnan(worst(steps, np.full(kept.size, -1e300), nothing(steps), 0.0))
 
@@ -306,11 +391,9 @@ def test_another_function_that_holds_is_as_good(honest, tmp_path):
 
 def test_without_a_function_flips_are_at_most_what_one_counts(designed):
     """u = 0: a flip from the last side counts 3, and none from the others."""
-    from limitsets.checker.brackets import read_setting
-
     steps = designed.chain.steps
     kept = kept_cells(steps, read_setting(designed.chain.section).noisy.landing)
-    nodes, gained = most_gain(steps, kept, None, 1.0)(np.zeros(kept.size))
+    nodes, gained = most_gain(steps, kept, FLIPS, 1.0)(np.zeros(kept.size))
     last = nodes >= steps.mesh.first[2]
     assert 0.0 <= gained[~last].max() < 1e-9
     assert 3.0 <= gained[last].max() < 3.1

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from limitsets.base import AnswerError, Progress
+from limitsets.base.arrays import Array
 from limitsets.feeder.scattering import Scattering, Uniform
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.chances.absorption import absorption_brackets
@@ -22,7 +22,7 @@ def brackets_beside(
     scene: Scene,
     scatter: Scattering,
     goal: tuple[float, int],
-    starts: Sequence[float],
+    starts: Array,
     cells: int,
     progress: Progress,
 ) -> dict[str, tuple[float, float]]:
@@ -38,10 +38,12 @@ def brackets_beside(
         A law or an effect of which nothing is proved.
     """
     x = goal[0]
-    laid = [(side, float(lo), x) for side, lo in enumerate(starts) if lo < x]
+    laid = [(side, lo, x) for side, lo in enumerate(starts.tolist()) if lo < x]
     # without scatter of the landing a start next to the joint needs throws without bound
-    how = {"cells": cells, "mean": scatter.landing is not None, "progress": progress}
-    ends = absorption_brackets(scene, scatter, right=goal, starts=laid, **how)
+    mean = scatter.landing is not None
+    ends = absorption_brackets(
+        scene, scatter, right=goal, starts=laid, cells=cells, mean=mean, progress=progress
+    )
     first, last = ends.quantile(0.95, RIGHT)
     # the throws at which the share of the fed, drawn as a line between whole throws, crosses 95 %
     proved = {} if first is None or last is None else {"95 % throws": (max(first - 1.0, 0.0), float(last))}

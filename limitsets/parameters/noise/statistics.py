@@ -312,13 +312,17 @@ class NoiseStatistics(ChainSolution, Tabled):
         rows: list[tuple[Any, ...]] = [
             (name, each, self.errors.get(name)) for name, each in self.numbers.items()
         ]
-        columns = ("of the noise", Column("value", show=".6g"), Column("change on halving", show=".1e"))
+        columns: list[str | Column] = [
+            "of the noise",
+            Column("value", show=".6g"),
+            Column("change on halving", show=".1e"),
+        ]
         said = how_found(self.how)
         if self.proved:
             rows = [(*row, self.proved.get(row[0])) for row in rows]
-            columns += (Column("proved", show=".6f", ends=True),)
+            columns.append(Column("proved", show=".6f", ends=True))
             said += "; brackets are proved: of time and shares from every start in attracting cells, almost surely"
-        return (Table(columns, rows, f"{self.scene}: under noise", said),)
+        return (Table(tuple(columns), rows, f"{self.scene}: under noise", said),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the answers as JSON takes them: null, never nan."""

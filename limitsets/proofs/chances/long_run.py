@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from limitsets.base import (
     AnswerError,
     Column,
@@ -36,6 +38,7 @@ from limitsets.proofs.prover.certificate import pack
 from limitsets.proofs.prover.long_run_of_map import ALLOWANCE, settled, stretches
 
 if TYPE_CHECKING:
+    from limitsets.checker.landings import Noisy
     from limitsets.checker.steps import Chain as Steps
 
 CELLS = 4000
@@ -58,8 +61,8 @@ class LongRunAverages(Tabled):
     starts : tuple of (int, float, float)
         Side, from x, to x: from these no throw leads out [length].
     numbers : dict of str to (float, float)
-        Between which numbers they lie: "flips_per_throw", "share_of_side_0" and so on, "jogs_per_visit_of_side_0" and
-        so on where flips are proved.
+        Between which numbers they lie: "flips_per_throw", "share_of_side_0" and so on, "lyapunov" where the slopes of
+        throws are proved not to be 0, "jogs_per_visit_of_side_0" and so on where flips are proved.
     chain : Chain
         The chain on its cells.
     averages : list of dict
@@ -137,7 +140,8 @@ def long_run_averages(
 ) -> LongRunAverages:
     """Prove between which numbers averages over ever more throws lie, from every start, where throws scatter.
 
-    Flips per throw, the share of throws from each side, and jogs per visit of each side.
+    Flips per throw, the share of throws from each side, jogs per visit of each side, and the Lyapunov exponent: the
+    average of ln |dx'/dx|, by which two parts that are thrown alike drift apart per throw.
 
     Parameters
     ----------
@@ -208,10 +212,12 @@ def long_run_averages(
         raise AnswerError(
             "the starts", begin or "none found", "places that no throw leaves", remedy
         ) from None
-    averages, functions = _bounded(chain, kept, len(read.sides), tell)
+    averages, functions = _bounded(chain, setting.noisy, kept, len(read.sides), tell)
     numbers = {
-        name: (max(float.fromhex(one["lower"]), 0.0), min(float.fromhex(one["upper"]), 1.0))
-        for name, one in averages.items()
+        name: (float.fromhex(one["lower"]), float.fromhex(one["upper"])) for name, one in averages.items()
+    }
+    numbers |= {
+        name: (max(lo, 0.0), min(hi, 1.0)) for name, (lo, hi) in numbers.items() if name != "lyapunov"
     }
     return LongRunAverages(
         read.name, read.unit, noise, tuple(begin), numbers | _jogs(numbers, len(read.sides)), chain=chain,
@@ -220,18 +226,26 @@ def long_run_averages(
 
 
 def _bounded(
-    chain: Chain, kept: Array, sides: int, tell: Progress
+    chain: Chain, noisy: Noisy, kept: Array, sides: int, tell: Progress
 ) -> tuple[dict[str, dict[str, Any]], dict[str, Array]]:
-    """Bound flips and the shares of all sides: by name as a certificate has them, and the functions."""
-    from limitsets.checker.long_run import FLIPS, SIDE, most_gain
+    """Bound all averages: by name as a certificate has them, and the functions."""
+    from flint import ctx
 
-    names = {"flips_per_throw": None} | {f"share_of_side_{k}": k for k in range(sides)}
+    from limitsets.checker.balls import PRECISION
+    from limitsets.checker.log_slopes import log_slopes
+    from limitsets.checker.long_run import EXPONENT, FLIPS, SIDE, most_gain, nodes_of
+
+    names: dict[str, str | int] = {"flips_per_throw": FLIPS} | {f"share_of_side_{k}": k for k in range(sides)}
+    with ctx.workprec(PRECISION):
+        logs = log_slopes(noisy, chain.steps.mesh, kept)
+    if np.isfinite(np.array(logs)[:, nodes_of(kept)]).all():
+        names["lyapunov"] = EXPONENT
     averages, functions = dict[str, dict[str, Any]](), dict[str, Array]()
-    for number, (name, side) in enumerate(names.items()):
-        averages[name] = {"of": FLIPS if side is None else {SIDE: side}}
+    for number, (name, of) in enumerate(names.items()):
+        averages[name] = {"of": {SIDE: of} if isinstance(of, int) else of}
         for k, (sign, word) in enumerate(((-1.0, "lower"), (1.0, "upper"))):
             tell(name, 2 * number + k, 2 * len(names))
-            gain, mesh = most_gain(chain.steps, kept, side, sign), chain.steps.mesh
+            gain, mesh = most_gain(chain.steps, kept, of, sign, logs), chain.steps.mesh
             bound, functions[f"{number}.{word}"] = settled(gain, mesh.place, mesh.first)
             averages[name][word] = (sign * (bound + ALLOWANCE)).hex()
     return averages, functions

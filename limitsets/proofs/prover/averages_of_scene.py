@@ -141,7 +141,7 @@ def averages_of_scene(scene: Scene, of: Any, cells: int | None, progress: Progre
     places = {side: (float(box.lo.a[side]), scene.arm_length) for side in rests}
     asked = asked_for(words, Subject(Nothing(), places, functools.partial(_length, scene), sides or rests))
     if reason := unfit(scene, attractors, "averages"):
-        instead = "limitsets.robust.long_run_averages proves flips and shares of sides where laws are uniform"
+        instead = "limitsets.robust.long_run_averages proves exponent, flips and shares of sides where laws are uniform"
         if box.effects:
             instead = "limitsets.analyse samples them"
         return left(reason if no_cells(attractors.component) else f"{reason}; {instead}")
