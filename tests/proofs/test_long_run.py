@@ -131,8 +131,8 @@ def test_an_exponent_below_0_is_printed_so_and_a_share_is_not(designed):
     said = [Counted(of, (-0.25, 1.5), (zero, zero)) for of in (EXPONENT, FLIPS, 2)]
     lines = long_run_in_words(LongRun(read_setting(designed.chain.section), [], said))[-3:]
     assert "exponent: between -0.25 and 1.5" in lines[0]
-    assert "flips per throw: between 0.0 and 1.0" in lines[1]
-    assert "from side 2: between 0.0 and 1.0" in lines[2]
+    assert "flips per throw: between 0 and 1" in lines[1]
+    assert "from side 2: between 0 and 1" in lines[2]
 
 
 def test_where_a_slope_may_be_0_nothing_is_bounded():
