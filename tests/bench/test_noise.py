@@ -23,7 +23,10 @@ from limitsets.parameters.noise.sampling import ManyParts, scattering_map, throw
 from limitsets.parameters.noise.statistics import noise_statistics
 from limitsets.parameters.noise.ulam import transfer
 from limitsets.proofs.chances.absorption import absorption_brackets
+from limitsets.proofs.chances.long_run import long_run_averages
+from limitsets.proofs.prover.certificate import recheck
 from tests.bench.measure import limit, take_turns, versus
+from tests.proofs.test_long_run import thrown
 
 pytestmark = pytest.mark.bench
 
@@ -213,3 +216,31 @@ def test_the_mean_of_a_normal_law_cut_at_six_sigma_lies_in_its_bracket(table):
     print(f"mean: operator {solved.numbers['mean throws']:.5f}, proved {found.mean}")
     table.append(limit("mean of the normal law, bracket's width", found.mean[1] - found.mean[0], "", None))
     assert found.mean[0] - 0.008 <= solved.numbers["mean throws"] <= found.mean[1] + 0.008
+
+
+# ----------------------------------------------------------------
+# Long-run averages, proved, beside 1e8 throws.
+
+
+def test_1e8_throws_meet_the_long_run_averages(table, tmp_path):
+    scene, begin = ls.load("paper-designed"), perf_counter()
+    proved = long_run_averages(scene, BOTH, cells=4000)
+    table.append(limit("long-run averages of paper-designed, 4000 cells", perf_counter() - begin, "s", None))
+    begin = perf_counter()
+    assert recheck(proved.save(tmp_path / "long.proof.zip", recheck=False)).verdict == "proved"
+    table.append(limit("their recheck", perf_counter() - begin, "s", None))
+    begin, many = perf_counter(), stats.norm.isf(MISS)
+    counted = throw_many(scene, BOTH, GOAL, starts_from(scene), throws=THROWS, parts=100_000)
+    table.append(limit("1e8 throws", perf_counter() - begin, "s", None))
+    names = {"share of flip": "flips_per_throw"} | {
+        f"time on side {k}": f"share_of_side_{k}" for k in range(3)
+    }
+    for name, its in names.items():
+        number, error = counted.numbers[name], many * counted.errors[name]
+        meet(table, name, (number - error, number + error), proved.numbers[its])
+    begin = perf_counter()
+    exponents = np.array([thrown("designed", 0.003, 0.02, seed=seed)[2] for seed in range(8)])
+    error = stats.t.isf(MISS, 7) * exponents.std(ddof=1) / np.sqrt(8)
+    table.append(limit("exponent of 4e7 throws in numpy", perf_counter() - begin, "s", None))
+    sampled = exponents.mean() - error, exponents.mean() + error
+    meet(table, "Lyapunov exponent", sampled, proved.numbers["lyapunov"])
