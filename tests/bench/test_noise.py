@@ -26,7 +26,7 @@ from limitsets.proofs.chances.absorption import absorption_brackets
 from limitsets.proofs.chances.long_run import long_run_averages
 from limitsets.proofs.prover.certificate import recheck
 from tests.bench.measure import limit, take_turns, versus
-from tests.proofs.test_long_run import thrown
+from tests.proofs.test_long_run import thrown as plain_throws
 
 pytestmark = pytest.mark.bench
 
@@ -239,7 +239,7 @@ def test_1e8_throws_meet_the_long_run_averages(table, tmp_path):
         number, error = counted.numbers[name], many * counted.errors[name]
         meet(table, name, (number - error, number + error), proved.numbers[its])
     begin = perf_counter()
-    exponents = np.array([thrown("designed", 0.003, 0.02, seed=seed)[2] for seed in range(8)])
+    exponents = np.array([plain_throws("designed", 0.003, 0.02, seed=seed)[2] for seed in range(8)])
     error = stats.t.isf(MISS, 7) * exponents.std(ddof=1) / np.sqrt(8)
     table.append(limit("exponent of 4e7 throws in numpy", perf_counter() - begin, "s", None))
     sampled = exponents.mean() - error, exponents.mean() + error
