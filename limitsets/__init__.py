@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from limitsets.parameters.noise import noise_statistics as noise_statistics
     from limitsets.parameters.sheet.sheet_run import robustness as robustness
     from limitsets.proofs.auditing import audit as audit
+    from limitsets.proofs.chances.interval_chain import interval_chain as interval_chain
     from limitsets.proofs.policies import feedback as feedback
     from limitsets.proofs.prover import certify as certify
     from limitsets.proofs.prover.averaging import average as average
@@ -88,6 +89,7 @@ _PUBLIC = {
     "fit": "parameters.fitting:fit",
     "formulas": "proofs.prover.programs:formulas",
     "grid": "systems.cells:grid",
+    "interval_chain": "proofs.chances.interval_chain:interval_chain",
     "limit_set": "systems.sets:limit_set",
     "load": "feeder.scene:load",
     "map": "systems.maps.written:map",
@@ -162,6 +164,7 @@ __all__ = [
     "formulas",
     "grid",
     "interval",
+    "interval_chain",
     "limit_set",
     "load",
     "map",
