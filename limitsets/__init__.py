@@ -164,7 +164,6 @@ __all__ = [
     "formulas",
     "grid",
     "interval",
-    "interval_chain",
     "limit_set",
     "load",
     "map",
