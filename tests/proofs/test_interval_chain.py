@@ -3,6 +3,7 @@
 import math
 import re
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.feeder.scattering import Gaussian, Scattering, Uniform, thrown
+from limitsets.proofs.chances.interval_chain import _throws
 from limitsets.systems.maps import advance
 from tests.closed_forms import ladder
 
@@ -139,15 +141,16 @@ def test_a_cell_whose_images_meet_the_middle_of_a_target_is_bounded_by_the_large
     assert most[0] == pytest.approx([1.0, 0.8 / 1.8], abs=NEAR)  # what leaves at either end is added up
 
 
-def test_starts_are_shared_out_by_length(walk):
-    (begin,) = walk.labels["init"]
-    least, most = walk.lower[[begin]].toarray()[0], walk.upper[[begin]].toarray()[0]
-    ends = np.array([cell[1:] if cell else (2.0, 2.0) for cell in walk.cells])
-    share = np.clip(np.minimum(ends[:, 1], 0.5) - np.maximum(ends[:, 0], 0.0), 0.0, None) / 0.5
-    np.testing.assert_allclose(least, share, atol=1e-12)
-    np.testing.assert_allclose(most, share, atol=1e-12)
-    assert (least <= share).all()
-    assert (share <= most).all()
+def test_starts_are_shared_out_by_length():
+    line, starts = ls.grid([(-1.0, 1.0)], cells=8), [(0, -0.8, -0.5), (0, 0.1, 0.6)]
+    chain = ls.interval_chain(ls.map(half), line, noise=0.5, starts=starts)
+    assert chain.labels["init"].tolist() == [0]
+    # lengths 0.3 and 0.5 of 0.8: cells from -0.75, from 0.5, and so on
+    share = np.array([0, 0.05, 0.25, 0, 0, 0.15, 0.25, 0.1, 0, 0]) / 0.8
+    least, most = dense(chain)
+    np.testing.assert_allclose(least[0], share, atol=1e-12)
+    np.testing.assert_allclose(most[0], share, atol=1e-12)
+    assert (least[0] <= share).all()
 
 
 # ---------------------------------------------------------------- every point of a cell
@@ -176,6 +179,24 @@ def test_steps_of_a_map_from_random_places_lie_within_bounds(two_pieces):
         assert (true <= most[k] + 1e-12).all()
 
 
+def test_throws_of_a_cell_are_wider_by_what_is_not_proved():
+    """A cell by hand: deviations from -1 to 1 in four parts, the border at 0.25 and up to 0.4 off."""
+    links = SimpleNamespace(
+        start=10,
+        deltas=np.array([-1.0, 1.0]),
+        place=np.array([[0.0, 2.0], [1.0, 3.0]]),
+        law=SimpleNamespace(most=0.5),
+        noisy=SimpleNamespace(far=0.0),
+        branch_of=lambda cell: SimpleNamespace(cut=(0.25, 0.25), gap=0.2, below=0, above=1),
+        range_of=lambda flips, lo, hi: (2 * flips, lo - 7.0 * flips, hi - 7.0 * flips),
+    )
+    # all throws lie from -0.5 to 3.5: half more than those of the nodes
+    rows = _throws(links, (10, 0.0, 0, -0.5, 3.5, 0, 0.0, 0.0), 0.1)
+    jogs = [(10, 0.25, 0, 0.5 * k - 0.5, 0.5 * k + 2.0, k == 0, 0.1) for k in range(4)]
+    flips = [(10, 0.25, 2, 0.5 * k - 7.5, 0.5 * k - 5.0, 0.0, 0.1) for k in (1, 2, 3)]
+    np.testing.assert_allclose(rows, [*jogs, *flips], atol=1e-12)
+
+
 def mean_shares(scene, side, x, speeds, e, bounds):
     """By place the shares of one throw from x in cells of all sides, over even deviations of the speed."""
     total, at = np.zeros((x.size, len(bounds))), thrown(scene.map)
@@ -187,18 +208,30 @@ def mean_shares(scene, side, x, speeds, e, bounds):
     return total / len(speeds)
 
 
-def test_throws_from_random_places_lie_within_bounds(designed):
-    scene, random, count = ls.load("paper-designed"), np.random.default_rng(5), 500
-    (least, most), e = dense(designed), 0.3
-    own = [(k, cell) for k, cell in enumerate(designed.cells) if cell and cell[2] - cell[1] > 1e-3]
+@pytest.fixture(scope="module")
+def coarse():
+    """Cells so wide, and speeds so different, that the border of the branches is far from its chord."""
+    noise = Scattering(speed=Uniform(0.04), landing=Uniform(0.02))
+    return ls.interval_chain("paper-designed", noise, right=(20.5, 2), wrong=20.5, cells=24)
+
+
+@pytest.mark.parametrize(("name", "bound", "e"), [("designed", 0.003, 0.3), ("coarse", 0.04, 0.02)])
+def test_throws_from_random_places_lie_within_bounds(name, bound, e, request):
+    chain, scene, random, count = (
+        request.getfixturevalue(name),
+        ls.load("paper-designed"),
+        np.random.default_rng(5),
+        2000,
+    )
+    least, most = dense(chain)
+    own = [(k, cell) for k, cell in enumerate(chain.cells) if cell and cell[2] - cell[1] > 1e-3]
     own = [(k, cell) for k, cell in own if cell[1] > scene.sides.a[cell[0]] + 0.1]
-    states = {name: int(some[0]) for name, some in designed.labels.items()}
-    speeds = 0.003 * (2.0 * (np.arange(count) + 0.5) / count - 1.0)
+    states = {label: int(some[0]) for label, some in chain.labels.items()}
+    speeds = bound * (2.0 * (np.arange(count) + 0.5) / count - 1.0)
     # behind the cells: the places that absorb, then what lies off the arm
-    far = [(side, 20.5, 28.0) for side in range(3)]
-    bounds = [cell for _, cell in own] + far
+    bounds = [cell for _, cell in own] + [(side, 20.5, 28.0) for side in range(3)]
     # cells from which some throws jog and some flip, and random ones
-    on = np.array([cell[0] if cell else -1 for cell in designed.cells])
+    on = np.array([cell[0] if cell else -1 for cell in chain.cells])
     both = [
         k
         for k, (state, (side, *_)) in enumerate(own)
@@ -206,17 +239,18 @@ def test_throws_from_random_places_lie_within_bounds(designed):
     ]
     assert len(both) >= 2
     assert min(least[own[k][0]].sum() for k in both) < 0.9  # which branch is open for some speeds
-    for k in {*both, *random.choice(len(own), 40, replace=False).tolist()}:
+    for k in {*both, *random.choice(len(own), 30, replace=False).tolist()}:
         state, (side, lo, hi) = own[k]
         x = random.uniform(lo, hi, 8)
         true = mean_shares(scene, np.full(8, side), x, speeds, e, bounds)
         wrong, right = true[:, -3] + true[:, -2], true[:, -1]
         columns = [*(number for number, _ in own), states["wrong"], states["right"]]
         true = np.column_stack([true[:, :-3], wrong, right])
-        assert (least[state, columns] <= true + 1e-4).all()  # the mean over the speed is a sum of 500
-        assert (true <= most[state, columns] + 1e-4).all()
+        near = 1.0 / count  # a sum of so many in place of the mean over the speed
+        assert (least[state, columns] <= true + near).all()
+        assert (true <= most[state, columns] + near).all()
         rest = 1.0 - true.sum(axis=1)  # the exits, and cells next to the joint
-        assert (least[state, states["exits"]] <= rest + 1e-4).all()
+        assert (least[state, states["exits"]] <= rest + near).all()
 
 
 def test_a_map_without_a_bound_leads_anywhere():
