@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from limitsets.parameters.noise import noise_statistics as noise_statistics
     from limitsets.parameters.sheet.sheet_run import robustness as robustness
     from limitsets.proofs.auditing import audit as audit
-    from limitsets.proofs.chances.interval_chain import interval_chain as interval_chain
     from limitsets.proofs.policies import feedback as feedback
     from limitsets.proofs.prover import certify as certify
     from limitsets.proofs.prover.averaging import average as average
