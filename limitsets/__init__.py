@@ -88,6 +88,7 @@ _PUBLIC = {
     "fit": "parameters.fitting:fit",
     "formulas": "proofs.prover.programs:formulas",
     "grid": "systems.cells:grid",
+    "interval_chain": "proofs.chances.interval_chain:interval_chain",
     "limit_set": "systems.sets:limit_set",
     "load": "feeder.scene:load",
     "map": "systems.maps.written:map",

@@ -8,7 +8,10 @@ import warnings
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
+
+from tests.closed_forms import ladder
 
 # ----------------------------------------------------------------
 # Every study runs, and says what it is expected to say.
@@ -226,6 +229,46 @@ def test_the_tables_of_chaos_are_those_expected():
         assert f"| {name} | {' | '.join(told)} |" in text
     for noise, (lo, hi) in expected["order"].items():
         assert f"| {noise} | {lo:.4f} to {hi:.4f} |" in text
+
+
+# P(x >= 18 in) after 0, 1, ... jogs of paper-designed-small-angle, from 15 to 16 in, each landing within 0.05 in
+LADDER = ladder((4.4179581, 1.0 + 2.0 / 48.6228609), (15.0, 16.0), 0.05, 18.0, 7)
+
+
+def stored_rows(case):
+    """What is stored of Storm's bounds, by the number of cells."""
+    return {int(cells): row for cells, row in expected_of("16_exchange")[case]["cells"].items()}
+
+
+def test_the_bounds_of_storm_hold_the_exact_values_and_meet_ours():
+    walk = 2.0 - np.cos(0.5) / (1.0 - np.sin(0.5))
+    for case, exact in (("walk", walk), ("ladder", LADDER[5]), ("feeder", None)):
+        for row in stored_rows(case).values():
+            lo, hi = row["storm"]["bounds"]
+            least, most = row.get("ours", (lo, hi))
+            assert max(lo, least) <= min(hi, most)
+            assert exact is None or (lo <= exact <= hi and least <= exact <= most)
+            assert row["storm"]["version"] == "2.0.0"
+            assert row["storm"]["states"] == row["states"]
+
+
+def test_exchange_without_storm_is_as_stored(tmp_path):
+    study = load_study("16_exchange")
+    numbers = study.main(out=tmp_path, walks=(100,), ladders=(300,), feeders=(250,))
+    assert numbers["ladder"]["exact"] == pytest.approx(LADDER[5], abs=1e-9)
+    assert not list(tmp_path.iterdir())  # no figure without Storm
+    for case, one in numbers.items():
+        for cells, row in one["cells"].items():
+            stored = stored_rows(case)[cells]
+            assert (row["states"], row["storm"]) == (stored["states"], None)
+            assert row.get("ours") == pytest.approx(stored.get("ours"), abs=1e-6)
+    study.figure(expected_of("16_exchange"), tmp_path)
+    assert (tmp_path / "widths.png").stat().st_size > 20_000
+
+
+def test_the_table_of_exchange_is_that_of_the_stored_numbers():
+    stored = {name: one for name, one in expected_of("16_exchange").items() if name != "command"}
+    assert load_study("16_exchange").table(stored) in readme_of("16_exchange")
 
 
 # ----------------------------------------------------------------

@@ -229,8 +229,8 @@ def absorption_brackets(
     guard()
     read = load(scene) if isinstance(scene, str) else scene
     noise = scattering_of(read) if scatter is None else scatter
-    places = _places(read, right, wrong, absorbing)
-    begin = tuple(_default_starts(read, right) if starts is None else starts)
+    places = absorbing_places(read, right, wrong, absorbing)
+    begin = tuple(default_starts(read, right) if starts is None else starts)
     require_places(read, "a start", begin)
     tell = progress or (lambda stage, done, total: None)
     from limitsets.checker.brackets import brackets_of
@@ -272,7 +272,7 @@ def _told(tell: Callable[[int, int], None], of: int, done: int) -> None:
     tell(done, of)
 
 
-def _places(
+def absorbing_places(
     scene: Scene,
     right: tuple[float, int] | None,
     wrong: float | None,
@@ -299,7 +299,8 @@ def _places(
     return absorbers
 
 
-def _default_starts(scene: Scene, right: tuple[float, int] | None) -> list[Place]:
+def default_starts(scene: Scene, right: tuple[float, int] | None) -> list[Place]:
+    """Give the starts where none are named: on every side from a twentieth of the arm beyond a_i to x of `right`."""
     if right is None:
         raise AnswerError("the starts", "none", "(side, from x, to x)", "pass starts=[...], or `right`")
     x = float(right[0])

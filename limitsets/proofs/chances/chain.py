@@ -91,12 +91,31 @@ def chain_of(
         A throw with effects, a law or a quantity of which nothing is proved, kappa so small that the impact may have
         several solutions, places that overlap; or python-flint is not installed.
     """
-    _require_known(scene, scatter)
     require_checker()
     import flint
 
     from limitsets.checker.balls import PRECISION
-    from limitsets.checker.brackets import chain_on, read_setting
+    from limitsets.checker.brackets import chain_on
+
+    with flint.ctx.workprec(PRECISION):
+        section, setting, nodes = setting_of(scene, scatter, starts, absorbing, cells)
+        steps, row = chain_on(setting, [nodes.place[nodes.of_side(k)] for k in range(len(scene.sides))], told)
+    return Chain(section, nodes, steps, row)
+
+
+def setting_of(
+    scene: Scene,
+    scatter: Scattering,
+    starts: Sequence[Place],
+    absorbing: Mapping[str, Sequence[Place]],
+    cells: int,
+) -> tuple[dict[str, Any], Setting, Nodes]:
+    """Say of which chain is spoken, as a certificate and as the checker has it, and spread its cells.
+
+    To be called with the checker's precision; refuses what `chain_of` refuses.
+    """
+    _require_known(scene, scatter)
+    from limitsets.checker.brackets import read_setting
     from limitsets.checker.file import BadFileError
 
     section: dict[str, Any] = {
@@ -107,14 +126,11 @@ def chain_of(
         "absorbing": {name: in_words(each, scene.unit) for name, each in absorbing.items()},
         "strata": STRATA,
     }
-    with flint.ctx.workprec(PRECISION):
-        try:
-            setting = read_setting(section)
-        except BadFileError as error:
-            raise AnswerError("the chain", scene.name, "one that the checker takes", str(error)) from None
-        nodes = _nodes_on_arm(scene, setting, absorbing, cells)
-        steps, row = chain_on(setting, [nodes.place[nodes.of_side(k)] for k in range(len(scene.sides))], told)
-    return Chain(section, nodes, steps, row)
+    try:
+        setting = read_setting(section)
+    except BadFileError as error:
+        raise AnswerError("the chain", scene.name, "one that the checker takes", str(error)) from None
+    return section, setting, _nodes_on_arm(scene, setting, absorbing, cells)
 
 
 def require_places(scene: Scene, thing: str, places: Sequence[Place]) -> None:

@@ -159,34 +159,24 @@ def long_run_of_map(
         Noise that is not above 0, an axis that closes, functions without a bound, or cells that steps leave.
     """
     begun, tell = time.perf_counter(), progress or silent
-    require_corners(lower, upper)
-    widest = float((grid.domain.hi - grid.domain.lo).max())
-    if not LEAST <= noise < 0.5 * widest:
-        room = f"at least {LEAST}, and below {0.5 * widest:.6g}, half of the grid"
-        raise AnswerError("the noise", noise, room, "leave it out for averages without noise")
-    if grid.domain.closes:
-        raise AnswerError("the grid", "an axis that closes", "one that ends", "noise is of lines that end")
-    require_checker()
+    require_noise(lower, upper, grid, noise, "leave it out for averages without noise")
     import flint
 
-    from limitsets.checker.any_map import Map, read_map, read_parameters
     from limitsets.checker.balls import PRECISION, UnprovedError
     from limitsets.checker.laws import uniform_law
     from limitsets.checker.long_run import END_SIGNS
-    from limitsets.checker.map_long_run import ENDS, FARTHEST, LongRunOfMap as Claimed, gains_of
+    from limitsets.checker.map_long_run import ENDS, LongRunOfMap as Claimed, gains_of
     from limitsets.checker.observable import Allowed, read_function
 
-    if not float(np.abs([grid.domain.lo, grid.domain.hi]).max()) < FARTHEST:
-        raise AnswerError("the grid", shown(grid), f"numbers below {FARTHEST:.6g}", "choose a unit of x")
     asked = asked_of_map(of, lower, grid)
     fine = cut_at_changes(lower, upper, grid, asked.jumps, turns=True)
     listed: list[dict[str, Any]] = [
         {"of": one.section} | {end: [(0.0).hex()] for end in ENDS} for one in asked.functions
     ]
     with flint.ctx.workprec(PRECISION):
-        shape = read_map(recorded_map(lower, grid.sides) | {"periodic": periods_of(grid.domain)})
-        the_map = Map(shape, read_parameters(parameters_of(lower, upper), shape.names, "the map"))
-        allowed, unknown = Allowed(shape.sides, shape.branches, shape.names), [np.zeros(0)] * 3
+        the_map = as_checked(lower, upper, grid)
+        shape, unknown = the_map.shape, [np.zeros(0)] * 3
+        allowed = Allowed(shape.sides, shape.branches, shape.names)
         functions = [read_function(one, [0], allowed, "the function", unknown) for one in listed]
         tell("cells", 0, 1)
         edges = [refined(the_map, side, axes[0], asked.jumps) for side, axes in enumerate(fine.edges)]
@@ -222,6 +212,30 @@ def long_run_of_map(
         lower, upper, fine, noise, tuple(starts), numbers=numbers, section=section, arrays=arrays,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
+
+
+def require_noise(lower: Any, upper: Any, grid: Grid, noise: float | None, without: str) -> None:
+    """Refuse what is no map of a line on a grid that ends, with steps that land within `noise` of the image."""
+    require_corners(lower, upper)
+    widest = float((grid.domain.hi - grid.domain.lo).max())
+    if noise is None or not LEAST <= noise < 0.5 * widest:
+        room = f"at least {LEAST}, and below {0.5 * widest:.6g}, half of the grid"
+        raise AnswerError("the noise", noise, room, without)
+    if grid.domain.closes:
+        raise AnswerError("the grid", "an axis that closes", "one that ends", "noise is of lines that end")
+    require_checker()
+    from limitsets.checker.map_long_run import FARTHEST
+
+    if not float(np.abs([grid.domain.lo, grid.domain.hi]).max()) < FARTHEST:
+        raise AnswerError("the grid", shown(grid), f"numbers below {FARTHEST:.6g}", "choose a unit of x")
+
+
+def as_checked(lower: Any, upper: Any, grid: Grid) -> CheckedMap:
+    """Give a map as the checker has it; to be called with its precision."""
+    from limitsets.checker.any_map import Map, read_map, read_parameters
+
+    shape = read_map(recorded_map(lower, grid.sides) | {"periodic": periods_of(grid.domain)})
+    return Map(shape, read_parameters(parameters_of(lower, upper), shape.names, "the map"))
 
 
 def refined(the_map: CheckedMap, side: int, edges: Array, jumps: Sequence[tuple[int, float]]) -> Array:
