@@ -229,6 +229,8 @@ def absorption_brackets(
     guard()
     read = load(scene) if isinstance(scene, str) else scene
     noise = scattering_of(read) if scatter is None else scatter
+    if cells < 1:
+        raise AnswerError("the cells per side", cells, "1 or more", f"leave it out: {CELLS}")
     places = absorbing_places(read, right, wrong, absorbing)
     begin = tuple(default_starts(read, right) if starts is None else starts)
     require_places(read, "a start", begin)
