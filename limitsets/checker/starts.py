@@ -122,8 +122,8 @@ def require_fitting(starts: Starts, goal: dict[str, Any], almost: bool, points: 
     """Require that the parts of a claim about starts fit each other and the goal; `points` are the fixed points."""
     kind = starts.kind
     anywhere = goal["anywhere"] and goal["kind"] != "attracts_all"  # which is about every start anyway
-    lossy = ("from", "from_foot", "cells")
-    require(starts.lost is None or kind in lossy, f"starts {kind}: none of them are lost")
+    lossy = kind in ("from", "from_foot", "cells") and not starts.only
+    require(starts.lost is None or lossy, f"starts {kind}: none of them are lost")
     require(kind != "from_foot" or starts.near is None, "starts from the foot on have no near_joint")
     if kind in ("every", "almost-every"):
         near = (starts.near is not None or anywhere) and not any(points)
@@ -149,7 +149,11 @@ def check_starts(c: Cells, scene: Scene, goal: dict[str, Any], starts: Starts) -
     itself and to lower ranks, while each jog from it moves the part one way by more than the landing scatters.  What is
     left, Z, has to thin out, rank by rank; and starts of length zero have to come from starts of length zero only.
     """
-    if starts.only:
+    if starts.only:  # of starts elsewhere a file says no more than where they creep
+        for side in range(len(c.edges)):
+            if starts.near is not None and starts.fixed(side) is not None:
+                q, points = starts.near
+                check_near_joint(c, scene, side, check_below_cells, q[side], points[side])
         return
     almost = goal["kind"] == "reaches" and not goal["every"]
     creeps = goal["kind"] == "attracts_all" and starts.near is not None and any(starts.near[1])

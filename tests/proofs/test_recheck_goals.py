@@ -139,6 +139,22 @@ def test_a_goal_about_all_starts_needs_all_cells_and_the_joint(good, tmp_path, s
     assert (report.verdict, report.starts) == ("proved-on-cells", "cells")
 
 
+def test_what_becomes_of_other_starts_is_checked_where_only_attracting_cells_are_claimed(good, tmp_path):
+    """Such files once printed that all other starts are lost, or creep to the joint, and counted them as explained."""
+    cells = with_goal(good, reaches(22, False, 400) | {"starts": "cells"})
+    assert verdict(cells, tmp_path).verdict == "proved-on-cells"
+    creep = cells.copy()
+    for each in creep.header["claims"][0]["section"]["near_joint"].values():
+        each["fixed_point"] = [(24.0).hex(), (24.5).hex()]
+    report = verdict(creep, tmp_path)
+    assert (report.verdict, "the arm's surface is not above the joint" in report.reason) == ("failed", True)
+    lost = cells.copy()
+    section = lost.header["claims"][0]["section"]
+    section["lost"] = dict.fromkeys(section.pop("near_joint"), (25.0).hex())
+    report = verdict(lost, tmp_path)
+    assert (report.verdict, "none of them are lost" in report.reason) == ("bad file", True)
+
+
 def test_components_are_not_joined_by_their_number(good, tmp_path):
     """A cell that none of the others leads to is no part of their component, though mapped into it."""
     f = with_goal(good, {"kind": "attracts_all"})
