@@ -331,6 +331,7 @@ HALF = ls.map(half)
         (("paper-designed", LINE), {"right": (20.5, 2)}, "Scattering"),
         (("paper-designed", LANDING), {"right": (20.5, 2), "noise": 0.1}, "beside a scene"),
         (("paper-designed", LANDING), {}, "starts"),
+        (("paper-designed", LANDING), {"right": (20.5, 2), "cells": 0}, "1 or more"),
         (("paper-designed", LANDING), {"right": (20.5, 2), "absorbing": {"a b": [(0, 5.0, 6.0)]}}, "labels"),
         (("paper-designed", LANDING), {"right": (20.5, 2), "starts": [(7, 5.0, 6.0)]}, "a start"),
         ((HALF, LINE), {}, "the noise"),

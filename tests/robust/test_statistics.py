@@ -84,7 +84,7 @@ def test_brackets_without_scatter_of_the_landing_have_no_mean():
     how = {"goal": GOAL, "cells": 64, "strata": 4, "sensitivity": False, "seconds": 0, "brackets": 24}
     found = noise_statistics("paper-designed", Scattering(speed=Gaussian(0.01)), **how)
     assert not {"mean throws", "fed", "lost", "time on side 0"} & set(found.proved)
-    with pytest.raises(AnswerError, match="cells per side is 0; allowed: 1 or more"):
+    with pytest.raises(AnswerError, match="bracket is 0; allowed: 1 or more"):
         noise_statistics("paper-designed", Scattering(speed=Gaussian(0.01)), **how | {"brackets": 0})
 
 

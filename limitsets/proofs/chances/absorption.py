@@ -22,6 +22,7 @@ from limitsets.feeder.scattering import Scattering, scattering_of, starts_from
 from limitsets.numbers.interval import guard
 from limitsets.proofs.chances.chain import EXITS, Chain, Place, chain_of, require_places, write
 from limitsets.proofs.chances.forever import forever
+from limitsets.proofs.prover.certifying import require_cells
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
@@ -229,8 +230,7 @@ def absorption_brackets(
     guard()
     read = load(scene) if isinstance(scene, str) else scene
     noise = scattering_of(read) if scatter is None else scatter
-    if cells < 1:
-        raise AnswerError("the cells per side", cells, "1 or more", f"leave it out: {CELLS}")
+    require_cells(cells, "absorption bracket")
     places = absorbing_places(read, right, wrong, absorbing)
     begin = tuple(default_starts(read, right) if starts is None else starts)
     require_places(read, "a start", begin)

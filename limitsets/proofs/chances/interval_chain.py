@@ -35,7 +35,7 @@ from limitsets.proofs.chances.absorption import absorbing_places, default_starts
 from limitsets.proofs.chances.chain import EXITS, Place, require_places, setting_of
 from limitsets.proofs.prover.averages_of_map import cut_at_changes
 from limitsets.proofs.prover.certificate import require_checker
-from limitsets.proofs.prover.certifying import require_map, require_none
+from limitsets.proofs.prover.certifying import require_cells, require_map, require_none
 from limitsets.proofs.prover.long_run_of_map import as_checked, require_noise
 from limitsets.systems.cells import Grid
 from limitsets.systems.maps import coerce
@@ -219,6 +219,7 @@ def interval_chain(
         else {"upper": upper, "noise": noise}
     )
     require_none(other, "interval_chain", f"beside {kind}")
+    require_cells(cells, "interval chain")
     if not all(name.isidentifier() and name.isascii() and name not in TAKEN for name in names):
         allowed = f"letters, digits and _, none of {', '.join(TAKEN)}"
         raise AnswerError("the names of absorbing places", ", ".join(names), allowed, "they become labels")

@@ -35,6 +35,7 @@ from limitsets.numbers.interval import guard
 from limitsets.proofs.chances.chain import Chain, Place, chain_of, edges_of, in_words, require_places
 from limitsets.proofs.prover import certify
 from limitsets.proofs.prover.certificate import pack
+from limitsets.proofs.prover.certifying import require_cells
 from limitsets.proofs.prover.long_run_of_map import ALLOWANCE, settled, stretches
 
 if TYPE_CHECKING:
@@ -183,8 +184,7 @@ def long_run_averages(
     if "cavity" in read.text:
         remedy = "leave [cavity] out: parts that fall into it make no more throws"
         raise AnswerError("the scene", read.name, "one without a cavity", remedy)
-    if cells < 1:
-        raise AnswerError("the cells per side", cells, "1 or more", f"leave it out: {CELLS}")
+    require_cells(cells, "average")
     begin = list(_around(read, noise) if starts is None else starts)
     require_places(read, "a start", begin)
     nodes, total = 0, len(read.sides) * cells
