@@ -48,6 +48,7 @@ The files follow docs/certificates.md, and each imports only from those before i
     links        what a step needs of every cell, and the chain of it             20, 21
     brackets     a claim of probabilities, and its brackets                       22, "Probabilities"
     long_run     averages of a noisy chain over ever more throws                  "Long-run averages"
+    policy_chances  throws of a policy in the mean, and parts that come           "Chances of a policy"
     any_map      the map of a file, and one cell of it
     map_cells    the cells, their labels
     map_cycles   periodic orbits, and balls around them

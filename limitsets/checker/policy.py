@@ -35,6 +35,7 @@ STOP = NO_STATE = -1  # no throw; no state: the answer cannot come, or the part 
 MOST_STATES = 100_000
 MOST_CHOICES = 16  # throws to choose from
 MODES = ("stop", "catch")
+OF_GAME = "scene mode goal starts first"
 IMAGES = (("jog", "<i4"), ("flip", "<i4"), ("phi", "<f8"))
 NAME_OF_THROW = r"[^\x00-\x1f\x7f]{1,64}"
 
@@ -55,8 +56,8 @@ class Choice(NamedTuple):
     scene: Scene
 
 
-class Policy(NamedTuple):
-    """The content of a file: read, and not yet believed."""
+class Game(NamedTuple):
+    """What is played, and the states to begin in."""
 
     raw: dict[str, Any]
     noise: object
@@ -65,25 +66,46 @@ class Policy(NamedTuple):
     mode: str
     x: Quantity
     side: int
-    starts: list[tuple[int, float, float]]
-    within: int
     first: list[int]  # by answer the state to begin in
-    cells: list[Cells]  # of each throw: the same borders, other images
-    throw: Array
-    left: Array
-    after: Array
-    belief: Array  # state, first and last cell
 
     def at(self, where: Quantity) -> Fraction:
         """Give a place in the unit of the arm's length."""
         return where.lo / LENGTHS[self.choices[0].scene.unit]
 
 
+class Policy(NamedTuple):
+    """The content of a file: read, and not yet believed."""
+
+    game: Game
+    starts: list[tuple[int, float, float]]
+    within: int
+    cells: list[Cells]  # of each throw: the same borders, other images
+    throw: Array
+    left: Array
+    after: Array
+    belief: Array  # state, first and last cell
+
+    @property
+    def raw(self) -> dict[str, Any]:
+        """The scene as the file has it."""
+        return self.game.raw
+
+
 def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Policy:
     """Read a file; raises BadFileError."""
-    keys, nothing = "scene mode goal starts within first", "a policy has no boxes and no tolerance"
-    section = section_alone(header, "policy", "a policy", keys, nothing, noisy=True)
-    raw, noise = section["scene"], header["noise"]
+    nothing = "a policy has no boxes and no tolerance"
+    section = section_alone(header, "policy", "a policy", f"{OF_GAME} within", nothing, noisy=True)
+    game = read_game(section, header["noise"])
+    within = whole_number(section["within"], 0, 10**17, "within is not a number of throws")
+    n_sides, answers = len(game.choices[0].scene.sides), len(game.first)
+    cells, own = read_arrays(header["arrays"], entries, len(game.choices), n_sides, answers)
+    starts = [read_start(row, n_sides) for row in rows(section["starts"], "starts", 1, MOST_STATES)]
+    return Policy(game, starts, within, cells, *own)
+
+
+def read_game(section: dict[str, Any], noise: object) -> Game:
+    """Read what is played: the throws to choose from, the question, where the part is wanted, and the beginning."""
+    raw = section["scene"]
     require(isinstance(raw, dict) and "feedback" in raw, "the scene has no feedback")
     require("goal" not in raw, "the scene has a goal of its own")
     has = table(raw["feedback"], "feedback", "throws", "sensor")
@@ -96,14 +118,11 @@ def read_policy(header: dict[str, Any], entries: dict[str, memoryview]) -> Polic
     mode = section["mode"]
     require(mode in MODES, "mode is neither stop nor catch")
     check_cavity(raw, mode, x)
-    within = whole_number(section["within"], 0, 10**17, "within is not a number of throws")
     words = ["any"] if sensor.side is None and sensor.place is None else ["yes", "no"]
     begin = table(section["first"], "first", " ".join(words))
     first = [NO_STATE if begin[word] is None else begin[word] for word in words]
     require(all(type(k) is int for k in first), "first holds no number of a state")
-    cells, own = read_arrays(header["arrays"], entries, len(choices), n_sides, len(words))
-    starts = [read_start(row, n_sides) for row in rows(section["starts"], "starts", 1, MOST_STATES)]
-    return Policy(raw, noise, choices, sensor, mode, x, side, starts, within, first, cells, *own)
+    return Game(raw, noise, choices, sensor, mode, x, side, first)
 
 
 def read_choice(value: object, raw: dict[str, Any], noise: object) -> Choice:
@@ -180,40 +199,54 @@ def read_arrays(
                 phi=phi,
             )
         )
-    throw, left, after = array("throw", "<i4"), array("left", "<i4"), array("after", "<i4", answers)
-    belief = array("belief", "<i4", 3)
+    own, belief = read_table(arrays, answers), array("belief", "<i4", 3)
+    arrays.require_no_others()
+    return cells, (*own, belief)
+
+
+def read_table(arrays: Arrays, answers: int) -> tuple[Array, Array, Array]:
+    """Read by state the throw, the throws left, and by answer the state after it."""
+    throw, left = arrays.read("throw", "<i4"), arrays.read("left", "<i4")
+    after = arrays.read("after", "<i4", answers)
     require(0 < len(throw) <= MOST_STATES, "there are no states, or too many")
     require(len(throw) == len(left) == len(after), "the table does not have one row for each state")
-    arrays.require_no_others()
-    return cells, (throw, left, after.reshape(len(throw), answers), belief)
+    return throw, left, after.reshape(len(throw), answers)
 
 
 def policy_in_words(policy: Policy) -> list[str]:
     """Say what is claimed."""
-    there = f"on side {policy.side} at x >= {policy.x}"
+    game = policy.game
+    there = f"on side {game.side} at x >= {game.x}"
     ends = {
         "stop": f"is brought to lie {there}, and the controller, which stops then, knows it",
-        "catch": f"comes to rest {there}, where it is caught, and nowhere before at x >= {policy.x} on another side",
-    }[policy.mode]
-    noisy = "for every sequence of throws, " if policy.noise is not None else ""
+        "catch": f"comes to rest {there}, where it is caught, and nowhere before at x >= {game.x} on another side",
+    }[game.mode]
+    noisy = "for every sequence of throws, " if game.noise is not None else ""
     starts = "; ".join(
         f"side {side}: [{rounded(lo, up=True)}, {rounded(hi, up=False)}]"
         for side, lo, hi in policy.starts[:12]
     )
-    caught = f" (those at x < {policy.x}: the others are caught at once)" if policy.mode == "catch" else ""
+    caught = f" (those at x < {game.x}: the others are caught at once)" if game.mode == "catch" else ""
     more = " ..." if len(policy.starts) > 12 else ""
     return [
         f"policy: {noisy}from every start named the part {ends}, after {policy.within} throws at most (an upper bound)",
         f"starts{caught}: {starts}{more}",
-        "throws to choose from: " + "; ".join(f"{each.name}: {each.given}" for each in policy.choices),
-        f"asked before the first throw and after each: {question_in_words(policy)}",
-        f"states of the policy: {len(policy.throw)}",
+        *table_in_words(game, len(policy.throw)),
     ]
 
 
-def question_in_words(policy: Policy) -> str:
+def table_in_words(game: Game, states: int) -> list[str]:
+    """Say what a table chooses from, what it asks, and how large it is."""
+    return [
+        "throws to choose from: " + "; ".join(f"{each.name}: {each.given}" for each in game.choices),
+        f"asked before the first throw and after each: {question_in_words(game)}",
+        f"states of the policy: {states}",
+    ]
+
+
+def question_in_words(game: Game) -> str:
     """Say what the sensor is asked, and how well it answers."""
-    sensor = policy.sensor
+    sensor = game.sensor
     if sensor.place is not None and sensor.error is not None:
         accuracy = (
             f", where it is farther from there than {sensor.error}; nearer any answer"
@@ -239,18 +272,17 @@ class Board(NamedTuple):
     lost: Array
 
 
-def board_of(policy: Policy) -> Board:
+def board_of(game: Game, c: Cells) -> Board:
     """Compare the borders of the cells with the places of sensor and goal, as exact numbers."""
-    c = policy.cells[0]
-    x, on = policy.at(policy.x), c.side == policy.side
+    x, on = game.at(game.x), c.side == game.side
     won = on & np.array([Fraction(value) >= x for value in c.lower().tolist()], dtype=bool)
-    lost = ~on & beyond(c.upper(), x) & (policy.mode == "catch")
-    place, error = policy.sensor.place, policy.sensor.error
+    lost = ~on & beyond(c.upper(), x) & (game.mode == "catch")
+    place, error = game.sensor.place, game.sensor.error
     if place is not None and error is not None:
-        nearest, farthest = policy.at(place) - policy.at(error), policy.at(place) + policy.at(error)
+        nearest, farthest = game.at(place) - game.at(error), game.at(place) + game.at(error)
         return Board([beyond(c.upper(), nearest), ~beyond(c.lower(), farthest)], won, lost)
-    if policy.sensor.side is not None:
-        asked = c.side == policy.sensor.side
+    if game.sensor.side is not None:
+        asked = c.side == game.sensor.side
         return Board([asked, ~asked], won, lost)
     return Board([np.ones(len(on), dtype=bool)], won, lost)
 
@@ -263,9 +295,9 @@ def beyond(values: Array, limit: Fraction) -> Array:
 def check_policy(policy: Policy) -> list[Array]:
     """Check the table; return by throw the cells from which it is made: the images that the table rests on."""
     check_ranges(policy)
-    board = board_of(policy)
+    board = board_of(policy.game, policy.cells[0])
     check_begin(policy, board)
-    made = [np.zeros(len(board.won), dtype=bool) for _ in policy.choices]
+    made = [np.zeros(len(board.won), dtype=bool) for _ in policy.game.choices]
     for state in range(len(policy.throw)):
         with about(f"state {state}"):
             check_state(policy, board, state)
@@ -277,21 +309,27 @@ def check_policy(policy: Policy) -> list[Array]:
 def check_ranges(policy: Policy) -> None:
     """Check that all numbers of states, throws and cells are those of one."""
     n, states = len(policy.cells[0].side), len(policy.throw)
-    sides = policy.choices[0].scene.sides
+    sides = policy.game.choices[0].scene.sides
     on = all(arb(float(e[0])) > s.a for e, s in zip(policy.cells[0].edges, sides, strict=True))
     prove(on, "the cells begin left of a: a part there has left the arm")
+    check_table(policy.game, policy.throw, policy.left, policy.after)
     state, first, last = policy.belief.T
     for good, what in (
-        (
-            ((policy.throw >= STOP) & (policy.throw < len(policy.choices))),
-            "a throw is none of those to choose from",
-        ),
-        (((policy.after >= NO_STATE) & (policy.after < states)), "a next state is none"),
-        (policy.left >= 0, "a number of throws left is negative"),
         ((state >= 0) & (state < states), "a belief is that of no state"),
         (np.diff(state) >= 0, "the beliefs are not in the order of the states"),
         ((first >= 0) & (first <= last) & (last < n), "a belief names cells that are none"),
-        (np.array([NO_STATE <= k < states for k in policy.first]), "the state to begin in is none"),
+    ):
+        prove(bool(good.all()), what)
+
+
+def check_table(game: Game, throw: Array, left: Array, after: Array) -> None:
+    """Check that all numbers of states and throws are those of one."""
+    states = len(throw)
+    for good, what in (
+        (((throw >= STOP) & (throw < len(game.choices))), "a throw is none of those to choose from"),
+        (((after >= NO_STATE) & (after < states)), "a next state is none"),
+        (left >= 0, "a number of throws left is negative"),
+        (np.array([NO_STATE <= k < states for k in game.first]), "the state to begin in is none"),
     ):
         prove(bool(good.all()), what)
 
@@ -316,9 +354,9 @@ def check_begin(policy: Policy, board: Board) -> None:
         prove(on, f"the starts [{lo!r}, {hi!r}] on side {side} do not lie on the cells")
         inside = (c.upper() > lo) & (c.lower() < hi) if lo < hi else (c.upper() >= lo) & (c.lower() <= hi)
         begin |= (c.side == side) & inside
-    caught = policy.mode == "catch" and (begin & beyond(c.upper(), policy.at(policy.x))).any()
+    caught = policy.game.mode == "catch" and (begin & beyond(c.upper(), policy.game.at(policy.game.x))).any()
     prove(not caught, "parts in some of the starts are caught at once")
-    for answer, state in zip(board.answers, policy.first, strict=True):
+    for answer, state in zip(board.answers, policy.game.first, strict=True):
         held = holds_all(policy, state, begin & answer)
         prove(held, "the state to begin in does not hold all starts with its answer")
         enough = state == NO_STATE or policy.left[state] <= policy.within
@@ -332,7 +370,7 @@ def check_state(policy: Policy, board: Board, state: int) -> None:
     """
     throw, belief = int(policy.throw[state]), mask_of(policy, state)
     if throw == STOP:
-        known = policy.mode == "stop" and not (belief & ~board.won).any()
+        known = policy.game.mode == "stop" and not (belief & ~board.won).any()
         prove(known, "it stops where the part may lie off the goal region")
         return
     c = policy.cells[throw]
@@ -342,7 +380,7 @@ def check_state(policy: Policy, board: Board, state: int) -> None:
         c.prove_all(~belief | inside | none, "its target cells are not those of one side")
     image = targets_of([c.jog, c.flip], belief)
     prove(not (image & board.lost).any(), "its throw may bring the part down on a wrong side")
-    if policy.mode == "catch":
+    if policy.game.mode == "catch":
         image &= ~board.won
     prove(bool(policy.left[state] >= 1), "it throws, and no throw is left")
     for answer, after in zip(board.answers, policy.after[state].tolist(), strict=True):
@@ -354,6 +392,6 @@ def check_state(policy: Policy, board: Board, state: int) -> None:
 
 def check_images(policy: Policy, number: int, made: Array, crew: Crew) -> None:
     """Check decision, landing and image of every cell from which one of the throws is made."""
-    c, choice = policy.cells[number], policy.choices[number]
+    c, choice = policy.cells[number], policy.game.choices[number]
     tasks = tasks_of(c, choice.scene, number, np.flatnonzero(made), None)
     crew.run(lambda cell: f"the throw {choice.name}, {c.name(cell)}", tasks)

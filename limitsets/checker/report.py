@@ -56,6 +56,12 @@ from .plane import (
     read_plane,
 )
 from .policy import Policy, check_images, check_policy, policy_in_words, read_policy
+from .policy_chances import (
+    PolicyChances,
+    check_policy_chances,
+    policy_chances_in_words,
+    read_policy_chances,
+)
 from .region import check_region_cell
 from .scene import (
     Scene,
@@ -333,7 +339,9 @@ def describe_scene(report: Report, raw: dict[str, Any], noise: object, alone: st
     """Say what a file relies on, and of which scene it is; `alone`: its claim, where that stands alone."""
     tell_model(report, raw, noise)
     for name, value in quantities(raw):
-        if alone != "policy" or not name.startswith("throw."):  # its throws are those to choose from
+        if not alone.startswith("policy") or not name.startswith(
+            "throw."
+        ):  # its throws are those to choose from
             report.parameters[plain(name)] = value_in_words(value, name)
 
 
@@ -365,7 +373,13 @@ def recheck_long_run(c: LongRun, _: int, progress: Progress, report: Report) -> 
     check_long_run(c, progress)
 
 
-def describe_chain(c: Chances | LongRun, report: Report, statement: list[str]) -> None:
+def recheck_policy_chances(c: PolicyChances, _: int, progress: Progress, report: Report) -> None:
+    """Check what a policy's table leads to, and fill in the report."""
+    describe_chain(c, report, policy_chances_in_words(c))
+    check_policy_chances(c, progress)
+
+
+def describe_chain(c: Chances | LongRun | PolicyChances, report: Report, statement: list[str]) -> None:
     """Say what is claimed of a noisy chain, and its laws."""
     for name, (word, text) in c.setting.laws.items():
         said = "uniform, within" if word == UNIFORM else "normal, with a standard deviation of"
@@ -378,11 +392,11 @@ def describe_chain(c: Chances | LongRun, report: Report, statement: list[str]) -
 
 def recheck_policy(policy: Policy, workers: int, progress: Progress, report: Report) -> None:
     """Check a policy, and fill in the report."""
-    report.parameters["noise (at every throw)"] = noise_in_words(policy.noise)
+    report.parameters["noise (at every throw)"] = noise_in_words(policy.game.noise)
     report.cells = len(policy.cells[0].side)
     report.statement = policy_in_words(policy)
     made = check_policy(policy)
-    setup = scene_of_box, [each.scene.raw for each in policy.choices], policy.noise
+    setup = scene_of_box, [each.scene.raw for each in policy.game.choices], policy.game.noise
     with crew_of(report, setup, workers, progress, sum(int(some.sum()) for some in made)) as crew:
         for number, some in enumerate(made):
             check_images(policy, number, some, crew)
@@ -390,9 +404,14 @@ def recheck_policy(policy: Policy, workers: int, progress: Progress, report: Rep
 
 ALONE: dict[str, tuple[Callable[..., Any], Callable[..., None], Callable[[Any], object]]] = {
     "region": (read_plane, recheck_plane, lambda _: None),
-    "policy": (read_policy, recheck_policy, lambda policy: policy.noise),
+    "policy": (read_policy, recheck_policy, lambda policy: policy.game.noise),
     "probabilities": (read_chances, recheck_chances, lambda chances: bounds_of_laws(chances.setting.laws)),
     "long-run": (read_long_run, recheck_long_run, lambda claim: bounds_of_laws(claim.setting.laws)),
+    "policy-chances": (
+        read_policy_chances,
+        recheck_policy_chances,
+        lambda claim: bounds_of_laws(claim.setting.laws),
+    ),
 }
 """The claims that stand alone in a file: how each is read and checked, and the noise that it has."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from contextlib import suppress
@@ -227,3 +228,8 @@ def said_of(written: dict[str, Any] | None, missing: str, *, partly: bool = Fals
     left = ", of what is proved only" if partly else ""
     done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
     return [f"certificate: {file}{left}, {done} (check it: {proposed('recheck', file)})"]
+
+
+def outward(low: float, high: float) -> str:
+    """Write a proved bracket, rounded outward."""
+    return f"{math.floor(low * 1e6) / 1e6:.6f} to {math.ceil(high * 1e6) / 1e6:.6f}"

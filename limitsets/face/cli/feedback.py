@@ -9,11 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import limitsets as ls
 from limitsets.base import LimitsetsError, Table
 from limitsets.face import report
-from limitsets.face.cli.arguments import certified, deviations, goal_at, named, place, places_of, said_of
+from limitsets.face.cli.arguments import (
+    certified,
+    deviations,
+    goal_at,
+    named,
+    outward,
+    place,
+    places_of,
+    said_of,
+)
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
 
 if TYPE_CHECKING:
-    from limitsets.proofs.policies import Synthesis
+    from limitsets.proofs.policies import PolicyChances, Synthesis
 
 
 @command(form=True)
@@ -35,6 +44,7 @@ def feedback(
     noise: Words = None,
     seconds: Annotated[float, limits(min=0.0)] = 60.0,
     parts: Annotated[int, limits(min=1)] = 10_000,
+    brackets: Annotated[int | None, limits(min=8, max=100_000)] = None,
     certificate: Path | None = None,
     no_recheck: bool = False,
 ) -> Answer:
@@ -72,12 +82,14 @@ def feedback(
         The most time of a search.
     parts : N
         Parts thrown by the policy.
+    brackets : N
+        Prove the mean number of throws and how many come, where deviations are even, on N cells per side.
     certificate : FILE
         Write the policy's certificate, NAME.proof.zip.
     out : DIR
         Write feedback.json, policy.csv and a figure there.
     """
-    from limitsets.proofs.policies import places
+    from limitsets.proofs.policies import places, policy_chances
     from limitsets.proofs.policies.simulation import simulate
 
     chosen = run.opened(scene)
@@ -104,9 +116,13 @@ def feedback(
         synthesis, certificate, "policy", proved=synthesis.solved, recheck=not no_recheck
     )
     thrown = simulate(synthesis, parts) if synthesis.solved else None
+    proved = None
+    if brackets is not None and synthesis.solved:
+        proved = policy_chances(synthesis, cells=brackets, progress=run.tell)
     record = synthesis.to_json() | {
         "certificate": written,
         "simulated": thrown,
+        "brackets": proved,
         "places": [{"x": x, "verdict": each.found.verdict, "within": each.found.throws} for x, each in tried],
     }
     solved = synthesis.found.policy is not None
@@ -120,6 +136,7 @@ def feedback(
             *_question(synthesis, tried),
             *said_of(written, "there is no policy"),
             *_policy(synthesis, thrown),
+            *_proved(proved),
         ],
         synthesis.table if synthesis.solved else None,
         code=0 if synthesis.solved else 1,
@@ -187,6 +204,15 @@ def _policy(synthesis: Synthesis, thrown: Any) -> Iterator[str | Table]:
         yield (
             f"thrown: {thrown.reached} of {thrown.parts} came, in {thrown.mean:.3g} throws on average{timed}{more}"
         )
+
+
+def _proved(proved: PolicyChances | None) -> Iterator[str]:
+    """Put proved brackets in words, rounded outward."""
+    if proved is not None:
+        scattered = proved.scatter.given()
+        laws = "where deviations are equally likely within the noise" if scattered else "without noise"
+        mean, come = (outward(*pair) for pair in (proved.mean, proved.come))
+        yield f"PROVED {laws}: {mean} throws on average; the part comes with a probability of {come}"
 
 
 def _named_states(after: dict[str, int | None], word: str) -> str:

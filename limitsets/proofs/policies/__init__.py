@@ -4,6 +4,7 @@
 feeder with the table ``[feedback]``; its images enclose those of every point and every noise ("boxes").
 """
 
+from limitsets.proofs.policies.chances import PolicyChances, policy_chances
 from limitsets.proofs.policies.game import Game, game_of, image_of
 from limitsets.proofs.policies.policy import Found, Policy, broken, search
 from limitsets.proofs.policies.synthesis import Synthesis, feedback, places
@@ -12,11 +13,13 @@ __all__ = [
     "Found",
     "Game",
     "Policy",
+    "PolicyChances",
     "Synthesis",
     "broken",
     "feedback",
     "game_of",
     "image_of",
     "places",
+    "policy_chances",
     "search",
 ]

@@ -43,6 +43,19 @@ def write(
     workers: int | None,
 ) -> Path:
     """Write it, replacing an older file whole."""
+    require_minimal(board)
+    spans = [[side, lo.hex(), hi.hex()] for side, parts in board.starts.extents().items() for lo, hi in parts]
+    within = max((int(policy.left[k]) for k in policy.first if k != NONE), default=0)
+    section = game_section(board, sensor, policy) | {"starts": spans, "within": within}
+    claims = [{"claim": "policy", "section": section}]
+    held = table_arrays(policy) | _beliefs(policy) | _of_throws(board, policy)
+    model = section["scene"]["model"]
+    pack(path, model, claims, held, noise=board.noise, recheck=recheck, workers=workers)
+    return Path(path)
+
+
+def require_minimal(board: Board) -> None:
+    """Refuse effects, of which nothing is rechecked."""
     if any(box.effects for box in board.throws.values()):
         raise AnswerError(
             "the certificate",
@@ -50,21 +63,17 @@ def write(
             "the minimal model, and noise",
             "nothing rechecks other maps; the policy stands in .found and .to_json()",
         )
-    model = {"flight": board.scene.flight, "flip": board.scene.flip}
+
+
+def game_section(board: Board, sensor: Sensor | None, policy: Policy) -> dict[str, Any]:
+    """Say what is played, and the states to begin in, as certificates have it."""
     x, side = board.goal
-    spans = [[side, lo.hex(), hi.hex()] for side, parts in board.starts.extents().items() for lo, hi in parts]
-    section = {
-        "scene": _scene(board, sensor) | {"model": model},
+    return {
+        "scene": _scene(board, sensor) | {"model": {"flight": board.scene.flight, "flip": board.scene.flip}},
         "mode": board.mode,
         "goal": {"x": f"{exact_text(x)} {board.scene.unit}", "side": side},
-        "starts": spans,
-        "within": max((int(policy.left[k]) for k in policy.first if k != NONE), default=0),
         "first": policy.to_json()["first"],
     }
-    claims = [{"claim": "policy", "section": section}]
-    held = _of_policy(policy) | _of_throws(board, policy)
-    pack(path, model, claims, held, noise=board.noise, recheck=recheck, workers=workers)
-    return Path(path)
 
 
 def _scene(board: Board, sensor: Sensor | None) -> dict[str, Any]:
@@ -83,18 +92,22 @@ def _scene(board: Board, sensor: Sensor | None) -> dict[str, Any]:
     return text
 
 
-def _of_policy(policy: Policy) -> Arrays:
-    """Write the table: what is thrown in each state, what comes after, and where the part may lie (ranges of cells)."""
-    edge = np.zeros((policy.states, 1), dtype=bool)
-    steps = np.diff(np.concatenate([edge, policy.belief, edge], axis=1).astype(np.int8), axis=1)
-    state, first = np.nonzero(steps == 1)
-    _, past = np.nonzero(steps == -1)
+def table_arrays(policy: Policy) -> Arrays:
+    """Write the table: what is thrown in each state, and what comes after."""
     return {
         "throw": policy.throw.astype(np.int32),
         "left": policy.left.astype(np.int32),
         "after": policy.after.astype(np.int32).squeeze(axis=1 if len(policy.answers) == 1 else ()),
-        "belief": np.stack([state, first, past - 1], axis=1).astype(np.int32),
     }
+
+
+def _beliefs(policy: Policy) -> Arrays:
+    """Write where the part may lie in each state, as ranges of cells."""
+    edge = np.zeros((policy.states, 1), dtype=bool)
+    steps = np.diff(np.concatenate([edge, policy.belief, edge], axis=1).astype(np.int8), axis=1)
+    state, first = np.nonzero(steps == 1)
+    _, past = np.nonzero(steps == -1)
+    return {"belief": np.stack([state, first, past - 1], axis=1).astype(np.int32)}
 
 
 def _of_throws(board: Board, policy: Policy) -> Arrays:
