@@ -124,10 +124,10 @@ class Map:
     """A map for one box of parameters."""
 
     def __init__(self, shape: Shape, parameters: dict[str, tuple[str, str]]):
-        self.shape, self.dimension = shape, shape.dimension
+        self.shape, self.dimension, self.parameters = shape, shape.dimension, parameters
         self.periods = [[period_of(text) for text in axes] for axes in shape.periods]  # by side and axis
         values = {n: number(lo, n).union(number(hi, n)) for n, (lo, hi) in parameters.items()}
-        wide = [name for name, (lo, hi) in parameters.items() if lo != hi]
+        self.wide = wide = [name for name, (lo, hi) in parameters.items() if lo != hi]
         self.ranges = [floats_around(values[name]) for name in wide]
         self.program_of = functools.partial(Program, dimension=self.dimension, values=values, wide=wide)
         self.image = {key: self.program_of(f) for key, f in shape.images.items()}

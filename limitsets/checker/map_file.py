@@ -23,7 +23,7 @@ from .file import (
 )
 from .map_cells import MapCells
 from .map_cycles import Begins, Listed, read_begins, read_cycles
-from .map_long_run import OF_LONG_RUN, read_long_run_of_map
+from .map_long_run import MORE_OF_LONG_RUN, OF_LONG_RUN, read_long_run_of_map
 from .map_orbits import Every, read_every
 from .map_plane import ParameterAxis, RegionPlace, read_axes, read_region_boxes
 from .observable import KEYS as OF_AVERAGES, Allowed, read_average
@@ -137,7 +137,8 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     known = {name: section for name, section in claims.items() if name in CLAIMS_OF_MAP}
     for name, section in known.items():
         more = " begins" if name == "cycles" and shape.closes else ""
-        table(section, f"{where}: section of {name}", CLAIMS_OF_MAP[name] + more)
+        optional = MORE_OF_LONG_RUN if name == "long-run" else ""
+        table(section, f"{where}: section of {name}", CLAIMS_OF_MAP[name] + more, optional)
     rechecked = not shape.closes or not {"all-cycles", "escapes"} & set(known)
     require(
         rechecked, f"{where}: this checker knows neither all-cycles nor escapes beside axes with a period"

@@ -17,12 +17,12 @@ from flint import arb
 from .any_map import Map
 from .balls import ONE, ZERO, Arb, Array, about, prove
 from .brackets import Place
-from .file import Arrays, read_box, read_side, require, rows, table
+from .file import Arrays, decimal, read_box, read_side, require, rows, table
 from .landings import upper
 from .laws import Law, uniform_law
 from .long_run import END_SIGNS, Gain, check_end, check_starts_stay, kept_cells, nodes_of
 from .means import INFLATE
-from .noisy_map import BranchOfCell, chain_of_map
+from .noisy_map import BranchOfCell, Stratum, Varied, chain_of_map, strata_of
 from .observable import (
     Allowed,
     Averaged,
@@ -33,10 +33,12 @@ from .observable import (
     observed_of,
     read_function,
 )
-from .program import Program, rational
+from .program import Program, named, rational
 from .steps import Chain
 
 OF_LONG_RUN = "landing starts functions"
+MORE_OF_LONG_RUN = "varied"
+STRATA = (1, 2, 4, 8, 16, 32, 64)
 ENDS = ("lower", "upper")
 MOST_NODES_OF_MAP, FARTHEST = 2_000_000, 2.0**100
 
@@ -46,6 +48,7 @@ class LongRunOfMap(NamedTuple):
 
     landing: str
     law: Law
+    varied: Varied | None
     starts: list[Place]
     edges: list[Array]
     functions: list[Averaged]  # `lower` and `upper` are the functions u
@@ -65,7 +68,9 @@ def read_long_run_of_map(
 ) -> LongRunOfMap:
     """Read the claim of a box of parameters."""
     bound = rational(section["landing"], f"{where}: landing")
-    require(0 < bound < FARTHEST, f"{where}: landing is not above 0, or too large")
+    varied = read_varied(section["varied"], allowed.names, where) if "varied" in section else None
+    fits = 0 < bound < FARTHEST or (bound == 0 and varied is not None)  # where a parameter varies
+    require(fits, f"{where}: landing is not above 0, or too large")
     edges = [arrays.read(f"{prefix}nodes.{side}", "<f8") for side in range(allowed.sides)]
     sound = all(
         len(e) >= 4 and bool((np.diff(e) > 0).all()) and float(np.abs(e).max()) < FARTHEST for e in edges
@@ -91,13 +96,28 @@ def read_long_run_of_map(
         )
         for k, one in enumerate(listed)
     ]
-    return LongRunOfMap(section["landing"], uniform_law(bound, 1), starts, edges, functions)
+    return LongRunOfMap(section["landing"], uniform_law(bound, 1), varied, starts, edges, functions)
+
+
+def read_varied(value: object, names: list[str], where: str) -> Varied:
+    """Read which parameter varies at every step."""
+    known = table(value, f"{where}: varied", "name within strata")
+    bound = rational(known["within"], f"{where}: varied")
+    named_one = known["name"] in names and type(known["strata"]) is int and known["strata"] in STRATA
+    require(named_one and bound > 0, f"{where}: what varies is no parameter, or its bound or strata are none")
+    return Varied(known["name"], bound, known["strata"])
 
 
 def long_run_of_map_in_words(c: LongRunOfMap) -> Iterator[str]:
     """Put the claim in words."""
     places = ", ".join(f"[{float(lo)!r}, {float(hi)!r}] of side {side}" for side, lo, hi in c.starts)
-    yield f"steps land within {c.landing} of f(x), evenly and independent of each other; from every start in {places}"
+    laws = [] if c.law.certain else [f"steps land within {c.landing} of f(x), evenly"]
+    if c.varied is not None:
+        bound = decimal(c.varied.bound)
+        laws.append(
+            f"at every step {named(c.varied.name)} deviates by at most {bound} from its value, evenly"
+        )
+    yield f"{'; '.join(laws)}; deviations are independent of each other; from every start in {places}"
     yield "almost surely averages over n steps, counted from the first landing on, lie in the end between the two"
     for one in c.functions:
         lo, hi = known_bounds(one, 0)
@@ -117,13 +137,28 @@ class Majorant(NamedTuple):
 
 
 def majorants(
-    the_map: Map, chain: Chain, pieces: list[BranchOfCell], functions: list[Averaged]
+    chain: Chain, strata: list[Stratum], pieces: list[list[BranchOfCell]], functions: list[Averaged]
 ) -> list[list[Majorant]]:
-    """Bound what is counted from above, by function and sign: its negative for the lower end."""
+    """Bound what is counted from above, by function and sign, its negative for the lower end."""
+    values = np.zeros((len(functions), 2, len(chain.mesh.place)))
+    excess = np.zeros((len(functions), 2))
+    for stratum, some in zip(strata, pieces, strict=True):
+        own, much = majorants_of(stratum.whole, values.shape, some, functions)
+        values += stratum.weight * own
+        excess += stratum.weight * much
+    return [
+        [Majorant(v, float(much) * INFLATE) for v, much in zip(*pair, strict=True)]
+        for pair in zip(values, excess, strict=True)
+    ]
+
+
+def majorants_of(
+    the_map: Map, shape: tuple[int, ...], pieces: list[BranchOfCell], functions: list[Averaged]
+) -> tuple[Array, Array]:
+    """Bound what is counted in a stratum, and what it may exceed that by: by function, sign, and the first by node."""
     ranges = the_map.piece([]).balls
     observed = [observed_of(one, the_map.program_of, ranges) for one in functions]
-    values = np.full((len(functions), 2, len(chain.mesh.place)), -np.inf)
-    excess = np.zeros((len(functions), 2))
+    values, excess = np.full(shape, -np.inf), np.zeros(shape[:2])
     for piece in pieces:
         program = the_map.image[piece.side, piece.branch]
         at = on_cell(program, piece, piece.ends, ranges)
@@ -140,10 +175,7 @@ def majorants(
                     values[k, sign, piece.at : piece.at + 2], row
                 )
     values[np.isneginf(values)] = 0.0
-    return [
-        [Majorant(v, float(much) * INFLATE) for v, much in zip(*pair, strict=True)]
-        for pair in zip(values, excess, strict=True)
-    ]
+    return values, excess
 
 
 def on_cell(program: Program, piece: BranchOfCell, ends: tuple[float, float], ranges: list[Arb]) -> OnCell:
@@ -220,20 +252,23 @@ class GainOfEnd(NamedTuple):
 
 def gains_of(the_map: Map, c: LongRunOfMap) -> tuple[Chain, Array, list[list[GainOfEnd]]]:
     """Prove the steps: the chain, the cells of N by their left nodes, what bounds each function and its negative."""
-    chain, pieces = chain_of_map(the_map, c.edges, c.law)
+    strata = strata_of(the_map, c.varied)
+    chain, pieces = chain_of_map(strata, c.edges, c.law)
     kept = kept_cells(chain, c.law)
     prove(bool(kept.any()), "from every cell some step may lead out")
     nodes, free = nodes_of(kept), np.full(len(chain.mesh.place), -np.inf)
 
     def gain(counted: Majorant) -> GainOfEnd:
-        more = counted.excess * c.law.most * INFLATE
+        prove(counted.excess == 0.0 or not c.law.certain, "ln |f'| has a pole, and landings do not scatter")
+        more = counted.excess * c.law.most * INFLATE if counted.excess else 0.0
 
         def bound(u: Array) -> tuple[Array, Array]:
             return nodes, chain.above(u + counted.values, free, more)[nodes]
 
         return GainOfEnd(bound, float(np.abs(counted.values).max()))
 
-    counted = majorants(the_map, chain, [piece for piece in pieces if kept[piece.at]], c.functions)
+    inner = [[piece for piece in some if kept[piece.at]] for some in pieces]
+    counted = majorants(chain, strata, inner, c.functions)
     return chain, kept, [[gain(of) for of in pair] for pair in counted]
 
 

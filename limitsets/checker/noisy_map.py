@@ -1,19 +1,26 @@
 """A map of a line whose steps land within a bounded distance of f(x), evenly: where steps lead, cell by cell.
 
-docs/certificates.md, "Long-run averages".  What is collected is what `steps` needs to bound the mean of a function
-after a step; cells whose image is not enclosed have no step.
+docs/certificates.md, "Steps that land with noise".  What is collected is what `steps` needs to bound the mean of a
+function after a step; cells whose image is not enclosed have no step.
+
+A parameter may vary too, evenly and anew at every step.  Its range is cut in strata.  On a stratum of width d the mean
+of G(f(x, p)) lies above that of its two ends by no more than G(f(x, .)) lies above its chord, which `turn_of` bounds as
+it does along a cell: there x varies, here p.
 """
 
 import itertools
 import math
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 from flint import arb
 
 from .any_map import Map, possible
-from .balls import Arb, Array, Pair
+from .balls import Arb, Array, Pair, exact
 from .brackets import OUTERMOST, mesh_of
+from .file import decimal
 from .landings import upper
 from .laws import Law
 from .links import turn_of
@@ -73,45 +80,135 @@ def steps_from(
     return steps
 
 
-def chain_of_map(the_map: Map, edges: list[Array], law: Law) -> tuple[Chain, list[BranchOfCell]]:
-    """Prove the steps from the cells between nodes; with the cells of the chain on their branches."""
+class Varied(NamedTuple):
+    """A parameter that deviates at every step within a bound, evenly; the range is cut in so many strata."""
+
+    name: str
+    bound: Fraction
+    strata: int
+
+
+class Stratum(NamedTuple):
+    """The map for a part of what a parameter may be: for all of it, and for either end; 1 where nothing varies."""
+
+    weight: float
+    whole: Map
+    ends: list[Map]
+    name: str = ""
+    width: float = 0.0
+
+    def images(self, step: StepOfMap, end: int) -> list[Arb]:
+        """Enclose where steps from an end of a cell lead, for the ends of the stratum."""
+        if not self.ends:
+            return [step.images[end]]
+        own = step.piece
+        return [
+            each.image[own.side, own.branch].at([arb(own.ends[end]), *each.piece([]).balls])[0]
+            for each in self.ends
+        ]
+
+
+def strata_of(the_map: Map, varied: Varied | None) -> list[Stratum]:
+    """Cut what a parameter may be."""
+    if varied is None:
+        return [Stratum(1.0, the_map, [])]
+    name, step = varied.name, 2 * varied.bound / varied.strata
+    lo, hi = (Fraction(end) for end in the_map.parameters[name])
+
+    def between(first: Fraction, last: Fraction) -> Map:
+        ends = decimal(lo + first), decimal(hi + last)
+        return Map(the_map.shape, the_map.parameters | {name: ends})
+
+    cuts = [k * step - varied.bound for k in range(varied.strata + 1)]
+    return [
+        Stratum(1.0 / varied.strata, between(a, b), [between(a, a), between(b, b)], name, upper(exact(step)))
+        for a, b in itertools.pairwise(cuts)
+    ]
+
+
+def chain_of_map(
+    strata: list[Stratum], edges: list[Array], law: Law
+) -> tuple[Chain, list[list[BranchOfCell]]]:
+    """Prove the steps from the cells between nodes; with the cells of the chain on their branches, by stratum."""
     size = max(float(np.abs(each).max()) for each in edges) + float(law.reach)
     mesh = mesh_of(edges, OUTERMOST * FAR_OF_MAP * 2.0 ** math.ceil(math.log2(size)))
-    scatter = Scatter(mesh, law, NARROW_OF_MAP)
-    parts, pieces = Parts(), list[BranchOfCell]()
-    places: dict[int, tuple[int, Arb]] = {}  # by node where the step from there leads
+    scatter = None if law.certain else Scatter(mesh, law, NARROW_OF_MAP)
+    parts, pieces = Parts(), [list[BranchOfCell]() for _ in strata]
+    places: dict[int, list[Lands]] = {}  # by node and stratum where steps from there lead
     for side, (first, end) in enumerate(itertools.pairwise(mesh.first.tolist())):
-        known: dict[tuple[int, int, float], Arb] = {}
+        known: list[dict[tuple[int, int, float], Arb]] = [{} for _ in strata]
         for at in range(first + 1, end - 2):
             ends = float(mesh.place[at]), float(mesh.place[at + 1])
-            steps = steps_from(the_map, side, at, ends, known)
-            if not steps:
+            steps = [
+                steps_from(each.whole, side, at, ends, seen) for each, seen in zip(strata, known, strict=True)
+            ]
+            if not all(steps):
                 continue
-            pieces += [step.piece for step in steps]
-            ranges = [(step.to, *step.range) for step in (steps[0], steps[-1])]
-            parts.at_cells.rows.append((at, float(len(steps) > 1), *ranges[0], *ranges[1]))
-            if len(steps) == 1:
-                (step,) = steps
-                row = turn_of(at, ends[1] - ends[0], step.piece.slope, step.piece.bend, ranges[0])
-                parts.turns.rows += [] if row is None else [row]
-            for node, image in zip((at, at + 1), steps[0].images, strict=True):
-                if len(steps) == 1 or node not in places:  # on a cell of one branch the node has this one too
-                    places[node] = steps[0].to, image
-    spread = spread_of(places, parts)
-    rows = mean_rows(len(mesh.place), scatter.mesh, [spread])
+            for own, each in zip(pieces, steps, strict=True):
+                own += [step.piece for step in each]
+            open_share = sum(each.weight for each, some in zip(strata, steps, strict=True) if len(some) > 1)
+            ranges = hulls([(step.piece.branch, step.to, *step.range) for some in steps for step in some])
+            parts.at_cells.rows.append((at, open_share, *ranges[0], *ranges[-1]))
+            turns = [row for each, some in zip(strata, steps, strict=True) for row in turns_of(each, some)]
+            bounded = [row for row in turns if row is not None]
+            parts.turns.rows += bounded if len(bounded) == len(turns) else []
+            for k, node in enumerate((at, at + 1)):
+                lands = [
+                    Lands(each.weight, some[0], each.images(some[0], k), sure=len(some) == 1)
+                    for each, some in zip(strata, steps, strict=True)
+                ]
+                # on a cell of one branch the node has this one too
+                before = places.get(node, lands)
+                places[node] = [new if new.sure else old for new, old in zip(lands, before, strict=True)]
+    rows = mean_rows(len(mesh.place), mesh if scatter is None else scatter.mesh, [spread_of(places, parts)])
     # nodes are not raised together: the cells beside a change of branch may be wide
     return Chain(mesh, scatter, rows, {}, parts, 0.0, narrow=0.0), pieces
 
 
-def spread_of(places: dict[int, tuple[int, Arb]], parts: Parts) -> Spread:
-    """Put the step from each node to where it leads, and collect how far it may be off."""
-    to, at = [], []
-    for node, (side, image) in sorted(places.items()):
-        middle = float(image.mid())
-        off = upper(abs(image - middle)) * INFLATE
-        where = side, middle - off, middle + off
-        parts.at_nodes.rows.append((node, 0.0, *where, *where, 1.0, off))
-        to.append(side)
-        at.append(middle)
-    lands, nodes = np.array(at), np.array(sorted(places), dtype=np.int64)
-    return Spread(nodes, np.ones(len(nodes)), np.array(to, dtype=np.int64), lands, lands)
+class Lands(NamedTuple):
+    """Where the steps of a stratum from a node lead, and whether on this branch for sure."""
+
+    weight: float
+    step: StepOfMap
+    images: list[Arb]
+    sure: bool
+
+
+def hulls(ranges: Iterable[tuple[int, int, float, float]]) -> list[tuple[int, float, float]]:
+    """Return by branch the side and the range that holds all places; given by branch, side and ends."""
+    by_branch: dict[int, tuple[int, float, float]] = {}
+    for branch, side, lo, hi in ranges:
+        _, least, most = by_branch.get(branch, (side, lo, hi))
+        by_branch[branch] = side, min(lo, least), max(hi, most)
+    return [by_branch[branch] for branch in sorted(by_branch)]
+
+
+def turns_of(of: Stratum, steps: list[StepOfMap]) -> Iterator[tuple[float, ...] | None]:
+    """Bound how far the mean lies above its chord along a cell, and above that of the ends of what varies.
+
+    Nothing where both branches are possible, which counts by the share of the range of G; None where nothing is known.
+    """
+    if len(steps) > 1:
+        return
+    ((own, to, _, reach),) = steps
+    h = upper(arb(own.ends[1]) - arb(own.ends[0]))
+    yield turn_of(own.at, h, own.slope, own.bend, (to, *reach), of.weight)
+    if of.ends:
+        program, number = of.whole.image[own.side, own.branch], 1 + of.whole.wide.index(of.name)
+        balls = [arb(own.ends[0]).union(arb(own.ends[1])), *of.whole.piece([]).balls]
+        yield turn_of(own.at, of.width, *program.bend(balls, number)[1:], (to, *reach), of.weight)
+
+
+def spread_of(places: dict[int, list[Lands]], parts: Parts) -> Spread:
+    """Put the steps from each node to where they lead, and collect how far these may be off."""
+    rows = list[tuple[int, float, int, float]]()  # node, weight, side, place
+    for node, lands in sorted(places.items()):
+        middles = [(each, float(image.mid()), image) for each in lands for image in each.images]
+        off = max(upper(abs(image - middle)) for _, middle, image in middles) * INFLATE
+        where = hulls(
+            (each.step.piece.branch, each.step.to, middle - off, middle + off) for each, middle, _ in middles
+        )
+        parts.at_nodes.rows.append((node, 0.0, *where[0], *where[-1], 1.0, off))
+        rows += [(node, each.weight / len(each.images), each.step.to, middle) for each, middle, _ in middles]
+    at, weight, to, where_to = (np.array(column) for column in zip(*rows, strict=True))
+    return Spread(at.astype(np.int64), weight, to.astype(np.int64), where_to, where_to)

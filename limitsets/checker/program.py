@@ -96,7 +96,7 @@ Jet = tuple[Arb, Arb, Arb]  # a value, its derivative by x0 and the second
 
 
 def bend_of_product(x: Jet, y: Jet, _: Arb) -> tuple[Arb, Arb]:
-    """Return the two derivatives of x y by x0."""
+    """Return the two derivatives of x y by an input."""
     (x0, x1, x2), (y0, y1, y2) = x, y
     return x1 * y0 + x0 * y1, x2 * y0 + 2 * x1 * y1 + x0 * y2
 
@@ -140,7 +140,7 @@ BINARY: dict[str, tuple[Function, Partials, Bends]] = {
     "max": (arb.max, by_largest, bend_of_largest),
     "atan2": (arb.atan2, by_atan2, bend_of_atan2),
 }
-"""Operations on two numbers, their partial derivatives at x, y from the value too, and their derivatives by x0."""
+"""Operations on two numbers, their partial derivatives at x, y from the value too, and those by an input."""
 
 
 def cube_root(x: Arb) -> Arb:
@@ -331,16 +331,16 @@ class Program:
             by[k] = [None if u is None else factor * u for u in by[a]]
         return [[ZERO if u is None else u for u in by[k]] for k in out or self.out]
 
-    def bend(self, inputs: list[Arb]) -> tuple[Arb, Arb, Arb]:
-        """Enclose the one result, its derivative by x0 and the second; nan where a kink or a jump may lie.
+    def bend(self, inputs: list[Arb], number: int = 0) -> tuple[Arb, Arb, Arb]:
+        """Enclose the one result, its derivative by one input and the second; nan where a kink or a jump may lie.
 
         Finite ones are so only where the formula is twice differentiable on the balls of the inputs.
         """
         balls = self.known.copy()
         flat = ZERO, ZERO
-        by: list[tuple[Arb, Arb] | None] = [None] * len(balls)  # None where x0 does not matter
+        by: list[tuple[Arb, Arb] | None] = [None] * len(balls)  # None where it does not matter
         for k, j in self.inputs:
-            balls[k], by[k] = inputs[j], (ONE, ZERO) if j == 0 else None
+            balls[k], by[k] = inputs[j], (ONE, ZERO) if j == number else None
         for k, function, a, b in self.steps:
             word, _, exponent = self.formulas.operations[k]
             x = balls[a]

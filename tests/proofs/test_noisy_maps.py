@@ -198,7 +198,7 @@ def bounds_of(places, to, borders):
         )
         for i in range(count)
     ]  # fmt: skip
-    chain, kept, gains = gains_of(the_map, LongRunOfMap("1", law, [], edges, functions))
+    chain, kept, gains = gains_of(the_map, LongRunOfMap("1", law, None, [], edges, functions))
     assert kept.sum() == sum(len(each) - 1 for each in edges)
     mesh = chain.mesh
     low, high = ([settled(each[k].bound, mesh.place, mesh.first)[0] for each in gains] for k in (0, 1))
@@ -288,7 +288,7 @@ def test_a_step_is_bounded_at_every_place_of_wide_cells(case, seed):
             "a test",
             [np.zeros(0)] * 3,
         )
-        claim = LongRunOfMap("0.3", uniform_law(Fraction(3, 10), 1), [], [edges], [function])
+        claim = LongRunOfMap("0.3", uniform_law(Fraction(3, 10), 1), None, [], [edges], [function])
         chain, kept, ((lower, upper),) = gains_of(checked(the_map), claim)
         assert kept.sum() == len(edges) - 1
         u = rng.normal(size=len(chain.mesh.place)) * (seed > 0)

@@ -7,8 +7,16 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import limitsets as ls
-from limitsets.base import Table
-from limitsets.face.cli.arguments import certified_claims, laid_ranges, own_file, said_of, with_ending
+from limitsets.base import LimitsetsError, Table
+from limitsets.face.cli.arguments import (
+    certified_claims,
+    laid_ranges,
+    named,
+    number,
+    own_file,
+    said_of,
+    with_ending,
+)
 from limitsets.face.cli.certify import records_of
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
 from limitsets.face.cli.output import saved
@@ -27,7 +35,7 @@ def average(
     set_: Words = None,
     domain: str | None = None,
     periodic: bool = False,
-    noise: float | None = None,
+    noise: Words = None,
     cells: Annotated[int | None, limits(min=1)] = None,
     no_recheck: bool = False,
 ) -> Answer:
@@ -49,9 +57,10 @@ def average(
         Of a map: a range.
     periodic
         Of a map: it is taken modulo the width of the domain.
-    noise : LENGTH
-        Of a map: each step lands evenly within this distance of the image; then bounds hold from every start, almost
-        surely, and the map need not stretch.
+    noise : NAME=BOUND
+        Of a map: each step lands evenly within this distance of the image (landing=BOUND, or BOUND alone), or this
+        parameter deviates so far at every step; then bounds hold from every start, almost surely, and the map need not
+        stretch; repeatable.
     cells : N
         Cells, 8192 by default, of a map 10 000: the bounds come nearer as 1/N.
     out : FILE
@@ -61,10 +70,15 @@ def average(
     chosen = subject(scene, set_)
     if isinstance(chosen, MapOfFile):
         line = ls.grid(domain_of(chosen, domain), cells=cells or CELLS, periodic=periodic)
-        how: dict[str, Any] = {"map": chosen.lower, "grid": line, "upper": chosen.upper, "noise": noise}
+        how: dict[str, Any] = {
+            "map": chosen.lower,
+            "grid": line,
+            "upper": chosen.upper,
+            "noise": _noise(noise),
+        }
         file = with_ending(run.out or Path(f"{chosen.name}{KIND}.proof.zip"))
     else:
-        of_scene_alone(chosen, {"--domain": domain, "--periodic": periodic or None, "--noise": noise})
+        of_scene_alone(chosen, {"--domain": domain, "--periodic": periodic or None, "--noise": noise or None})
         how = {"map": chosen, "cells": cells}
         file = own_file(chosen, KIND) if run.out is None else with_ending(run.out)
     with saved(file):  # refuses a place that cannot be written before anything is proved
@@ -84,6 +98,20 @@ def average(
     about = None if isinstance(chosen, MapOfFile) else run.about(proof.model, chosen)
     shown = proof.table if proof.average is None else proof.average.table
     return Answer(records_of(proof, written), words, shown, code=0 if proof.average else 1, about=about)
+
+
+def _noise(words: list[str] | None) -> dict[str, float] | None:
+    """Read what deviates; a number alone is of the landing."""
+    given = [word if "=" in word else f"landing={word}" for word in words or []]
+    noise = dict[str, float]()
+    for name, text in named(given, "--noise", "the noise", "NAME=BOUND", "write a number, or NAME=NUMBER"):
+        bound = number(text)
+        if isinstance(bound, str):
+            raise LimitsetsError(
+                f"the noise of {name}", bound, "a number", "leave the unit out", key="--noise"
+            )
+        noise[name] = bound
+    return noise or None
 
 
 def _function(word: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, overload
 
@@ -43,7 +44,7 @@ def average(
     of: Any = None,
     *,
     upper: Any = None,
-    noise: float,
+    noise: float | Mapping[str, float],
     progress: Progress | None = None,
 ) -> LongRunOfMap: ...
 @shown_in_notebooks
@@ -54,7 +55,7 @@ def average(
     of: Any = None,
     *,
     upper: Any = None,
-    noise: float | None = None,
+    noise: float | Mapping[str, float] | None = None,
     cells: int | None = None,
     progress: Progress | None = None,
 ) -> Proof | ProofOfMap | LongRunOfMap:
@@ -81,8 +82,9 @@ def average(
         ``[[(0.0, 0.5)], [(0.5, 1.0)]]`` of lists of ranges is a histogram.  Default: "lyapunov", of a scene all words.
     upper : NamedTuple, optional
         Of a map alone: the upper corner of the parameters; the bounds hold for every fixed value between.
-    noise : float, optional
-        Of a map alone: each step lands within this distance of the image, evenly, whatever the steps before did.  Then
+    noise : float or mapping of str to float, optional
+        Of a map alone: each step lands within this distance of the image, evenly, whatever the steps before did.  Or by
+        name what deviates evenly at every step and by how much: ``{"landing": 0.001, "r": 0.02}``, a parameter.  Then
         the map need not stretch: ln |f'| may have slopes 0, and cube roots with an infinite one.  What holds is said of
         every start, almost surely: what the average tends to, if only along some of the steps, lies between the two.
     cells : int, optional

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -26,7 +26,7 @@ from limitsets.proofs.prover.certificate import Saved, require_checker
 from limitsets.proofs.prover.certificate_of_map import Part, parameters_of, write_map
 from limitsets.proofs.prover.programs import periods_of, recorded_map
 from limitsets.proofs.prover.proof import Claim
-from limitsets.proofs.prover.recording import decimal
+from limitsets.proofs.prover.recording import decimal, names_of
 from limitsets.systems.cells import Grid
 from limitsets.systems.maps import kind_of
 from limitsets.systems.maps.contract import require_corners
@@ -43,8 +43,11 @@ MOST_STEPS, STILL = 3000, 1e-6
 PATIENCE, SOON = 100, 1e-3
 # A step goes so far towards what it gains, so that nothing swings.
 DAMPED = 0.8
-# The least noise.
-LEAST = 1e-90
+# The least noise, and its name in a mapping.
+LEAST, LANDING = 1e-90, "landing"
+WITHOUT = "leave it out for averages without noise"
+# Parts in which the range of a parameter that varies is cut.
+STRATA = 32
 # A certificate claims bounds that are wider by this, for the roundings of another machine's sums.
 ALLOWANCE = 1e-9
 
@@ -59,8 +62,9 @@ class LongRunOfMap(Saved):
         The corners of the parameters; the bounds hold for every fixed value between.
     grid : Grid
         The cells.
-    noise : float
-        Steps land evenly within this distance of the image, independent of each other.
+    noise : float or mapping of str to float
+        Steps land evenly within this distance of the image, independent of each other; or by name what deviates evenly
+        at every step and by how much: "landing", and a parameter.
     starts : tuple of (int, float, float)
         Side, from x, to x: from these no step leads out.
     numbers : dict of str to (float, float)
@@ -74,7 +78,7 @@ class LongRunOfMap(Saved):
     map: Any
     upper: Any
     grid: Grid
-    noise: float
+    noise: float | Mapping[str, float]
     starts: tuple[tuple[int, float, float], ...]
     numbers: dict[str, tuple[float, float]]
     section: dict[str, Any]
@@ -109,7 +113,7 @@ class LongRunOfMap(Saved):
         heads = ("average", Column("lo", show=".12g"), Column("hi", show=".12g"), Column("width", show=".2g"))
         said = (
             f"proved: from every start in {in_words(self.starts)}, almost surely, averages over ever more steps end "
-            f"between lo and hi, where steps land within {self.noise:g} of the image, evenly"
+            f"between lo and hi, where {noise_in_words(self.noise)}"
         )
         return (Table(heads, rows, "Averages along orbits with noise", said),)
 
@@ -148,24 +152,38 @@ def in_words(starts: Sequence[tuple[int, float, float]]) -> str:
     )
 
 
+def noise_in_words(noise: float | Mapping[str, float]) -> str:
+    """Say what deviates."""
+    bounds = dict(noise) if isinstance(noise, Mapping) else {LANDING: noise}
+    landing = bounds.pop(LANDING, 0.0)
+    laws = [f"steps land within {landing:g} of the image"] if landing else []
+    laws += [f"{name} deviates by at most {bound:g} at every step" for name, bound in bounds.items()]
+    return f"{' and '.join(laws)}, evenly"
+
+
 def long_run_of_map(
-    lower: Any, upper: Any, grid: Grid, of: Any, noise: float, progress: Progress | None
+    lower: Any, upper: Any, grid: Grid, of: Any, noise: float | Mapping[str, float], progress: Progress | None
 ) -> LongRunOfMap:
     """Prove between which numbers averages lie in the end where each step lands evenly within `noise` of the image.
+
+    Of a mapping "landing" is that distance, and another key a parameter that deviates so far from its value.
 
     Raises
     ------
     AnswerError
-        Noise that is not above 0, an axis that closes, functions without a bound, or cells that steps leave.
+        Noise that is not above 0, or of two parameters, an axis that closes, functions without a bound, or cells that
+        steps leave.
     """
     begun, tell = time.perf_counter(), progress or silent
-    require_noise(lower, upper, grid, noise, "leave it out for averages without noise")
+    landing, varied = _laws(lower, noise)
+    require_noise(lower, upper, grid, landing or None if varied is None else landing or LEAST, WITHOUT)
     import flint
 
     from limitsets.checker.balls import PRECISION, UnprovedError
     from limitsets.checker.laws import uniform_law
     from limitsets.checker.long_run import END_SIGNS
     from limitsets.checker.map_long_run import ENDS, LongRunOfMap as Claimed, gains_of
+    from limitsets.checker.noisy_map import Varied
     from limitsets.checker.observable import Allowed, read_function
 
     asked = asked_of_map(of, lower, grid)
@@ -180,9 +198,10 @@ def long_run_of_map(
         functions = [read_function(one, [0], allowed, "the function", unknown) for one in listed]
         tell("cells", 0, 1)
         edges = [refined(the_map, side, axes[0], asked.jumps) for side, axes in enumerate(fine.edges)]
-        law = uniform_law(Fraction(decimal(noise)), 1)
+        law = uniform_law(Fraction(decimal(landing)), 1)
+        parameter = None if varied is None else Varied(varied[0], Fraction(decimal(varied[1])), STRATA)
         try:
-            chain, kept, gains = gains_of(the_map, Claimed("", law, [], edges, functions))
+            chain, kept, gains = gains_of(the_map, Claimed("", law, parameter, [], edges, functions))
         except UnprovedError as error:
             allow = "so small that steps stay on some cells, where what is averaged has a bound"
             raise AnswerError(
@@ -198,11 +217,13 @@ def long_run_of_map(
         for end, column in zip(ENDS, columns, strict=True)
     }
     starts = stretches(kept, mesh.place, mesh.first)
-    section = {
-        "landing": decimal(noise),
+    section: dict[str, Any] = {
+        "landing": decimal(landing),
         "starts": [{"side": side, "box": [[lo.hex(), hi.hex()]]} for side, lo, hi in starts],
         "functions": listed,
     }
+    if varied is not None:
+        section["varied"] = {"name": varied[0], "within": decimal(varied[1]), "strata": STRATA}
     numbers = {}
     for one, each in zip(asked.functions, listed, strict=True):
         lo, hi = (float.fromhex(each[end][0]) for end in ENDS)
@@ -212,6 +233,22 @@ def long_run_of_map(
         lower, upper, fine, noise, tuple(starts), numbers=numbers, section=section, arrays=arrays,
         seconds=time.perf_counter() - begun,
     )  # fmt: skip
+
+
+def _laws(lower: Any, noise: float | Mapping[str, float]) -> tuple[float, tuple[str, float] | None]:
+    """Read noise: how far steps land from the image, and the parameter that deviates, with its bound."""
+    bounds = {
+        name: float(bound)
+        for name, bound in (noise if isinstance(noise, Mapping) else {LANDING: noise}).items()
+    }
+    landing, parameters = bounds.pop(LANDING, 0.0), [name for name, _ in names_of(lower)]
+    for name, bound in bounds.items():
+        if name not in parameters or not (math.isfinite(bound) and bound >= LEAST):
+            allowed = f"above 0, of {' or '.join([LANDING, *parameters])}"
+            raise AnswerError(f"the noise of {name}", bound, allowed, "correct it, or leave it out")
+    if len(bounds) > 1:
+        raise AnswerError("the noise", sorted(bounds), "of one parameter", "leave the others out")
+    return landing, next(iter(bounds.items()), None)
 
 
 def require_noise(lower: Any, upper: Any, grid: Grid, noise: float | None, without: str) -> None:
