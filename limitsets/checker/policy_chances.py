@@ -91,7 +91,7 @@ def read_policy_chances(header: dict[str, Any], entries: dict[str, memoryview]) 
     bounds = {}
     for word in (MEAN, COME):
         lo, hi = (hex_float(end, word) for end in rows(section[word], word, 2, 2))
-        require(lo <= hi, f"{word}: the ends do not ascend")
+        require(0.0 <= lo <= hi, f"{word}: the ends are negative, or do not ascend")
         bounds[word] = lo, hi
     return PolicyChances(game, settings, edges, *own, bounds)
 
@@ -123,8 +123,8 @@ def policy_chances_in_words(c: PolicyChances) -> list[str]:
         "    all deviations are independent of each other",
         f"    starts, equally likely per length: {places_in_words(c.setting.starts, c.setting.scene.unit)}",
         *table_in_words(c.game, len(c.throw)),
-        f"    P({ends}): between {rounded(max(come[0], 0.0), up=False)} and {rounded(min(come[1], 1.0), up=True)}",
-        f"    the mean of T: between {rounded(max(mean[0], 0.0), up=False)} and {rounded(mean[1], up=True)}",
+        f"    P({ends}): between {rounded(come[0], up=False)} and {rounded(min(come[1], 1.0), up=True)}",
+        f"    the mean of T: between {rounded(mean[0], up=False)} and {rounded(mean[1], up=True)}",
     ]
 
 
@@ -219,7 +219,7 @@ def bounds_of(c: PolicyChances, advance: Callable[[int], None]) -> dict[str, Pai
     bounds = {}
     for of in (MEAN, COME):
         low, high = (mean_above(row, bound_of(c, chains, places, of, sign)) for sign in (-1.0, 1.0))
-        bounds[of] = -low, high
+        bounds[of] = max(-low, 0.0), high if of == MEAN else min(high, 1.0)
     return bounds
 
 

@@ -165,7 +165,7 @@ def policy_chances(
     if policy is None:
         remedy = "more throws, other throws, another sensor or fewer starts may do it"
         raise AnswerError("the policy", synthesis.found.verdict, "one that was found", remedy)
-    require_cells(cells, "chance of a policy")
+    require_cells(cells, "expectation")
     require_minimal(synthesis)
     require_checker()
     import flint
@@ -199,16 +199,14 @@ def policy_chances(
         ]
         table = policy.throw, policy.left, policy.after
         bounds = bounds_of(Claimed(game, settings, edges, *table, {}), told)
-    (low, high), (least, most) = bounds["mean"], bounds["come"]
-    claimed = {"mean": (max(low, 0.0), high), "come": (max(least, 0.0), min(most, 1.0))}
     section |= {
         word: [(lo * (1.0 - ALLOWANCE)).hex(), (hi * (1.0 + ALLOWANCE)).hex()]
-        for word, (lo, hi) in claimed.items()
+        for word, (lo, hi) in bounds.items()
     }
     arrays = table_arrays(policy) | {f"edges.{side}": each for side, each in enumerate(edges)}
     count = sum(each.size - 1 for each in edges)
     return PolicyChances(
-        scene.name, scatter, tuple(starts), claimed["mean"], claimed["come"], cells=count,
+        scene.name, scatter, tuple(starts), bounds["mean"], bounds["come"], cells=count,
         section=section, arrays=arrays, seconds=time.perf_counter() - begun,
     )  # fmt: skip
 

@@ -176,7 +176,7 @@ def long_run_of_map(
     """
     begun, tell = time.perf_counter(), progress or silent
     landing, varied = _laws(lower, noise)
-    require_noise(lower, upper, grid, landing or None if varied is None else landing or LEAST, WITHOUT)
+    require_noise(lower, upper, grid, landing if varied is None else landing or LEAST, WITHOUT)
     import flint
 
     from limitsets.checker.balls import PRECISION, UnprovedError

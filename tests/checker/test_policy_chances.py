@@ -1,0 +1,229 @@
+"""What a policy leads to under known laws: known answers, thrown parts, forged files."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+from limitsets.robust import Gaussian, Scattering, Uniform
+
+import limitsets as ls
+from limitsets.base.errors import AnswerError
+from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
+from limitsets.parameters.noise.sampling import ManyParts, scattering_map
+from limitsets.proofs.policies import policy_chances
+from limitsets.systems.maps import images
+from tests.checker.test_policy import CAVITY, FEW, scene_with
+from tests.proofs.forge import opened
+
+BOTH = Scattering(speed=Uniform(0.01), landing=Uniform(0.05))
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """Policies by what they are asked: a place, a place with an error, a side with a cavity that catches."""
+    few = {"starts": FEW, "cells": 256}
+    return {
+        "place": ls.feedback(scene_with(), **few),
+        "error": ls.feedback(scene_with(), BeyondSensor(19.0, 0.02), noise={"throw.speed": "0.1 %"}, **few),
+        "catch": ls.feedback(scene_with(cavity=CAVITY), SideSensor(2), mode="catch", starts=FEW, cells=512),
+    }
+
+
+@pytest.fixture(scope="module")
+def written(solved, tmp_path_factory):
+    chances = policy_chances(solved["catch"], BOTH, cells=200)
+    return chances, opened(chances.save(tmp_path_factory.mktemp("chances") / "catch.proof.zip"))
+
+
+def section_of(file):
+    return file.header["claims"][0]["section"]
+
+
+def one_throw(goal, noise=None):
+    """A policy of one throw with the part's own speed, from 16 to 16.001 in on side 2, that stops whatever it hears."""
+    tree = ls.load("paper-designed").as_dict()
+    tree["feedback"] = {"throws": [{"name": "own", **tree["throw"]}]}
+    return ls.feedback(ls.load(tree), "none", goal=goal, starts={2: (16.0, 16.001)}, cells=64, noise=noise)
+
+
+# ------------------------------------------------------------------------------ known answers
+
+
+def test_one_throw_comes_with_the_probability_of_its_law():
+    """It lands within 0.5 in of T(x), evenly: the share beyond the goal is (T(x) + 0.5 - goal) / 1 on average."""
+    scene = ls.load("paper-designed")
+    starts = np.linspace(16.0, 16.001, 101)
+    lands = images(scene.map, starts, 2)
+    assert (lands.side == 2).all()
+    goal = float(lands.x.min()) - 0.1
+    policy = one_throw((goal, 2), {"landing.x": "0.05 in"})
+    assert policy.found.throws == 1
+    chances = policy_chances(policy, Scattering(landing=Uniform(0.5)), cells=2000)
+    exact = float(np.mean(lands.x + 0.5 - goal))
+    lo, hi = chances.come
+    assert lo <= exact <= hi < lo + 2e-4
+    assert abs(chances.mean[0] - 1.0) < 1e-9 > abs(chances.mean[1] - 1.0)
+
+
+def test_a_policy_that_is_proved_for_the_noise_brings_all_parts(solved):
+    # without scatter of the landing functions jump, and coarse cells bound little
+    chances = policy_chances(
+        solved["error"], Scattering(speed=Uniform(0.001), landing=Uniform(1e-3)), cells=1000
+    )
+    assert chances.come[0] > 0.97
+    assert chances.mean[1] <= solved["error"].found.throws
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("asked", ["place", "error", "catch"])
+@pytest.mark.parametrize("answer", ["even", "yes", "no"])
+def test_thrown_parts_come_as_often_as_is_proved(solved, asked, answer):
+    """Parts of the package's own engine of many throws; a sensor near its place says yes, no or either."""
+    policy, count = solved[asked], 20_000
+    if asked != "error" and answer != "even":
+        pytest.skip("this sensor does not err")
+    chances = policy_chances(policy, BOTH, cells=500)
+    throws, come = thrown(policy, BOTH, count, {"even": None, "yes": 1.0, "no": -1.0}[answer])
+    for (lo, hi), row in ((chances.mean, throws), (chances.come, come)):
+        error = 5.0 * row.std() / count**0.5
+        assert lo - error <= row.mean() <= hi + error
+        assert hi - lo < (1.0 if asked == "error" else 0.35)
+
+
+def thrown(policy, scatter, count, mood):
+    """Run a table; `mood`: what the sensor's error is in its bound, None for anything."""
+    table, random = policy.found.policy, np.random.default_rng(1)
+    ((side, ((lo, hi),)),) = policy.starts.extents().items()
+    x, sides = random.uniform(lo, hi, count), np.full(count, side)
+    maps = []
+    for each in policy.scene.feedback.throws:
+        tree = policy.scene.with_values({each.quantity: each.text}).as_dict()
+        bare = {key: value for key, value in tree.items() if key not in ("cavity", "goal")}
+        maps.append(scattering_map(ls.load(bare), scatter, 3))
+    drawn, (goal, wanted) = 0, policy.goal
+
+    def heard():
+        if isinstance(policy.sensor, SideSensor):
+            yes = sides == policy.sensor.side
+        else:
+            off = random.uniform(-1.0, 1.0, count) if mood is None else -mood
+            yes = x > policy.sensor.x + policy.sensor.error * off
+        words = list(table.answers)
+        return np.where(yes, words.index("yes"), words.index("no"))
+
+    state, moving = table.first[heard()], np.ones(count, dtype=bool)
+    made, come = np.zeros(count), np.zeros(count)
+    for _ in range(int(table.left.max()) + 1):
+        moving &= state >= 0
+        stops = moving & (table.throw[state] < 0)
+        come[stops & (x >= goal) & (sides == wanted) & (policy.mode == "stop")] = 1.0
+        moving &= ~stops
+        for k, of in enumerate(maps):
+            now = np.flatnonzero(moving & (table.throw[state] == k))
+            many = ManyParts(of, x[now], sides[now], drawn)
+            code = many.throw()
+            drawn = many.drawn
+            made[now] += 1.0
+            x[now], sides[now] = many.x, np.maximum(many.side, 0)
+            moving[now[code < 0]] = False
+        if policy.mode == "catch":
+            caught = moving & (x >= goal)
+            come[caught & (sides == wanted)] = 1.0
+            moving &= ~caught
+        state = np.where(moving, table.after[state, heard()], state)
+    assert not moving.any()
+    return made, come
+
+
+def test_a_normal_law_counts_its_tails():
+    policy = one_throw((17.0, 2), {"landing.x": "0.05 in"})
+    x = float(images(ls.load("paper-designed").map, np.array([16.0005]), 2).x[0])
+    sigma = (x - 17.0) / 2.0
+    lo, hi = policy_chances(policy, Scattering(landing=Gaussian(sigma)), cells=1000).come
+    assert lo < 0.97725 < hi < lo + 5e-3  # of a standard normal number above -2
+
+
+# ------------------------------------------------------------------------------ files
+
+
+def test_the_file_says_what_is_proved(written, tmp_path):
+    chances, file = written
+    report = ls.recheck(file.write(tmp_path / "again.proof.zip"))
+    assert report.verdict == "proved"
+    said = "\n".join(report.statement)
+    assert "until the part is caught (at x >= 20 in) or has left the arm, or the controller hears" in said
+    assert "P(the part is caught on side 2 at x >= 20 in): between" in said
+    assert report.parameters["law of landing.x"].startswith("uniform, within")
+    assert not any(name.startswith("throw.") for name in report.parameters)
+    json = chances.to_json()
+    assert json["mean"] == {"lo": chances.mean[0], "hi": chances.mean[1]}
+    assert [row[0] for row in chances.table().rows] == ["mean number of throws", "probability to come"]
+
+
+@pytest.mark.parametrize(("word", "end"), [*itertools.product(("mean", "come"), (0, 1))])
+def test_bounds_that_are_nearer_are_denied(written, tmp_path, word, end):
+    forged = written[1].copy()
+    pair = section_of(forged)[word]
+    lo, hi = (float.fromhex(each) for each in pair)
+    pair[end] = (0.99 * lo + 0.01 * hi if end == 0 else 0.01 * lo + 0.99 * hi).hex()
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.proof.zip"))
+    assert report.verdict == "failed"
+    assert f"policy-chances: {word}: " in report.reason
+    assert "is claimed, only" in report.reason
+
+
+def changed_table(forged, name, place, value):
+    forged.arrays[name] = forged.arrays[name].copy()
+    forged.arrays[name][place] = value
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict", "why"),
+    [
+        (
+            lambda f: changed_table(f, "left", slice(None), 1),
+            "failed",
+            "the number of throws left does not fall",
+        ),
+        (lambda f: changed_table(f, "after", 0, 9999), "failed", "a next state is none"),
+        (lambda f: changed_table(f, "throw", 0, 7), "failed", "a throw is none of those to choose from"),
+        (lambda f: section_of(f)["first"].update(yes=9999), "failed", "the state to begin in is none"),
+        (
+            lambda f: section_of(f).update(mean=[(9.0).hex(), (1.0).hex()]),
+            "bad file",
+            "mean: the ends are negative, or",
+        ),
+        (
+            lambda f: section_of(f).update(absorbing={"here": [[2, "21 in", "22 in"]]}),
+            "bad file",
+            "the places where parts end are those of the policy",
+        ),
+        (lambda f: section_of(f)["scene"].update(effects={}), "bad file", "with effects"),
+        (
+            lambda f: section_of(f)["laws"].update({"landing.x": {"uniform": "0.06 in"}}),
+            "failed",
+            "is claimed",
+        ),
+        (lambda f: section_of(f)["goal"].update(x="21 in"), "bad file", "parts are caught elsewhere"),
+        (lambda f: section_of(f)["starts"].append([2, "17.5 in", "18 in"]), "bad file", "overlap"),
+    ],
+)
+def test_what_is_no_such_claim_is_denied(written, tmp_path, change, verdict, why):
+    forged = written[1].copy()
+    change(forged)
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.proof.zip"))
+    assert report.verdict == verdict
+    assert why in report.reason
+
+
+def test_what_cannot_be_asked_is_refused(solved):
+    unsolved = ls.feedback(scene_with(), "none", starts=FEW, cells=64, throws=1)
+    with pytest.raises(AnswerError, match="the policy is 'not-solved'"):
+        policy_chances(unsolved)
+    with pytest.raises(AnswerError, match="the cells of an expectation is 0"):
+        policy_chances(solved["place"], cells=0)
+    with pytest.raises(AnswerError, match="of speed and landing place"):
+        policy_chances(solved["place"], Scattering(tilt=Uniform(0.01)))
