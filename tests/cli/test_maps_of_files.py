@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import limitsets as ls
 from limitsets.face.cli import main
 from tests.cli.command import documented, json_of, names_in, prints, refusal, run
 
@@ -187,3 +188,30 @@ def test_an_atlas_of_a_map(capfd, mymap):
     xarray = pytest.importorskip("xarray")
     answers = xarray.open_zarr("made-atlas.zarr", consolidated=False)
     assert answers["period"].values.squeeze()[:, 0].tolist() == [1, 2]
+
+
+def test_averages_under_noise_of_a_parameter(capfd, mymap):
+    how = (
+        "average",
+        f"{mymap}:ricker",
+        "--set",
+        "r=2.6",
+        "--domain",
+        "0.06:2.2",
+        "--of",
+        "0:1",
+        "--cells",
+        "300",
+    )
+    _, out, _ = run_of_file(capfd, *how, "--noise", "r=0.1", "--noise", "0.02")
+    assert "steps land within 0.02 of the image and r deviates by at most 0.1 at every step, evenly" in out
+    assert ls.recheck("ricker.averages.proof.zip").verdict == "proved"
+    _, out, _ = run_of_file(capfd, *how, "--noise", "0.02", "--no-recheck", "--json")
+    assert json.loads(out)[0]["noise"] == 0.02
+    for noise, why in (
+        ("q=0.1", "the noise of q is 0.1"),
+        ("wide", "noise of landing is 'wide'"),
+        ("r=", "noise of r is ''"),
+    ):
+        code, _, err = run_of_file(capfd, *how, "--noise", noise)
+        assert (code, why in err) == (2, True), err
