@@ -133,36 +133,22 @@ def chain_of_map(
     size = max(float(np.abs(each).max()) for each in edges) + float(law.reach)
     mesh = mesh_of(edges, OUTERMOST * FAR_OF_MAP * 2.0 ** math.ceil(math.log2(size)))
     scatter = None if law.certain else Scatter(mesh, law, NARROW_OF_MAP)
-    parts, pieces = Parts(), [list[BranchOfCell]() for _ in strata]
-    places: dict[int, list[Lands]] = {}  # by node and stratum where steps from there lead
+    collected = CellsOfMap(strata)
     for side, (first, end) in enumerate(itertools.pairwise(mesh.first.tolist())):
         known: list[dict[tuple[int, int, float], Arb]] = [{} for _ in strata]
         for at in range(first + 1, end - 2):
             ends = float(mesh.place[at]), float(mesh.place[at + 1])
-            steps = [
-                steps_from(each.whole, side, at, ends, seen) for each, seen in zip(strata, known, strict=True)
-            ]
-            if not all(steps):
-                continue
-            for own, each in zip(pieces, steps, strict=True):
-                own += [step.piece for step in each]
-            open_share = sum(each.weight for each, some in zip(strata, steps, strict=True) if len(some) > 1)
-            ranges = hulls([(step.piece.branch, step.to, *step.range) for some in steps for step in some])
-            parts.at_cells.rows.append((at, open_share, *ranges[0], *ranges[-1]))
-            turns = [row for each, some in zip(strata, steps, strict=True) for row in turns_of(each, some)]
-            bounded = [row for row in turns if row is not None]
-            parts.turns.rows += bounded if len(bounded) == len(turns) else []
-            for k, node in enumerate((at, at + 1)):
-                lands = [
-                    Lands(each.weight, some[0], each.images(some[0], k), sure=len(some) == 1)
-                    for each, some in zip(strata, steps, strict=True)
-                ]
-                # on a cell of one branch the node has this one too
-                before = places.get(node, lands)
-                places[node] = [new if new.sure else old for new, old in zip(lands, before, strict=True)]
-    rows = mean_rows(len(mesh.place), mesh if scatter is None else scatter.mesh, [spread_of(places, parts)])
+            collected.add(
+                at,
+                [
+                    steps_from(each.whole, side, at, ends, seen)
+                    for each, seen in zip(strata, known, strict=True)
+                ],
+            )
+    goal, spread = mesh if scatter is None else scatter.mesh, spread_of(collected.places, collected.parts)
     # nodes are not raised together: the cells beside a change of branch may be wide
-    return Chain(mesh, scatter, rows, {}, parts, 0.0, narrow=0.0), pieces
+    rows = mean_rows(len(mesh.place), goal, [spread])
+    return Chain(mesh, scatter, rows, {}, collected.parts, 0.0, narrow=0.0), collected.pieces
 
 
 class Lands(NamedTuple):
@@ -172,6 +158,36 @@ class Lands(NamedTuple):
     step: StepOfMap
     images: list[Arb]
     sure: bool
+
+
+class CellsOfMap:
+    """What is collected of cells: their pieces by stratum, and by node and stratum where steps from there lead."""
+
+    def __init__(self, strata: list[Stratum]):
+        self.strata, self.parts, self.places = strata, Parts(), dict[int, list[Lands]]()
+        self.pieces = [list[BranchOfCell]() for _ in strata]
+
+    def add(self, at: int, steps: list[list[StepOfMap]]) -> None:
+        """Add a cell by the steps of each stratum, unless those of some are not enclosed."""
+        if not all(steps):
+            return
+        for own, some in zip(self.pieces, steps, strict=True):
+            own += [step.piece for step in some]
+        by_stratum = list(zip(self.strata, steps, strict=True))
+        open_share = sum(each.weight for each, some in by_stratum if len(some) > 1)
+        ranges = hulls((step.piece.branch, step.to, *step.range) for some in steps for step in some)
+        self.parts.at_cells.rows.append((at, open_share, *ranges[0], *ranges[-1]))
+        turns = [row for each, some in by_stratum for row in turns_of(each, some)]
+        bounded = [row for row in turns if row is not None]
+        self.parts.turns.rows += bounded if len(bounded) == len(turns) else []
+        for k, node in enumerate((at, at + 1)):
+            lands = [
+                Lands(each.weight, some[0], each.images(some[0], k), sure=len(some) == 1)
+                for each, some in by_stratum
+            ]
+            # on a cell of one branch the node has this one too
+            before = self.places.get(node, lands)
+            self.places[node] = [new if new.sure else old for new, old in zip(lands, before, strict=True)]
 
 
 def hulls(ranges: Iterable[tuple[int, int, float, float]]) -> list[tuple[int, float, float]]:

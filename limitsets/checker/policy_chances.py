@@ -119,10 +119,10 @@ def policy_chances_in_words(c: PolicyChances) -> list[str]:
         "catch": (f"the part is caught {there}", f"the part is caught (at x >= {c.game.x}) or {lost}"),
     }[c.game.mode]
     return [
-        f"policy-chances: T is the number of throws until {until}, or {answer}",
-        "    all deviations are independent of each other",
+        f"policy-chances: T is the number of throws that the table of this file makes until {until}, or {answer}",
+        "    all deviations are independent of each other, and of all answers given before them",
         f"    starts, equally likely per length: {places_in_words(c.setting.starts, c.setting.scene.unit)}",
-        *table_in_words(c.game, len(c.throw)),
+        *(f"    {line}" for line in table_in_words(c.game, len(c.throw))),
         f"    P({ends}): between {rounded(come[0], up=False)} and {rounded(min(come[1], 1.0), up=True)}",
         f"    the mean of T: between {rounded(mean[0], up=False)} and {rounded(mean[1], up=True)}",
     ]
@@ -208,6 +208,8 @@ def bound_of(c: PolicyChances, chains: dict[int, Chain], places: Places, of: str
 def bounds_of(c: PolicyChances, advance: Callable[[int], None]) -> dict[str, Pair]:
     """Bound the mean of T and the probability that a part comes, over the starts."""
     check_table(c.game, c.throw, c.left, c.after)
+    stops = c.game.mode == "stop" or not (c.throw == STOP).any()
+    prove(stops, "the table stops, where parts go on until they are caught")
     states, answers = np.nonzero((c.after != NO_STATE) & (c.throw != STOP)[:, None])
     falls = c.left[c.after[states, answers]] < c.left[states]
     prove(bool(falls.all()), "the number of throws left does not fall")
@@ -216,10 +218,10 @@ def bounds_of(c: PolicyChances, advance: Callable[[int], None]) -> dict[str, Pai
     places, row = places_of(c, mesh), start_row(c.setting, mesh)
     made = sorted(set(c.throw.tolist()) - {STOP})
     chains = {throw: chain_on(c.settings[throw], c.edges, advance)[0] for throw in made}
-    bounds = {}
+    bounds, most = {}, max((int(c.left[k]) for k in c.game.first if k != NO_STATE), default=0)
     for of in (MEAN, COME):
         low, high = (mean_above(row, bound_of(c, chains, places, of, sign)) for sign in (-1.0, 1.0))
-        bounds[of] = max(-low, 0.0), high if of == MEAN else min(high, 1.0)
+        bounds[of] = max(0.0, -low), min(high, float(most) if of == MEAN else 1.0)
     return bounds
 
 

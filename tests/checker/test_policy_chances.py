@@ -7,10 +7,14 @@ import pytest
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
+import flint
 from limitsets.robust import Gaussian, Scattering, Uniform
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
+from limitsets.checker.balls import PRECISION
+from limitsets.checker.brackets import mesh_of
+from limitsets.checker.policy_chances import PolicyChances, places_of, read_settings
 from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
 from limitsets.parameters.noise.sampling import ManyParts, scattering_map
 from limitsets.proofs.policies import policy_chances
@@ -138,12 +142,39 @@ def thrown(policy, scatter, count, mood):
     return made, come
 
 
+def test_a_sensor_far_off_the_arm_is_no_matter(tmp_path):
+    far = ls.feedback(
+        scene_with(), BeyondSensor(20.0, 150.0), starts={2: (20.5, 21.0)}, goal=(20.0, 2), cells=64
+    )
+    chances = policy_chances(far, cells=8)
+    assert chances.mean == (0.0, 0.0)
+    assert ls.recheck(chances.save(tmp_path / "far.proof.zip")).verdict == "proved"
+
+
 def test_a_normal_law_counts_its_tails():
     policy = one_throw((17.0, 2), {"landing.x": "0.05 in"})
     x = float(images(ls.load("paper-designed").map, np.array([16.0005]), 2).x[0])
     sigma = (x - 17.0) / 2.0
     lo, hi = policy_chances(policy, Scattering(landing=Gaussian(sigma)), cells=1000).come
     assert lo < 0.97725 < hi < lo + 5e-3  # of a standard normal number above -2
+
+
+def test_cells_that_hold_a_place_count_on_both_of_its_sides(written):
+    """Cells from 5 to 19, to 21, to 27 in; wanted is 20 in or beyond on side 2, and the sensor tells this side."""
+    with flint.ctx.workprec(PRECISION):
+        game, settings = read_settings(section_of(written[1]))
+        edges = [np.array([5.0, 19.0, 21.0, 27.0])] * 3
+        for mode, right, wrong, asked in (("catch", [2, 3], [], [1, 2]), ("stop", [2, 3], [1, 2], [1, 2, 3])):
+            table = PolicyChances(game._replace(mode=mode), settings, edges, *[np.zeros(0)] * 3, {})
+            places = places_of(table, mesh_of(edges, 1000.0))
+            of_side = {"right": places.right, "wrong": places.wrong, "yes": places.answers[0]}
+            # by left nodes: far out, 5, 19, 21, 27, far out on each side
+            found = {name: np.flatnonzero(some[12:18]).tolist() for name, some in of_side.items()}
+            assert {name: [k for k in some if 1 <= k <= 3] for name, some in found.items()} == {
+                "right": right, "wrong": wrong, "yes": asked,
+            }  # fmt: skip
+            elsewhere = np.flatnonzero(places.wrong[:6]).tolist()
+            assert [k for k in elsewhere if 1 <= k <= 3] == ([2, 3] if mode == "catch" else [1, 2, 3])
 
 
 # ------------------------------------------------------------------------------ files
@@ -173,6 +204,15 @@ def test_bounds_that_are_nearer_are_denied(written, tmp_path, word, end):
     assert report.verdict == "failed"
     assert f"policy-chances: {word}: " in report.reason
     assert "is claimed, only" in report.reason
+
+
+def test_a_table_that_stops_leaves_parts_that_have_to_be_caught(written, tmp_path):
+    forged = written[1].copy()
+    forged.arrays["throw"] = np.full_like(forged.arrays["throw"], -1)
+    for word in ("mean", "come"):
+        section_of(forged)[word] = [(0.0).hex(), (1.0).hex()]
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.proof.zip"))
+    assert (report.verdict, "the table stops" in report.reason) == ("failed", True)
 
 
 def changed_table(forged, name, place, value):
@@ -221,9 +261,14 @@ def test_what_is_no_such_claim_is_denied(written, tmp_path, change, verdict, why
 
 def test_what_cannot_be_asked_is_refused(solved):
     unsolved = ls.feedback(scene_with(), "none", starts=FEW, cells=64, throws=1)
-    with pytest.raises(AnswerError, match="the policy is 'not-solved'"):
+    with pytest.raises(AnswerError, match=r"the policy is .not-solved."):
         policy_chances(unsolved)
     with pytest.raises(AnswerError, match="the cells of an expectation is 0"):
         policy_chances(solved["place"], cells=0)
+    for cells in ("8", 8.5):
+        with pytest.raises(AnswerError, match="the argument cells"):
+            policy_chances(solved["place"], cells=cells)
+    with pytest.raises(AnswerError, match="more than 120000 nodes"):
+        policy_chances(solved["place"], Scattering(landing=Gaussian(0.02)), cells=45_000)
     with pytest.raises(AnswerError, match="of speed and landing place"):
         policy_chances(solved["place"], Scattering(tilt=Uniform(0.01)))

@@ -50,9 +50,7 @@ def test_json_has_the_keys_of_the_page(capfd):
 def test_brackets_are_proved_beside_the_thrown_parts(capfd):
     few = (*FEW, "--noise", "landing.x=0.005 in", "--brackets", "300")
     out = prints(capfd, "feedback", SCENE, *few)
-    said = re.search(
-        r"PROVED where deviations .* within the noise: ([\d.]+) to ([\d.]+) throws on average", out
-    )
+    said = re.search(r"PROVED \(deviations .* per length\): ([\d.]+) to ([\d.]+) throws on average", out)
     assert said is not None
     record = json_of(capfd, "feedback", SCENE, *few)["brackets"]
     assert float(said[1]) <= record["mean"]["lo"] <= record["mean"]["hi"] <= float(said[2])

@@ -210,9 +210,10 @@ def _proved(proved: PolicyChances | None) -> Iterator[str]:
     """Put proved brackets in words, rounded outward."""
     if proved is not None:
         scattered = proved.scatter.given()
-        laws = "where deviations are equally likely within the noise" if scattered else "without noise"
+        laws = "deviations equally likely within the noise, independent" if scattered else "no noise"
         mean, come = (outward(*pair) for pair in (proved.mean, proved.come))
-        yield f"PROVED {laws}: {mean} throws on average; the part comes with a probability of {come}"
+        yield f"PROVED ({laws}; starts equally likely per length): {mean} throws on average,"
+        yield f"    and the part comes with a probability of {come}"
 
 
 def _named_states(after: dict[str, int | None], word: str) -> str:

@@ -18,6 +18,7 @@ from limitsets.base import (
     Progress,
     Table,
     Tabled,
+    arguments_checked,
     as_table,
     picked,
     shown_in_notebooks,
@@ -115,6 +116,7 @@ class PolicyChances(Tabled):
 
 
 @shown_in_notebooks
+@arguments_checked
 def policy_chances(
     synthesis: Synthesis,
     scatter: Scattering | None = None,
@@ -124,8 +126,8 @@ def policy_chances(
 ) -> PolicyChances:
     """Prove how many throws a policy makes in the mean, and how likely parts come, where deviations have known laws.
 
-    Starts are equally likely per length on the starts of the policy.  Near the place of the sensor, where it may err,
-    the bounds hold whatever it answers.
+    Starts are equally likely per length on the cells of the policy's starts.  Near the place of the sensor, where it
+    may err, the bounds hold whatever it answers, as long as it does not know the deviations of throws to come.
 
     Parameters
     ----------
@@ -161,16 +163,15 @@ def policy_chances(
     True
     """
     begun, tell = time.perf_counter(), progress or silent
-    policy = synthesis.found.policy
-    if policy is None:
-        remedy = "more throws, other throws, another sensor or fewer starts may do it"
-        raise AnswerError("the policy", synthesis.found.verdict, "one that was found", remedy)
+    policy = synthesis.require_policy()
     require_cells(cells, "expectation")
     require_minimal(synthesis)
     require_checker()
     import flint
 
-    from limitsets.checker.balls import PRECISION
+    from limitsets.checker.balls import PRECISION, UnprovedError
+    from limitsets.checker.brackets import require_edges
+    from limitsets.checker.file import BadFileError
     from limitsets.checker.policy_chances import PolicyChances as Claimed, bounds_of, read_settings
 
     scatter = _within(synthesis) if scatter is None else scatter
@@ -198,7 +199,11 @@ def policy_chances(
             for side in range(len(scene.sides))
         ]
         table = policy.throw, policy.left, policy.after
-        bounds = bounds_of(Claimed(game, settings, edges, *table, {}), told)
+        try:
+            require_edges(edges, settings[0])
+            bounds = bounds_of(Claimed(game, settings, edges, *table, {}), told)
+        except (BadFileError, UnprovedError) as error:
+            raise AnswerError("the chances", "none proved", "what the checker takes", str(error)) from None
     section |= {
         word: [(lo * (1.0 - ALLOWANCE)).hex(), (hi * (1.0 + ALLOWANCE)).hex()]
         for word, (lo, hi) in bounds.items()
@@ -235,4 +240,5 @@ def _cuts(synthesis: Synthesis) -> Array:
     close = CLOSE * synthesis.scene.arm_length
     sensor = synthesis.sensor
     places = [synthesis.goal[0], *getattr(sensor, "cuts", ())]
-    return np.array([x + k * close for x in places for k in (-2, -1, 0, 1, 2)])
+    arm = synthesis.scene.arm_length
+    return np.array([x + k * close for x in places if abs(x) < arm for k in (-2, -1, 0, 1, 2)])

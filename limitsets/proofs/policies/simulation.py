@@ -239,10 +239,7 @@ def simulate(synthesis: Synthesis, parts: int = 10_000, seed: int = 0) -> Simula
     AnswerError
         Where there is no policy.
     """
-    policy = synthesis.found.policy
-    if policy is None:
-        remedy = "more throws, other throws, another sensor or fewer starts may do it"
-        raise AnswerError("the policy", synthesis.found.verdict, "one that was found", remedy)
+    policy = synthesis.require_policy()
     random = np.random.default_rng(seed)
     x, side = _drawn(synthesis, parts, random)
     state = policy.first[_heard(synthesis, x, side, random)]

@@ -160,6 +160,14 @@ class Synthesis(Board, Saved):
         """Whether there is a policy."""
         return self.found.verdict == SOLVED
 
+    def require_policy(self) -> Policy:
+        """Return the policy; AnswerError where there is none."""
+        outcome = self.found
+        if outcome.policy is None:
+            remedy = "more throws, other throws, another sensor or fewer starts may do it"
+            raise AnswerError("the policy", outcome.verdict, "one that was found", remedy)
+        return outcome.policy
+
     @property
     def grid(self) -> Grid:
         """The cells."""
@@ -181,11 +189,7 @@ class Synthesis(Board, Saved):
 
     def _write(self, path: str | Path, **how: Any) -> None:
         """Write the policy that was found."""
-        if self.found.policy is None:
-            raise AnswerError(
-                "the certificate", self.found.verdict, "of a policy that was found", "see .found"
-            )
-        write(path, self, self.sensor, self.found.policy, **how)
+        write(path, self, self.sensor, self.require_policy(), **how)
 
     def denied(self, why: str) -> Synthesis:
         """Return the answer where the checker denies its certificate: nothing is decided."""

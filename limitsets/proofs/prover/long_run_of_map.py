@@ -230,8 +230,8 @@ def long_run_of_map(
         shares = {"share", "steps"} & set(one.section)  # these lie between 0 and 1 by themselves
         numbers[one.name] = (max(lo, 0.0), min(hi, 1.0)) if shares else (lo, hi)
     return LongRunOfMap(
-        lower, upper, fine, landing if varied is None else noise, tuple(starts), numbers=numbers, section=section, arrays=arrays,
-        seconds=time.perf_counter() - begun,
+        lower, upper, fine, landing if varied is None else noise, tuple(starts), numbers=numbers, section=section,
+        arrays=arrays, seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 
