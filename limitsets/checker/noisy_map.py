@@ -177,7 +177,7 @@ class CellsOfMap:
         open_share = sum(each.weight for each, some in by_stratum if len(some) > 1)
         ranges = hulls((step.piece.branch, step.to, *step.range) for some in steps for step in some)
         self.parts.at_cells.rows.append((at, open_share, *ranges[0], *ranges[-1]))
-        turns = [row for each, some in by_stratum for row in turns_of(each, some)]
+        turns = [row for each, some in by_stratum for row in turns_of_stratum(each, some)]
         bounded = [row for row in turns if row is not None]
         self.parts.turns.rows += bounded if len(bounded) == len(turns) else []
         for k, node in enumerate((at, at + 1)):
@@ -199,7 +199,7 @@ def hulls(ranges: Iterable[tuple[int, int, float, float]]) -> list[tuple[int, fl
     return [by_branch[branch] for branch in sorted(by_branch)]
 
 
-def turns_of(of: Stratum, steps: list[StepOfMap]) -> Iterator[tuple[float, ...] | None]:
+def turns_of_stratum(of: Stratum, steps: list[StepOfMap]) -> Iterator[tuple[float, ...] | None]:
     """Bound how far the mean lies above its chord along a cell, and above that of the ends of what varies.
 
     Nothing where both branches are possible, which counts by the share of the range of G; None where nothing is known.

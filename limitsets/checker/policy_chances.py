@@ -205,7 +205,7 @@ def bound_of(c: PolicyChances, chains: dict[int, Chain], places: Places, of: str
     return heard(c.game.first)
 
 
-def bounds_of(c: PolicyChances, advance: Callable[[int], None]) -> dict[str, Pair]:
+def bounds_of_policy(c: PolicyChances, advance: Callable[[int], None]) -> dict[str, Pair]:
     """Bound the mean of T and the probability that a part comes, over the starts."""
     check_table(c.game, c.throw, c.left, c.after)
     stops = c.game.mode == "stop" or not (c.throw == STOP).any()
@@ -235,7 +235,7 @@ def check_policy_chances(c: PolicyChances, progress: Progress) -> None:
         if progress is not None:
             progress(done, work)
 
-    for word, (low, high) in bounds_of(c, advance).items():
+    for word, (low, high) in bounds_of_policy(c, advance).items():
         lo, hi = c.bounds[word]
         only = f"only {rounded(low, up=False)} to {rounded(high, up=True)} is proved"
         prove(lo <= low and high <= hi, f"{word}: {lo!r} to {hi!r} is claimed, {only}")

@@ -172,7 +172,7 @@ def policy_chances(
     from limitsets.checker.balls import PRECISION, UnprovedError
     from limitsets.checker.brackets import require_edges
     from limitsets.checker.file import BadFileError
-    from limitsets.checker.policy_chances import PolicyChances as Claimed, bounds_of, read_settings
+    from limitsets.checker.policy_chances import PolicyChances as Claimed, bounds_of_policy, read_settings
 
     scatter = _within(synthesis) if scatter is None else scatter
     scene, places = synthesis.scene, synthesis.starts.extents()
@@ -201,7 +201,7 @@ def policy_chances(
         table = policy.throw, policy.left, policy.after
         try:
             require_edges(edges, settings[0])
-            bounds = bounds_of(Claimed(game, settings, edges, *table, {}), told)
+            bounds = bounds_of_policy(Claimed(game, settings, edges, *table, {}), told)
         except (BadFileError, UnprovedError) as error:
             raise AnswerError("the chances", "none proved", "what the checker takes", str(error)) from None
     section |= {
