@@ -86,7 +86,7 @@ def test_the_power_is_90_percent(effect):
 @pytest.mark.sweep
 @pytest.mark.parametrize("flipped", [0.0, 0.05])
 def test_the_level_is_5_percent(flipped):
-    assert rejected(40, seed=24, flipped=flipped) <= binom.ppf(0.999, 40, 0.05)
+    assert rejected(100, seed=24, flipped=flipped) <= binom.ppf(0.999, 100, 0.05)
 
 
 @pytest.mark.parametrize("effect", [None, "roll", pytest.param("slip", marks=pytest.mark.sweep)])
