@@ -251,7 +251,7 @@ def test_it_ends_where_the_rigid_body_does() -> None:
 
 
 @pytest.mark.sweep
-@pytest.mark.parametrize("others", [("slip",), ("bounce",), ("slip", "bounce"), ("pivot",)])
+@pytest.mark.parametrize("others", [("slip",), ("bounce",), ("slip", "pivot"), ("slip", "pivot", "bounce")])
 def test_it_ends_where_the_rigid_body_does_with_other_effects(others: tuple[str, ...]) -> None:
     assert all(agree(case, (*BOTH, *others)) for case in chamfered_cases(30, 11))
 
