@@ -27,10 +27,13 @@ analyse: .venv/run.stamp  ## report and pictures of the paper's designed feeder 
 	$(PY) -m limitsets analyse $(SCENE)
 
 test: .venv/dev.stamp  ## the tests, with the examples in the docstrings, the studies and the notebooks
-	$(PYTEST) -m "not sweep"
+	$(PYTEST) -m "not sweep and not repeats"
 
 test-all: .venv/dev.stamp  ## these and the long ones: many random examples, searches
-	$(PYTEST)
+	$(PYTEST) -m "not repeats"
+
+repeats: .venv/dev.stamp  ## more random examples of what test-all checks with fewer; no part of CI
+	$(PYTEST) -m repeats
 
 lint: .venv/dev.stamp  ## ruff: rules and format
 	$(PY) -m ruff check .
@@ -93,4 +96,4 @@ $(PY):
 gallery: .venv/dev.stamp  ## draw the pictures of docs/gallery.md again
 	cd docs/gallery && awk '/^```python/ { on = 1; next } /^```/ { on = 0 } on' ../gallery.md | ../../$(PY) -
 
-.PHONY: help analyse test test-all lint types contracts bench docs linkcheck checker studies notebooks gallery check clean
+.PHONY: help analyse test test-all repeats lint types contracts bench docs linkcheck checker studies notebooks gallery check clean

@@ -80,7 +80,7 @@ def rejected(count, seed, **how):
 @pytest.mark.sweep
 @pytest.mark.parametrize("effect", ["roll", "slip"])
 def test_the_power_is_90_percent(effect):
-    assert told_apart(effect, 100, seed=22) >= 90  # of a thousand in the benchmarks
+    assert told_apart(effect, 40, seed=22) >= 36  # of a thousand in the benchmarks
 
 
 @pytest.mark.sweep

@@ -82,9 +82,12 @@ NOISES = [
 ]
 
 
+CASES = [("paper-designed", *each) for each in NOISES]
+CASES += [("paper-initial", *NOISES[k]) for k in (0, 1, 2, 3, 5, 6, 7)]  # the others take longest
+
+
 @pytest.mark.sweep
-@pytest.mark.parametrize(("scatter", "count"), NOISES)
-@pytest.mark.parametrize("name", ["paper-designed", "paper-initial"])
+@pytest.mark.parametrize(("name", "scatter", "count"), CASES)
 def test_one_throw_is_bounded_at_every_place(name, scatter, count):
     scene = ls.load(name)
     chain = chain_of(scene, scatter, [(2, 8.0, 20.0)], {"right": [(2, 25.0, math.inf)]}, 250).steps

@@ -24,8 +24,8 @@ from tests.sweep.stores import bytes_of, run
 from tests.sweep.tasks_of_tests import TASK, X, Y, long_answer
 
 ROOT = Path(__file__).resolve().parents[2]
-FEW, MANY = range(1), range(1, 20)
-SEEDS = [*FEW, *(pytest.param(k, marks=pytest.mark.sweep) for k in MANY)]
+MARKS = [[], *[pytest.mark.sweep] * 4, *[pytest.mark.repeats] * 15]
+SEEDS = [pytest.param(k, marks=marks) for k, marks in enumerate(MARKS)]
 
 
 def workers_of(process):
@@ -72,7 +72,7 @@ def test_a_killed_worker_costs_nothing_but_time(seed, tmp_path, whole):
 
 
 @pytest.mark.sweep
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_killed_driver_is_continued_and_leaves_no_workers(seed, tmp_path, whole):
     store, rng = tmp_path / "s.zarr", random.Random(seed)
     for chunks in sorted(rng.randrange(20) for _ in range(2)):  # the second one kills a run that continues
@@ -213,7 +213,7 @@ def mounted(place, size):
 if hasattr(os, "geteuid") and os.geteuid() == 0:
 
     @pytest.mark.sweep
-    @pytest.mark.parametrize("pages", range(25, 45))
+    @pytest.mark.parametrize("pages", range(25, 45, 3))
     def test_a_file_system_that_is_full_is_continued_when_it_is_larger(pages, tmp_path, whole):
         place = tmp_path / "small"
         place.mkdir()

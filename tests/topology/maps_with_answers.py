@@ -41,20 +41,23 @@ ls.register(Two, image=_two, image_on=_two_on, branches=("left", "right", "rest"
 
 
 class Grazing(NamedTuple):
-    """x' = x/2 below `jump`, and (1 + x)/2 from there on, on one branch: a jump that no code tells.
+    """x' = slope x + offset, and from `jump` on 1/2 more, on one branch: a jump that no code tells.
 
-    Known answers: for jump in (0, 1) the fixed points 0 and 1 attract what lies below and above `jump`.
+    Known answers: with slope 1/2, offset 0 and jump in (0, 1) the fixed points 0 and 1 attract what lies below and
+    above `jump`; without a jump the fixed point is offset / (1 - slope).
     """
 
     jump: float = 0.3
+    slope: float = 0.5
+    offset: float = 0.0
 
 
 def _grazing(params: Grazing, x: float, side: int) -> tuple[float, int, int]:
-    return 0.5 * x + 0.5 * (1.0 if x >= params.jump else 0.0), side, 0
+    return params.slope * x + params.offset + (0.5 if x >= params.jump else 0.0), side, 0
 
 
 def _grazing_on(params: Grazing, x: float, side: int, branch: int) -> tuple[float, int, float]:
-    return 0.5 * x + 0.5 * (1.0 if x >= params.jump else 0.0), side, 0.5
+    return params.slope * x + params.offset + (0.5 if x >= params.jump else 0.0), side, params.slope
 
 
 ls.register(Grazing, image=_grazing, image_on=_grazing_on)

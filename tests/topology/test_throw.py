@@ -144,25 +144,6 @@ def _sines_on(p, x, side, branch):
 ls.register(TwoSines, image=_sines, image_on=_sines_on, branches=("back", "same", "on"))
 
 
-class Monotone(NamedTuple):
-    """The same map where it rises: two branches."""
-
-    omega: float
-    k: float
-    m: float
-
-
-def _monotone(p, x, side):
-    y = _lift(p, x)
-    return (y, side, 0) if y < 1.0 else (y - 1.0, side, 1)
-
-
-def _monotone_on(p, x, side, branch):
-    return _lift(p, x) - branch, side
-
-
-ls.register(Monotone, image=_monotone, image_on=_monotone_on, branches=("same", "on"))
-
 # The longest cycle that is looked for, and what is near enough for Newton's method to begin.
 LONGEST, NEAR = 256, 1e-2
 
@@ -250,7 +231,7 @@ def test_a_cycle_that_was_told_as_two_bands():
     [
         (of_ricker, 600, 0.25),
         (of_logistic, 1500, 0.1),
-        pytest.param(of_ricker, 10_000, 0.25, marks=pytest.mark.sweep),
+        pytest.param(of_ricker, 10_000, 0.25, marks=pytest.mark.repeats),
     ],
 )
 def test_no_cycle_of_a_map_is_told_as_chaos(of_map, count, cycles):
@@ -275,7 +256,7 @@ def test_at_a_bifurcation_no_longer_cycle_is_told(r, period):
 @pytest.mark.parametrize(
     ("circle", "period"),
     # the orbit {0, 1/2} of multiplier (1 - m)^2 - k^2, and the fixed point 0 of multiplier 1 - k - m
-    [(Monotone(0.5, 0.75, 0.2), 2), (Monotone(0.5, 0.4, 0.2), 2), (TwoSines(0.0, 1.5, 0.3), 1)],
+    [(TwoSines(0.5, 0.75, 0.2), 2), (TwoSines(0.5, 0.4, 0.2), 2), (TwoSines(0.0, 1.5, 0.3), 1)],
 )
 def test_a_cycle_on_the_cut_of_a_circle_is_not_told_twice(circle, period):
     """0 and 1 are one place of the circle: the same cycle was told as two attractors, of periods 3 and 2."""
