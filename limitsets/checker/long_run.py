@@ -118,6 +118,9 @@ def kept_cells(chain: Chain, law: Law) -> Array:
     kept[live] = alone[live] & alone[live + 1]
     reach, met = float(np.nextafter(float(law.reach), np.inf)), []
     for span in (chain.cells.one, chain.cells.two):
+        if law.certain:
+            met.append(span)
+            continue
         side = np.searchsorted(goal.first, span.first, side="right") - 1
         met.append(mesh.within(side, goal.place[span.first] - reach, goal.place[span.last + 1] + reach))
     while True:

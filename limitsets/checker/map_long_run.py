@@ -103,8 +103,10 @@ def read_varied(value: object, names: list[str], where: str) -> Varied:
     """Read which parameter varies at every step."""
     known = table(value, f"{where}: varied", "name within strata")
     bound = rational(known["within"], f"{where}: varied")
-    named_one = known["name"] in names and type(known["strata"]) is int and known["strata"] in STRATA
-    require(named_one and bound > 0, f"{where}: what varies is no parameter, or its bound or strata are none")
+    count = known["strata"]
+    require(known["name"] in names, f"{where}: what varies is no parameter of the map")
+    require(bound > 0, f"{where}: what varies has no bound above 0")
+    require(type(count) is int and count in STRATA, f"{where}: strata is not a power of 2 up to {STRATA[-1]}")
     return Varied(known["name"], bound, known["strata"])
 
 
@@ -259,7 +261,7 @@ def gains_of(the_map: Map, c: LongRunOfMap) -> tuple[Chain, Array, list[list[Gai
     nodes, free = nodes_of(kept), np.full(len(chain.mesh.place), -np.inf)
 
     def gain(counted: Majorant) -> GainOfEnd:
-        prove(counted.excess == 0.0 or not c.law.certain, "ln |f'| has a pole, and landings do not scatter")
+        prove(counted.excess == 0.0 or not c.law.certain, "ln |f'| has a pole: landings have to scatter too")
         more = counted.excess * c.law.most * INFLATE if counted.excess else 0.0
 
         def bound(u: Array) -> tuple[Array, Array]:

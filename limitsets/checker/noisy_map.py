@@ -18,7 +18,7 @@ import numpy as np
 from flint import arb
 
 from .any_map import Map, possible
-from .balls import Arb, Array, Pair, exact
+from .balls import Arb, Array, Pair, exact, prove
 from .brackets import OUTERMOST, mesh_of
 from .file import decimal
 from .landings import upper
@@ -145,6 +145,7 @@ def chain_of_map(
                     for each, seen in zip(strata, known, strict=True)
                 ],
             )
+    prove(bool(collected.places), "the image of no cell is enclosed")
     goal, spread = mesh if scatter is None else scatter.mesh, spread_of(collected.places, collected.parts)
     # nodes are not raised together: the cells beside a change of branch may be wide
     rows = mean_rows(len(mesh.place), goal, [spread])

@@ -215,6 +215,17 @@ def test_a_table_that_stops_leaves_parts_that_have_to_be_caught(written, tmp_pat
     assert (report.verdict, "the table stops" in report.reason) == ("failed", True)
 
 
+def test_an_answer_that_leads_to_no_state_ends_the_throws(tmp_path):
+    policy = one_throw((17.0, 2), {"landing.x": "0.05 in"})
+    file = opened(
+        policy_chances(policy, Scattering(landing=Uniform(0.5)), cells=300).save(tmp_path / "a.proof.zip")
+    )
+    file.arrays["after"] = np.full_like(file.arrays["after"], -1)
+    section_of(file)["mean"] = [(1.0 - 1e-9).hex(), (1.0 + 1e-9).hex()]
+    section_of(file)["come"] = [(0.0).hex(), (1e-9).hex()]
+    assert ls.recheck(file.seal().write(tmp_path / "b.proof.zip")).verdict == "proved"
+
+
 def changed_table(forged, name, place, value):
     forged.arrays[name] = forged.arrays[name].copy()
     forged.arrays[name][place] = value

@@ -18,7 +18,7 @@ from limitsets.checker.balls import PRECISION
 from limitsets.checker.laws import uniform_law
 from limitsets.checker.links import turn_of
 from limitsets.checker.map_long_run import LongRunOfMap, gains_of, pole
-from limitsets.checker.noisy_map import BranchOfCell, steps_from
+from limitsets.checker.noisy_map import BranchOfCell, Varied, chain_of_map, steps_from, strata_of
 from limitsets.checker.observable import Allowed, read_function
 from limitsets.proofs.prover.long_run_of_map import settled
 from tests.proofs.forge import opened
@@ -314,12 +314,12 @@ def test_the_range_of_a_step_holds_a_turn_inside_the_cell_and_its_bow():
 # ---------------------------------------------------------------- poles
 
 
-def checked(the_map):
+def checked(the_map, parameters=None):
     """A recorded map, as the checker has it."""
     from limitsets.proofs.prover.programs import recorded_map
     from limitsets.systems.maps import coerce
 
-    return Map(read_map(recorded_map(coerce(the_map), 1) | {"periodic": [[None]]}), {})
+    return Map(read_map(recorded_map(coerce(the_map), 1) | {"periodic": [[None]]}), parameters or {})
 
 
 def squares(x):
@@ -600,10 +600,71 @@ def test_a_file_with_a_parameter_that_varies_is_rechecked_and_forgeries_are_deni
         assert ls.recheck(forged.seal().write(tmp_path / "forged.proof.zip")).verdict == verdict, change
 
 
+def over(x, p):
+    return x / p
+
+
+def bare(x, landing):
+    return x * landing
+
+
+def waves(x, p):
+    return 0.8 * np.sin(3.0 * p * x) + p * p
+
+
+def kinked(x, p):
+    return 0.3 * x + 0.5 * abs(p - 0.03)
+
+
+def fewer(x, p):
+    return 0.5 * x - 0.4 * p
+
+
+def wavy_border(x, p):
+    return np.sin(8.0 * x) - 3.0 * p
+
+
+WIDE, FINE = np.linspace(-1.5, 1.5, 13), np.linspace(-1.5, 1.5, 61)
+VARIED = {  # map, value or range of p, strata, nodes, and the map in numpy
+    "two slopes": (ls.map(waves, p=0.0), ("0.0", "0.0"), 1, FINE, waves),
+    "few strata": (ls.map(waves, p=0.5), ("0.5", "0.5"), 4, WIDE, waves),
+    "a tolerance": (ls.map(waves, p=0.02), ("0.02", "0.05"), 2, WIDE, waves),
+    "a kink": (ls.map(kinked, p=0.0), ("0.0", "0.0"), 1, WIDE, kinked),
+    "a border": (
+        ls.map(pieces=(shifted, fewer), margin=wavy_border, p=0.0), ("0.0", "0.0"), 4, WIDE,
+        lambda x, p: np.where(wavy_border(x, p) > 0, fewer(x, p), shifted(x, p)),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("case", VARIED)
+def test_a_step_with_a_parameter_that_varies_is_bounded_at_every_place(case, seed):
+    the_map, ends, count, edges, image = VARIED[case]
+    rng = np.random.default_rng(seed)
+    slope, turn, bow = rng.uniform(-2.0, 2.0, 3)
+    with flint.ctx.workprec(PRECISION):
+        strata = strata_of(checked(the_map, {"p": ends}), Varied("p", Fraction(1, 10), count))
+        chain, _ = chain_of_map(strata, [edges], uniform_law(Fraction(0), 1))
+    place = chain.mesh.place
+    near = np.clip(place, -3.0, 3.0)
+    u = slope * np.sin(2.0 * near + turn) + bow * near * near
+    bound = chain.above(u, np.full(len(place), -np.inf))
+    x, p = rng.uniform(edges[0], edges[-1], 400), 0.2 * (np.arange(4000) + 0.5) / 4000 - 0.1
+    for value in {float(end) for end in ends}:
+        mean = np.interp(image(x[:, None], value + p), place, u).mean(axis=1)
+        assert (np.interp(x, place, bound) > mean - 2e-4).all()
+
+
 def test_noise_of_parameters_that_is_none_is_refused():
+    for the_map, noise in ((ls.map(over, p=0.05), {"p": 0.1}), (ls.map(times, p=0.3), {"p": 1e-50})):
+        with pytest.raises(AnswerError, match="the noise is"):
+            ls.average(the_map, ls.grid([(-1.0, 1.0)], cells=20), itself, noise=noise)
+    with pytest.raises(AnswerError, match="a parameter is 'landing'"):
+        ls.average(ls.map(bare, landing=0.5), ls.grid([(-1.0, 1.0)], cells=20), itself, noise=0.1)
     line, bow = ls.grid([(0.05, 0.99)], cells=100), ls.map(parabola, r=3.7)
     for noise, why in (
-        ({"q": 0.1}, "the noise of q is 0.1; allowed: above 0, of landing or r"),
+        ({"q": 0.1}, "the noise of q is 0.1; allowed: at least 1e-90, of landing or r"),
         ({"r": -0.1}, "the noise of r is -0.1"),
         ({}, "the noise is 0.0"),
         ({"landing": 0.0}, "the noise is 0.0"),

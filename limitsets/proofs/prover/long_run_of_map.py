@@ -175,11 +175,16 @@ def long_run_of_map(
         steps leave.
     """
     begun, tell = time.perf_counter(), progress or silent
-    landing, varied = _laws(lower, noise)
+    bounds = _laws(lower, noise)
+    landing, varied = (
+        bounds[LANDING],
+        next(((name, by) for name, by in bounds.items() if name != LANDING), None),
+    )
     require_noise(lower, upper, grid, landing if varied is None else landing or LEAST, WITHOUT)
     import flint
 
     from limitsets.checker.balls import PRECISION, UnprovedError
+    from limitsets.checker.file import BadFileError
     from limitsets.checker.laws import uniform_law
     from limitsets.checker.long_run import END_SIGNS
     from limitsets.checker.map_long_run import ENDS, LongRunOfMap as Claimed, gains_of
@@ -202,11 +207,10 @@ def long_run_of_map(
         parameter = None if varied is None else Varied(varied[0], Fraction(decimal(varied[1])), STRATA)
         try:
             chain, kept, gains = gains_of(the_map, Claimed("", law, parameter, [], edges, functions))
-        except UnprovedError as error:
+        except (BadFileError, UnprovedError) as error:
             allow = "so small that steps stay on some cells, where what is averaged has a bound"
-            raise AnswerError(
-                "the noise", noise, allow, f"widen the grid, or lower the noise: {error}"
-            ) from None
+            remedy = f"widen the grid, lower the noise, or let landings scatter too: {error}"
+            raise AnswerError("the noise", noise, allow, remedy) from None
         mesh, columns = chain.mesh, np.zeros((len(ENDS), len(chain.mesh.place), len(listed)))
         for k, (sign, word) in itertools.product(range(len(listed)), enumerate(ENDS)):
             tell(asked.functions[k].name, 2 * k + sign, 2 * len(listed))
@@ -230,25 +234,29 @@ def long_run_of_map(
         shares = {"share", "steps"} & set(one.section)  # these lie between 0 and 1 by themselves
         numbers[one.name] = (max(lo, 0.0), min(hi, 1.0)) if shares else (lo, hi)
     return LongRunOfMap(
-        lower, upper, fine, landing if varied is None else noise, tuple(starts), numbers=numbers, section=section,
+        lower, upper, fine, landing if varied is None else bounds, tuple(starts), numbers=numbers, section=section,
         arrays=arrays, seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 
-def _laws(lower: Any, noise: float | Mapping[str, float]) -> tuple[float, tuple[str, float] | None]:
-    """Read noise: how far steps land from the image, and the parameter that deviates, with its bound."""
-    bounds = {
-        name: float(bound)
-        for name, bound in (noise if isinstance(noise, Mapping) else {LANDING: noise}).items()
-    }
-    landing, parameters = bounds.pop(LANDING, 0.0), [name for name, _ in names_of(lower)]
+def _laws(lower: Any, noise: float | Mapping[str, float]) -> dict[str, float]:
+    """Read noise by name: how far steps land from the image, and the parameter that deviates, with its bound."""
+    given = noise if isinstance(noise, Mapping) else {LANDING: noise}
+    bounds, parameters = (
+        {LANDING: 0.0} | {name: float(bound) for name, bound in given.items()},
+        dict(names_of(lower)),
+    )
+    if LANDING in parameters:
+        raise AnswerError(
+            "a parameter", LANDING, "another name", "rename it: such noise is of where steps land"
+        )
     for name, bound in bounds.items():
-        if name not in parameters or not (math.isfinite(bound) and bound >= LEAST):
-            allowed = f"above 0, of {' or '.join([LANDING, *parameters])}"
+        if name != LANDING and not (name in parameters and LEAST <= bound < math.inf):
+            allowed = f"at least {LEAST}, of {' or '.join([LANDING, *parameters])}"
             raise AnswerError(f"the noise of {name}", bound, allowed, "correct it, or leave it out")
-    if len(bounds) > 1:
+    if len(bounds) > 2:
         raise AnswerError("the noise", sorted(bounds), "of one parameter", "leave the others out")
-    return landing, next(iter(bounds.items()), None)
+    return bounds
 
 
 def require_noise(lower: Any, upper: Any, grid: Grid, noise: float | None, without: str) -> None:
