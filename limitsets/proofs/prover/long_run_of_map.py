@@ -175,11 +175,7 @@ def long_run_of_map(
         steps leave.
     """
     begun, tell = time.perf_counter(), progress or silent
-    bounds = _laws(lower, noise)
-    landing, varied = (
-        bounds[LANDING],
-        next(((name, by) for name, by in bounds.items() if name != LANDING), None),
-    )
+    own, landing, varied = _laws(lower, noise)
     require_noise(lower, upper, grid, landing if varied is None else landing or LEAST, WITHOUT)
     import flint
 
@@ -234,13 +230,15 @@ def long_run_of_map(
         shares = {"share", "steps"} & set(one.section)  # these lie between 0 and 1 by themselves
         numbers[one.name] = (max(lo, 0.0), min(hi, 1.0)) if shares else (lo, hi)
     return LongRunOfMap(
-        lower, upper, fine, landing if varied is None else bounds, tuple(starts), numbers=numbers, section=section,
+        lower, upper, fine, own, tuple(starts), numbers=numbers, section=section,
         arrays=arrays, seconds=time.perf_counter() - begun,
     )  # fmt: skip
 
 
-def _laws(lower: Any, noise: float | Mapping[str, float]) -> dict[str, float]:
-    """Read noise by name: how far steps land from the image, and the parameter that deviates, with its bound."""
+def _laws(
+    lower: Any, noise: float | Mapping[str, float]
+) -> tuple[float | dict[str, float], float, tuple[str, float] | None]:
+    """Read noise: as the answer has it, how far steps land from the image, and the parameter that deviates, and how."""
     given = noise if isinstance(noise, Mapping) else {LANDING: noise}
     bounds, parameters = (
         {LANDING: 0.0} | {name: float(bound) for name, bound in given.items()},
@@ -256,7 +254,8 @@ def _laws(lower: Any, noise: float | Mapping[str, float]) -> dict[str, float]:
             raise AnswerError(f"the noise of {name}", bound, allowed, "correct it, or leave it out")
     if len(bounds) > 2:
         raise AnswerError("the noise", sorted(bounds), "of one parameter", "leave the others out")
-    return bounds
+    landing, *varied = bounds.items()
+    return (bounds if varied else landing[1]), landing[1], next(iter(varied), None)
 
 
 def require_noise(lower: Any, upper: Any, grid: Grid, noise: float | None, without: str) -> None:
