@@ -270,24 +270,27 @@ def test_cells_that_throws_leave_are_not_kept():
     chain = SimpleNamespace(mesh=mesh, goal=mesh, cells=inner, hard=SimpleNamespace(at=np.array([6])))
 
     def kept(reach):
-        return np.flatnonzero(kept_cells(chain, SimpleNamespace(reach=reach))).tolist()
+        return np.flatnonzero(kept_cells(chain, SimpleNamespace(reach=reach, certain=reach == 0.0))).tolist()
 
-    # each image meets its neighbours too, for roundings at its ends: 5 is beside the hard cell
-    assert kept(0.0) == []
+    # with scatter each image meets its neighbours too, for roundings at its ends: 5 is beside the hard cell
+    assert kept(1e-9) == []
+    # without it the spans are all that is met; 5 has a node of the hard cell
+    assert kept(0.0) == [1, 4]
     to |= {1: (2, 2), 2: (2, 2), 4: (2, 2)}
     span.first, span.last = (np.array([to[k][i] for k in live]) for i in (0, 1))
     other.first = other.last = np.full(live.size, 2)
-    assert kept(0.0) == []  # 2 and its neighbours, of which 3 leads out
+    assert kept(1e-9) == []  # 2 and its neighbours, of which 3 leads out
+    assert kept(0.0) == [1, 2, 4]
     to |= {3: (2, 2)}
     span.first, span.last = (np.array([to[k][i] for k in live]) for i in (0, 1))
-    assert kept(0.0) == [1, 2, 3, 4]
+    assert kept(1e-9) == [1, 2, 3, 4]
     assert kept(0.5) == [1, 2, 3, 4]
     assert kept(1.5) == []
-    assert kept(0.0) == [1, 2, 3, 4]
+    assert kept(1e-9) == [1, 2, 3, 4]
     other.last = np.array(
         [2, 6, 2, 2, 5]
     )  # on the other branch cell 2 leads to the hard cell, and 5 to itself
-    assert kept(0.0) == []
+    assert kept(1e-9) == []
 
 
 # ---------------------------------------------------------------- forged
