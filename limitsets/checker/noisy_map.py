@@ -89,7 +89,7 @@ class Varied(NamedTuple):
 
 
 class Stratum(NamedTuple):
-    """The map for a part of what a parameter may be: for all of it, and for either end; 1 where nothing varies."""
+    """The map for a part of what a parameter may be: for all of it, and for either end (none where nothing varies)."""
 
     weight: float
     whole: Map
