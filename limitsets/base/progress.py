@@ -47,6 +47,18 @@ def one_by_one(step: str, things: Iterable[T], of: int, progress: Progress | Non
         yield thing
 
 
+def added_up(step: str, of: int, progress: Progress | None) -> Callable[[int], None]:
+    """Return what is told how much more is done of a step, and says how much that is in all."""
+    done = 0
+
+    def told(more: int) -> None:
+        nonlocal done
+        done = min(done + more, of)
+        (progress or silent)(step, done, of)
+
+    return told
+
+
 def _number(done: int, of: int) -> int:
     """Give the number of the part that is on its way: the last one where all are done."""
     return min(done + 1, max(of, 1))

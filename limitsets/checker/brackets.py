@@ -14,7 +14,6 @@ import numpy as np
 from flint import arb
 
 from .balls import Array, UnprovedError, exact, prove
-from .cells import Progress
 from .file import (
     LENGTHS,
     Arrays,
@@ -77,6 +76,11 @@ class Chances(NamedTuple):
     mean: tuple[float, float] | None
     ever: dict[str, tuple[float, float]]
     functions: dict[str, Array]
+
+    @property
+    def work(self) -> int:
+        """How many nodes are thrown from, and looked at, in all."""
+        return (1 + len(self.within)) * sum(len(each) for each in self.edges)
 
     @property
     def raw(self) -> dict[str, Any]:
@@ -385,17 +389,9 @@ def check_quantiles(c: Chances, brackets: dict[str, Array]) -> None:
         prove(none_before and there, quantile)
 
 
-def check_chances(c: Chances, progress: Progress) -> None:
+def check_chances(c: Chances, advance: Callable[[int], None]) -> None:
     """Check everything that is claimed."""
     nodes = sum(len(each) for each in c.edges)
-    work, done = (1 + len(c.within)) * nodes, 0
-
-    def advance(more: int) -> None:
-        nonlocal done
-        done = min(done + more, work - 1)
-        if progress is not None:
-            progress(done, work)
-
     chain, row = chain_on(c.setting, c.edges, advance)
     brackets: dict[str, Array] = {}
     for name, said in c.within.items():
@@ -410,5 +406,3 @@ def check_chances(c: Chances, progress: Progress) -> None:
     for k, (name, said_of) in enumerate(c.ever.items()):
         pair = c.functions[f"ever.{k}.lower"], c.functions[f"ever.{k}.upper"]
         check_ever(chain, row, name, said_of, pair, ends)
-    if progress is not None:
-        progress(work, work)

@@ -41,6 +41,22 @@ Targets = tuple[Pair, Pair]  # the ends of the target cells of a jog and of a fl
 Progress = Callable[[int, int], None] | None  # called with the number of cells done and the number of all
 
 
+@contextmanager
+def added_up(progress: Progress, work: int) -> Iterator[Callable[[int], None]]:
+    """Give what is told how many more cells are done; all are only at the end."""
+    done = 0
+
+    def advance(more: int) -> None:
+        nonlocal done
+        done = min(done + more, work - 1)
+        if progress is not None:
+            progress(done, work)
+
+    yield advance
+    if progress is not None:
+        progress(work, work)
+
+
 def marked(ranges: Array, n: int) -> Array:
     """Mark the cells of some ranges, each given by its first and its last one."""
     begin, past = (np.bincount(at, minlength=n + 1) for at in (ranges[:, 0], ranges[:, 1] + 1))

@@ -25,7 +25,6 @@ import numpy as np
 
 from .balls import Array, Pair, about, prove
 from .brackets import Place, Setting, chain_on, places_in_words, read_setting, require_edges
-from .cells import Progress
 from .file import Arrays, hex_float, read_side, require, rounded, rows, section_alone, table
 from .laws import Law
 from .log_slopes import log_slopes
@@ -55,6 +54,11 @@ class LongRun(NamedTuple):
     setting: Setting
     edges: list[Array]
     counted: list[Counted]
+
+    @property
+    def work(self) -> int:
+        """How many nodes are thrown from, and looked at, in all."""
+        return sum(len(each) for each in self.edges)
 
     @property
     def raw(self) -> dict[str, Any]:
@@ -118,11 +122,9 @@ def kept_cells(chain: Chain, law: Law) -> Array:
     kept[live] = alone[live] & alone[live + 1]
     reach, met = float(np.nextafter(float(law.reach), np.inf)), []
     for span in (chain.cells.one, chain.cells.two):
-        if law.certain:
-            met.append(span)
-            continue
         side = np.searchsorted(goal.first, span.first, side="right") - 1
-        met.append(mesh.within(side, goal.place[span.first] - reach, goal.place[span.last + 1] + reach))
+        lands = mesh.within(side, goal.place[span.first] - reach, goal.place[span.last + 1] + reach)
+        met.append(span if law.certain else lands)
     while True:
         outside = np.concatenate([[0], np.cumsum(~kept)])
         stays = np.ones(len(live), dtype=bool)
@@ -195,16 +197,8 @@ def check_end(sign: float, u: Array, end: float, gain: Gain, size: float = 4.0) 
     prove(excess <= sign * end, f"the {'upper' if sign > 0 else 'lower'} end is {end!r}: {only}")
 
 
-def check_long_run(c: LongRun, progress: Progress) -> None:
+def check_long_run(c: LongRun, advance: Callable[[int], None]) -> None:
     """Check everything that is claimed."""
-    work, done = sum(len(each) for each in c.edges), 0
-
-    def advance(more: int) -> None:
-        nonlocal done
-        done = min(done + more, work - 1)
-        if progress is not None:
-            progress(done, work)
-
     chain, _ = chain_on(c.setting, c.edges, advance)
     prove(
         chain.beyond == 0.0 and bool(c.setting.noisy.landing.beyond == 0),
@@ -220,5 +214,3 @@ def check_long_run(c: LongRun, progress: Progress) -> None:
         with about(f"average {k}"):
             for sign, u, end in zip(END_SIGNS, one.functions, one.bounds, strict=True):
                 check_end(sign, u, end, most_gain(chain, kept, one.of, sign, logs), size)
-    if progress is not None:
-        progress(work, work)

@@ -272,17 +272,17 @@ class Board(NamedTuple):
     lost: Array
 
 
-def board_of(game: Game, c: Cells) -> Board:
+def board_of(game: Game, side: Array, lower: Array, upper: Array) -> Board:
     """Compare the borders of the cells with the places of sensor and goal, as exact numbers."""
-    x, on = game.at(game.x), c.side == game.side
-    won = on & np.array([Fraction(value) >= x for value in c.lower().tolist()], dtype=bool)
-    lost = ~on & beyond(c.upper(), x) & (game.mode == "catch")
+    x, on = game.at(game.x), side == game.side
+    won = on & np.array([Fraction(value) >= x for value in lower.tolist()], dtype=bool)
+    lost = ~on & beyond(upper, x) & (game.mode == "catch")
     place, error = game.sensor.place, game.sensor.error
     if place is not None and error is not None:
         nearest, farthest = game.at(place) - game.at(error), game.at(place) + game.at(error)
-        return Board([beyond(c.upper(), nearest), ~beyond(c.lower(), farthest)], won, lost)
+        return Board([beyond(upper, nearest), ~beyond(lower, farthest)], won, lost)
     if game.sensor.side is not None:
-        asked = c.side == game.sensor.side
+        asked = side == game.sensor.side
         return Board([asked, ~asked], won, lost)
     return Board([np.ones(len(on), dtype=bool)], won, lost)
 
@@ -295,7 +295,8 @@ def beyond(values: Array, limit: Fraction) -> Array:
 def check_policy(policy: Policy) -> list[Array]:
     """Check the table; return by throw the cells from which it is made: the images that the table rests on."""
     check_ranges(policy)
-    board = board_of(policy.game, policy.cells[0])
+    c = policy.cells[0]
+    board = board_of(policy.game, c.side, c.lower(), c.upper())
     check_begin(policy, board)
     made = [np.zeros(len(board.won), dtype=bool) for _ in policy.game.choices]
     for state in range(len(policy.throw)):

@@ -11,7 +11,6 @@ there may lead to.  Lower ends come from the bounds of -V.  Nothing here rests o
 its table leads to is counted, whatever the laws.
 """
 
-import itertools
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -32,8 +31,7 @@ from .brackets import (
     require_edges,
     start_row,
 )
-from .cells import Progress
-from .file import Arrays, Cells, hex_float, require, rounded, rows, section_alone
+from .file import Arrays, hex_float, require, rounded, rows, section_alone
 from .horizon import mean_above, nothing
 from .links import ABSORBED, LIVE
 from .means import Mesh
@@ -65,6 +63,11 @@ class PolicyChances(NamedTuple):
     left: Array
     after: Array
     bounds: dict[str, Pair]
+
+    @property
+    def work(self) -> int:
+        """How many nodes are thrown from, and looked at, in all."""
+        return len(self.settings) * sum(len(each) for each in self.edges)
 
     @property
     def raw(self) -> dict[str, Any]:
@@ -144,14 +147,11 @@ class Places(NamedTuple):
 def places_of(c: PolicyChances, mesh: Mesh) -> Places:
     """Compare the cells with the places of sensor and goal, as exact numbers."""
     kinds, _ = kinds_of(c.setting, mesh)
-    edges = [mesh.place[a:b] for a, b in itertools.pairwise(mesh.first)]
-    none = np.zeros(sum(len(each) - 1 for each in edges), dtype=np.int64)
-    pairs = np.zeros((len(none), 2), dtype=np.int64)
-    cells = Cells(edges, pairs, pairs, branch=none, rank=none, component=none, phi=pairs)
-    x, on, left = c.game.at(c.game.x), cells.side == c.game.side, np.arange(len(none)) + cells.side
-    sure, may = (
-        np.array([Fraction(end) >= x for end in ends.tolist()]) for ends in (cells.lower(), cells.upper())
-    )
+    left = np.flatnonzero(kinds >= 0)
+    side = np.searchsorted(mesh.first, left, side="right") - 1
+    lower, upper = mesh.place[left], mesh.place[left + 1]
+    x, on = c.game.at(c.game.x), side == c.game.side
+    sure, may = (np.array([Fraction(end) >= x for end in ends.tolist()]) for ends in (lower, upper))
     rests, caught = kinds[left] != ABSORBED, c.game.mode == "catch"
     asked = rests & ~(sure & caught)
 
@@ -164,7 +164,7 @@ def places_of(c: PolicyChances, mesh: Mesh) -> Places:
         by_node(kinds[left] != LIVE),
         by_node(rests & may & on),
         by_node(rests & (may & ~on if caught else ~(sure & on))),
-        [by_node(asked & answer) for answer in board_of(c.game, cells).answers],
+        [by_node(asked & answer) for answer in board_of(c.game, side, lower, upper).answers],
     )
 
 
@@ -225,19 +225,9 @@ def bounds_of_policy(c: PolicyChances, advance: Callable[[int], None]) -> dict[s
     return bounds
 
 
-def check_policy_chances(c: PolicyChances, progress: Progress) -> None:
+def check_policy_chances(c: PolicyChances, advance: Callable[[int], None]) -> None:
     """Check everything that is claimed."""
-    work, done = len(c.settings) * sum(len(each) for each in c.edges), 0
-
-    def advance(more: int) -> None:
-        nonlocal done
-        done = min(done + more, work - 1)
-        if progress is not None:
-            progress(done, work)
-
     for word, (low, high) in bounds_of_policy(c, advance).items():
         lo, hi = c.bounds[word]
         only = f"only {rounded(low, up=False)} to {rounded(high, up=True)} is proved"
         prove(lo <= low and high <= hi, f"{word}: {lo!r} to {hi!r} is claimed, {only}")
-    if progress is not None:
-        progress(work, work)

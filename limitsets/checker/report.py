@@ -17,7 +17,7 @@ import flint
 from .any_map import map_in_words
 from .balls import PRECISION, reason_of
 from .brackets import UNIFORM, Chances, bounds_of_laws, chances_in_words, check_chances, read_chances
-from .cells import Crew, Progress, extents, scene_of_box
+from .cells import Crew, Progress, added_up, extents, scene_of_box
 from .claims import CLAIMS, check_box_claims, failing, read_claims
 from .entropy import read_entropy
 from .feeding import verdict_of_feeds
@@ -361,22 +361,22 @@ def recheck_plane(plane: Plane, workers: int, progress: Progress, report: Report
     report.area = {"proved": proved, "refuted": refuted, "undecided": undecided}
 
 
-def recheck_chances(c: Chances, _: int, progress: Progress, report: Report) -> None:
-    """Check probabilities, and fill in the report."""
-    describe_chain(c, report, chances_in_words(c))
-    check_chances(c, progress)
+def of_chain(
+    in_words: Callable[[Any], list[str]], check: Callable[[Any, Callable[[int], None]], None]
+) -> Callable[[Any, int, Progress, Report], None]:
+    """Give the recheck of a claim about a noisy chain, from what puts the claim in words and what checks it."""
+
+    def recheck_chain(c: Any, _: int, progress: Progress, report: Report) -> None:
+        describe_chain(c, report, in_words(c))
+        with added_up(progress, c.work) as advance:
+            check(c, advance)
+
+    return recheck_chain
 
 
-def recheck_long_run(c: LongRun, _: int, progress: Progress, report: Report) -> None:
-    """Check long-run averages, and fill in the report."""
-    describe_chain(c, report, long_run_in_words(c))
-    check_long_run(c, progress)
-
-
-def recheck_policy_chances(c: PolicyChances, _: int, progress: Progress, report: Report) -> None:
-    """Check what a policy's table leads to, and fill in the report."""
-    describe_chain(c, report, policy_chances_in_words(c))
-    check_policy_chances(c, progress)
+def noise_of_chain(c: Chances | LongRun | PolicyChances) -> object:
+    """Return the bounds of the laws."""
+    return bounds_of_laws(c.setting.laws)
 
 
 def describe_chain(c: Chances | LongRun | PolicyChances, report: Report, statement: list[str]) -> None:
@@ -405,12 +405,12 @@ def recheck_policy(policy: Policy, workers: int, progress: Progress, report: Rep
 ALONE: dict[str, tuple[Callable[..., Any], Callable[..., None], Callable[[Any], object]]] = {
     "region": (read_plane, recheck_plane, lambda _: None),
     "policy": (read_policy, recheck_policy, lambda policy: policy.game.noise),
-    "probabilities": (read_chances, recheck_chances, lambda chances: bounds_of_laws(chances.setting.laws)),
-    "long-run": (read_long_run, recheck_long_run, lambda claim: bounds_of_laws(claim.setting.laws)),
+    "probabilities": (read_chances, of_chain(chances_in_words, check_chances), noise_of_chain),
+    "long-run": (read_long_run, of_chain(long_run_in_words, check_long_run), noise_of_chain),
     "policy-chances": (
         read_policy_chances,
-        recheck_policy_chances,
-        lambda claim: bounds_of_laws(claim.setting.laws),
+        of_chain(policy_chances_in_words, check_policy_chances),
+        noise_of_chain,
     ),
 }
 """The claims that stand alone in a file: how each is read and checked, and the noise that it has."""

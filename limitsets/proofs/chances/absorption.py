@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limitsets.base import AnswerError, Column, Table, Tabled, as_table, picked, shown_in_notebooks
+from limitsets.base import AnswerError, Column, Table, Tabled, added_up, as_table, picked, shown_in_notebooks
 from limitsets.base.arrays import Array
 from limitsets.feeder.scattering import Scattering, scattering_of, starts_from
 from limitsets.numbers.interval import guard
@@ -237,13 +237,7 @@ def absorption_brackets(
     tell = progress or (lambda stage, done, total: None)
     from limitsets.checker.brackets import brackets_of
 
-    nodes = 0
-
-    def told(more: int) -> None:
-        nonlocal nodes
-        nodes += more
-        tell("cells", min(nodes, len(read.sides) * cells), len(read.sides) * cells)
-
+    told = added_up("cells", len(read.sides) * cells, tell)
     chain = chain_of(read, noise, begin, places, cells, told)
     within, values = {}, {}
     for name in (ANY, *chain.steps.absorbed):

@@ -21,7 +21,7 @@ from limitsets.base import (
     Column,
     Progress,
     Table,
-    Tabled,
+    added_up,
     arguments_checked,
     as_table,
     picked,
@@ -34,7 +34,7 @@ from limitsets.feeder.scene import Scene, load
 from limitsets.numbers.interval import guard
 from limitsets.proofs.chances.chain import Chain, Place, chain_of, edges_of, in_words, require_places
 from limitsets.proofs.prover import certify
-from limitsets.proofs.prover.certificate import pack
+from limitsets.proofs.prover.certificate import Saved, pack
 from limitsets.proofs.prover.certifying import require_cells
 from limitsets.proofs.prover.long_run_of_map import ALLOWANCE, settled, stretches
 
@@ -50,7 +50,7 @@ BESIDE = 2.0**-13
 
 
 @dataclass(frozen=True, eq=False)
-class LongRunAverages(Tabled):
+class LongRunAverages(Saved):
     """Proved bounds of averages over ever more throws, from every start in some places, almost surely.
 
     Attributes
@@ -107,26 +107,11 @@ class LongRunAverages(Tabled):
             averages={name: {"lo": lo, "hi": hi} for name, (lo, hi) in self.numbers.items()},
         )
 
-    def save(self, path: str | Path, *, recheck: bool = True) -> Path:
-        """Write the bounds as a certificate, which gets its name once the checker has confirmed it.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, NAME.proof.zip; an older one is replaced whole.
-        recheck : bool
-            Whether to check it first.
-
-        Raises
-        ------
-        DeniedError
-            The checker does not confirm it; the file is kept as NAME.denied.zip.
-        """
+    def _write(self, path: str | Path, **how: Any) -> None:
+        """Write the claim."""
         section = self.chain.section | {"averages": self.averages}
         claims = [{"claim": "long-run", "section": section}]
-        arrays = self.functions | edges_of(self.chain)
-        pack(path, section["scene"]["model"], claims, arrays, recheck=recheck)
-        return Path(path)
+        pack(path, section["scene"]["model"], claims, self.functions | edges_of(self.chain), **how)
 
 
 @shown_in_notebooks
@@ -187,13 +172,7 @@ def long_run_averages(
     require_cells(cells, "average")
     begin = list(_around(read, noise) if starts is None else starts)
     require_places(read, "a start", begin)
-    nodes, total = 0, len(read.sides) * cells
-
-    def told(more: int) -> None:
-        nonlocal nodes
-        nodes += more
-        tell("cells", min(nodes, total), total)
-
+    told = added_up("cells", len(read.sides) * cells, tell)
     chain = chain_of(read, noise, begin, {"elsewhere": _elsewhere(read, begin)}, cells, told)
     from limitsets.checker.balls import UnprovedError, prove
     from limitsets.checker.brackets import read_setting

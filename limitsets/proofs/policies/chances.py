@@ -17,12 +17,11 @@ from limitsets.base import (
     Column,
     Progress,
     Table,
-    Tabled,
+    added_up,
     arguments_checked,
     as_table,
     picked,
     shown_in_notebooks,
-    silent,
 )
 from limitsets.base.arrays import Array, Arrays
 from limitsets.feeder.scattering import Scattering, Uniform
@@ -31,7 +30,7 @@ from limitsets.feeder.scene.quantities import deviation
 from limitsets.proofs.chances.chain import in_words, setting_of
 from limitsets.proofs.chances.nodes import CLOSE
 from limitsets.proofs.policies.synthesis import Synthesis, game_section, require_minimal, table_arrays
-from limitsets.proofs.prover.certificate import pack, require_checker
+from limitsets.proofs.prover.certificate import Saved, pack, require_checker
 from limitsets.proofs.prover.certifying import require_cells
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ CELLS = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class PolicyChances(Tabled):
+class PolicyChances(Saved):
     """What a policy leads to where deviations have known laws, proved.
 
     Attributes
@@ -95,24 +94,10 @@ class PolicyChances(Tabled):
             come=dict(zip(("lo", "hi"), self.come, strict=True)),
         )
 
-    def save(self, path: str | Path, *, recheck: bool = True) -> Path:
-        """Write the bounds as a certificate, which gets its name once the checker has confirmed it.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file, NAME.proof.zip; an older one is replaced whole.
-        recheck : bool
-            Whether to check it first.
-
-        Raises
-        ------
-        DeniedError
-            The checker does not confirm it; the file is kept as NAME.denied.zip.
-        """
+    def _write(self, path: str | Path, **how: Any) -> None:
+        """Write the claim."""
         claims = [{"claim": "policy-chances", "section": self.section}]
-        pack(path, self.section["scene"]["model"], claims, self.arrays, recheck=recheck)
-        return Path(path)
+        pack(path, self.section["scene"]["model"], claims, self.arrays, **how)
 
 
 @shown_in_notebooks
@@ -162,7 +147,7 @@ def policy_chances(
     >>> 1.9 < chances.mean[0] < chances.mean[1] < 2.1
     True
     """
-    begun, tell = time.perf_counter(), progress or silent
+    begun = time.perf_counter()
     policy = synthesis.require_policy()
     require_cells(cells, "expectation")
     require_minimal(synthesis)
@@ -179,12 +164,7 @@ def policy_chances(
     starts = [(side, float(lo), float(hi)) for side, pairs in places.items() for lo, hi in pairs]
     assert scene.feedback is not None
     throws = [_bare(scene.with_values({each.quantity: each.text})) for each in scene.feedback.throws]
-    done, total = 0, len(throws) * len(scene.sides) * cells
-
-    def told(more: int) -> None:
-        nonlocal done
-        done = min(done + more, total)
-        tell("throws", done, total)
+    told = added_up("throws", len(throws) * len(scene.sides) * cells, progress)
 
     with flint.ctx.workprec(PRECISION):
         chains = [setting_of(each, scatter, starts, {}, cells) for each in throws]

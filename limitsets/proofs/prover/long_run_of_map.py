@@ -176,7 +176,7 @@ def long_run_of_map(
     """
     begun, tell = time.perf_counter(), progress or silent
     own, landing, varied = _laws(lower, noise)
-    require_noise(lower, upper, grid, landing if varied is None else landing or LEAST, WITHOUT)
+    require_noise(lower, upper, grid, landing, WITHOUT, LEAST if varied is None else 0.0)
     import flint
 
     from limitsets.checker.balls import PRECISION, UnprovedError
@@ -258,12 +258,14 @@ def _laws(
     return (bounds if varied else landing[1]), landing[1], next(iter(varied), None)
 
 
-def require_noise(lower: Any, upper: Any, grid: Grid, noise: float | None, without: str) -> None:
+def require_noise(
+    lower: Any, upper: Any, grid: Grid, noise: float | None, without: str, least: float = LEAST
+) -> None:
     """Refuse what is no map of a line on a grid that ends, with steps that land within `noise` of the image."""
     require_corners(lower, upper)
     widest = float((grid.domain.hi - grid.domain.lo).max())
-    if noise is None or not LEAST <= noise < 0.5 * widest:
-        room = f"at least {LEAST}, and below {0.5 * widest:.6g}, half of the grid"
+    if noise is None or not least <= noise < 0.5 * widest:
+        room = f"at least {least}, and below {0.5 * widest:.6g}, half of the grid"
         raise AnswerError("the noise", noise, room, without)
     if grid.domain.closes:
         raise AnswerError("the grid", "an axis that closes", "one that ends", "noise is of lines that end")
