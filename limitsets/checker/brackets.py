@@ -13,24 +13,30 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb
 
-from .balls import Array, UnprovedError, exact, prove
+from .absorption import (
+    ANY,
+    LEFT,
+    OF_ABSORPTION,
+    Absorption,
+    absorption_in_words,
+    check_absorption,
+    read_absorption,
+)
+from .balls import Array, exact
 from .file import (
     LENGTHS,
     Arrays,
     decimal,
-    hex_float,
     number_and_unit,
     plain,
     quantity,
     read_side,
     require,
-    rounded,
     rows,
     section_alone,
     table,
     whole_number,
 )
-from .horizon import check_ever, check_mean, mean_above, proves_mean_above
 from .landings import Noisy
 from .laws import SIGMAS, Law, normal_law, uniform_law
 from .links import ABSORBED, HARD, LIVE, chain_of
@@ -45,10 +51,9 @@ from .steps import Chain
 # brackets claimed.
 
 
-ANY, LEFT = "any", "exits"
 # Landings are followed up to so many arms, more than shifts and scatter make of them; nodes end at so many of these.
 ARMS, OUTERMOST = 8.0, 32.0
-MOST_NODES, MOST_STRATA, MOST_BRACKETS = 120_000, 64, 2_000
+MOST_NODES, MOST_STRATA = 120_000, 64
 UNIFORM, NORMAL = "uniform", "gaussian"
 KINDS_OF_NOISE = {"throw.speed": "share", "landing.x": "length"}
 # Parts of a normal law, and finer strata in each: throws are enclosed at the ends of parts of the speed.
@@ -71,16 +76,12 @@ class Chances(NamedTuple):
 
     setting: Setting
     edges: list[Array]
-    within: dict[str, Array]  # by name two columns: lower and upper bound after 0, 1, ... throws
-    quantiles: list[tuple[str, Fraction, int, int]]
-    mean: tuple[float, float] | None
-    ever: dict[str, tuple[float, float]]
-    functions: dict[str, Array]
+    absorption: Absorption
 
     @property
     def work(self) -> int:
         """How many nodes are thrown from, and looked at, in all."""
-        return (1 + len(self.within)) * sum(len(each) for each in self.edges)
+        return (1 + len(self.absorption.within)) * sum(len(each) for each in self.edges)
 
     @property
     def raw(self) -> dict[str, Any]:
@@ -90,19 +91,16 @@ class Chances(NamedTuple):
 
 def read_chances(header: dict[str, Any], entries: dict[str, memoryview]) -> Chances:
     """Read a file; raises BadFileError."""
-    keys = "scene laws starts absorbing strata names quantiles mean"
+    keys = f"scene laws starts absorbing strata {OF_ABSORPTION}"
     nothing = "a file of probabilities has no boxes, no other noise and no tolerance"
     section = section_alone(header, "probabilities", "probabilities", keys, nothing, optional="ever")
     setting = read_setting(section)
-    names = rows(section["names"], "names", 1, 100)
-    known = all(isinstance(name, str) and name in (ANY, LEFT, *setting.absorbing) for name in names)
-    require(known and len(set(names)) == len(names), "names are not those of places that absorb")
-    ever = {name: (lo, hi) for name, lo, hi in map(read_ever, rows(section.get("ever", []), "ever", 0, 100))}
-    require(set(ever) <= set(setting.absorbing), "ever: a name is not that of places that absorb")
-    edges, within, functions = read_brackets(header["arrays"], entries, names, list(ever), setting)
-    quantiles = [read_quantile(each, names) for each in rows(section["quantiles"], "quantiles", 0, 1000)]
-    mean = None if section["mean"] is None else read_mean(section["mean"])
-    return Chances(setting, edges, within, quantiles, mean=mean, ever=ever, functions=functions)
+    arrays = Arrays(header["arrays"], entries)
+    edges = [arrays.read(f"edges.{i}", "<f8") for i in range(len(setting.scene.sides))]
+    require_edges(edges, setting)
+    absorption = read_absorption(section, arrays, "", setting.absorbing, sum(len(each) + 2 for each in edges))
+    arrays.require_no_others()
+    return Chances(setting, edges, absorption)
 
 
 def read_setting(section: dict[str, Any]) -> Setting:
@@ -133,27 +131,6 @@ def read_setting(section: dict[str, Any]) -> Setting:
     starts = read_places(section["starts"], "starts", scene)
     require(not overlapping({"starts": starts}), "two stretches of starts overlap: they would count twice")
     return Setting(laws, scene, noisy, starts, places)
-
-
-def read_brackets(
-    said: object, entries: dict[str, memoryview], names: list[str], ever: list[str], setting: Setting
-) -> tuple[list[Array], dict[str, Array], dict[str, Array]]:
-    """Read the arrays: the edges of the cells of each side, the brackets of each name, and functions at the nodes."""
-    arrays = Arrays(said, entries)
-    edges = [arrays.read(f"edges.{i}", "<f8") for i in range(len(setting.scene.sides))]
-    require_edges(edges, setting)
-    within = {name: arrays.read(f"within.{k}", "<f8", 2) for k, name in enumerate(names)}
-    needed = [f"ever.{k}.{end}" for k in range(len(ever)) for end in ("lower", "upper")]
-    held = [name for name in ("mean.lower", "mean.upper") if f"{name}.npy" in entries]
-    functions = {name: arrays.read(name, "<f8") for name in (*held, *needed)}
-    nodes = sum(len(each) + 2 for each in edges)
-    require(
-        all(len(each) == nodes for each in functions.values()), "a function has not one number for each node"
-    )
-    arrays.require_no_others()
-    lengths = {len(each) for each in within.values()}
-    require(len(lengths) == 1 and 1 <= lengths.pop() <= MOST_BRACKETS + 1, "the brackets are not alike many")
-    return edges, within, functions
 
 
 def table_of(value: object, where: str) -> dict[str, Any]:
@@ -234,64 +211,16 @@ def require_edges(edges: list[Array], setting: Setting) -> None:
         require(whole and float(np.abs(e).max()) < most, f"side {i}: the nodes do not span the arm")
 
 
-def read_quantile(value: object, names: list[Any]) -> tuple[str, Fraction, int, int]:
-    """Read one quantile: name, share, and between which numbers of throws."""
-    name, share, lo, hi = rows(value, "a quantile", 4, 4)
-    part, _ = number_and_unit(share if isinstance(share, str) else "", "share", "a quantile")
-    counts = type(lo) is int and type(hi) is int and 0 <= lo <= hi
-    require(name in names and 0 < part < 1 and counts, "a quantile is none")
-    return name, part, lo, hi
-
-
-def read_mean(value: object) -> tuple[float, float]:
-    """Read the bounds of a mean; null where there is no upper one."""
-    lo, hi = rows(value, "mean", 2, 2)
-    low, high = hex_float(lo, "mean"), math.inf if hi is None else hex_float(hi, "mean")
-    require(0 <= low <= high, "the bounds of the mean are none")
-    return low, high
-
-
-def read_ever(value: object) -> tuple[str, float, float]:
-    """Read the bounds of one probability."""
-    name, lo, hi = rows(value, "ever", 3, 3)
-    low, high = hex_float(lo, "ever"), hex_float(hi, "ever")
-    require(isinstance(name, str) and 0 <= low <= high <= 1, "ever: the bounds are none")
-    return name, low, high
-
-
 def chances_in_words(c: Chances) -> list[str]:
     """Put the claim in words, from the numbers that were checked."""
-    last = len(next(iter(c.within.values()))) - 1
     unit = c.setting.scene.unit
-    lines = [
+    return [
         "probabilities: T is the throw with which a part first comes to rest at a place named below, or leaves the arm",
         "    all deviations are independent of each other",
         f"    starts, equally likely per length: {places_in_words(c.setting.starts, unit)}",
+        *(f"    {name}: {places_in_words(places, unit)}" for name, places in c.setting.absorbing.items()),
+        *absorption_in_words(c.absorption, "throw"),
     ]
-    for name, places in c.setting.absorbing.items():
-        lines.append(f"    {name}: {places_in_words(places, unit)}")
-    for name, said in c.within.items():
-        lo, hi = (float(end) for end in said[-1])
-        what = "P(T <= n)" if name == ANY else f'P(ended "{name}" within n throws)'
-        lines.append(
-            f"    {what} for n = 0 to {last}; for n = {last} between {rounded(lo, up=False)} and"
-            f" {rounded(hi, up=True)}"
-        )
-    for name, share, lo, hi in c.quantiles:
-        what = "have ended" if name == ANY else f'have ended "{name}"'
-        count = f"exactly {lo}" if lo == hi else f"between {lo} and {hi}"
-        lines.append(
-            f"    the least number of throws within which {float(100 * share):.6g} % {what}: {count}"
-        )
-    for name, (low, high) in c.ever.items():
-        lines.append(
-            f'    P(ever ended "{name}"), after any number of throws: between {rounded(low, up=False)} and'
-            f" {rounded(high, up=True)}"
-        )
-    if c.mean is not None:
-        most = f", at most {rounded(c.mean[1], up=True)}" if math.isfinite(c.mean[1]) else ""
-        lines.append(f"    the mean of T: at least {rounded(c.mean[0], up=False)}{most}")
-    return lines
 
 
 def places_in_words(places: list[Place], unit: str) -> str:
@@ -331,9 +260,9 @@ def kinds_of(c: Setting, mesh: Mesh) -> tuple[Array, dict[str, Array]]:
     return kinds, {name: np.array(sorted(nodes), dtype=np.int64) for name, nodes in absorbed.items()}
 
 
-def start_row(c: Setting, mesh: Mesh) -> Rows:
+def start_row(starts: list[Place], mesh: Mesh) -> Rows:
     """Build the row that makes the mean over the starts, which are equally likely per length."""
-    side, lo, hi = (np.array(column) for column in zip(*c.starts, strict=True))
+    side, lo, hi = (np.array(column) for column in zip(*starts, strict=True))
     length = hi - lo
     weight = (length / length.sum()).astype(float)
     row = np.zeros(len(side), dtype=np.int64)
@@ -346,63 +275,10 @@ def start_row(c: Setting, mesh: Mesh) -> Rows:
 def chain_on(c: Setting, edges: list[Array], advance: Callable[[int], None]) -> tuple[Chain, Rows]:
     """Prove the throws of a chain on some cells; with the row that makes means over its starts."""
     mesh = mesh_of(edges, OUTERMOST * c.noisy.far)
-    return chain_of(c.noisy, mesh, *kinds_of(c, mesh), advance), start_row(c, mesh)
-
-
-def brackets_of(
-    chain: Chain, row: Rows, name: str, count: int, told: Callable[[int], None] = lambda done: None
-) -> tuple[Array, Array]:
-    """Prove brackets of one name after 0, 1, ... throws, so many in all; with bounds at the nodes after the last."""
-    value = {each: float(name in (ANY, each)) for each in chain.absorbed}
-    fixed = [chain.fixed({each: sign * v for each, v in value.items()}) for sign in (-1.0, 1.0)]
-    bound = [chain.first(each) for each in fixed]
-    brackets = np.empty((count, 2))
-    for n in range(count):
-        if n:
-            bound = [chain.above(values, each) for values, each in zip(bound, fixed, strict=True)]
-        brackets[n] = -mean_above(row, bound[0]), mean_above(row, bound[1])
-        told(n)
-    # to have ended is for ever: a lower bound holds later on, an upper one earlier
-    brackets[:, 0] = np.maximum(np.maximum.accumulate(brackets[:, 0]), 0.0)
-    brackets[:, 1] = np.minimum(np.minimum.accumulate(brackets[::-1, 1])[::-1], 1.0)
-    return brackets, np.stack([-bound[0], bound[1]])
-
-
-def check_within(name: str, said: Array, brackets: Array) -> None:
-    """Check that the brackets claimed of one name hold those that are proved."""
-    wrong = np.flatnonzero(~((said[:, 0] <= brackets[:, 0]) & (brackets[:, 1] <= said[:, 1])))
-    if len(wrong):
-        n = int(wrong[0])
-        lo, hi = rounded(float(brackets[n, 0]), up=False), rounded(float(brackets[n, 1]), up=True)
-        claimed = f"[{float(said[n, 0])!r}, {float(said[n, 1])!r}]"
-        what = f"P({plain(name)} within {n} throws)"
-        raise UnprovedError(f"{what}: {claimed} is claimed, [{lo}, {hi}] is proved")
-
-
-def check_quantiles(c: Chances, brackets: dict[str, Array]) -> None:
-    """Check the quantiles by the brackets that are proved."""
-    for name, share, lo, hi in c.quantiles:
-        low, high = brackets[name].T
-        none_before = lo == 0 or (lo <= len(high) and Fraction(float(high[lo - 1])) < share)
-        there = hi < len(low) and Fraction(float(low[hi])) >= share
-        quantile = f"the quantile of {float(share):.6g}, {lo} to {hi} throws, is not proved"
-        prove(none_before and there, quantile)
+    return chain_of(c.noisy, mesh, *kinds_of(c, mesh), advance), start_row(c.starts, mesh)
 
 
 def check_chances(c: Chances, advance: Callable[[int], None]) -> None:
     """Check everything that is claimed."""
-    nodes = sum(len(each) for each in c.edges)
     chain, row = chain_on(c.setting, c.edges, advance)
-    brackets: dict[str, Array] = {}
-    for name, said in c.within.items():
-        brackets[name], _ = brackets_of(chain, row, name, len(said))
-        advance(nodes)
-        check_within(name, said, brackets[name])
-    check_quantiles(c, brackets)
-    lower, upper = (c.functions.get(f"mean.{end}") for end in ("lower", "upper"))
-    if c.mean is not None:
-        check_mean(chain, row, c.mean, (lower, upper))
-    ends = upper is not None and proves_mean_above(chain, upper)
-    for k, (name, said_of) in enumerate(c.ever.items()):
-        pair = c.functions[f"ever.{k}.lower"], c.functions[f"ever.{k}.upper"]
-        check_ever(chain, row, name, said_of, pair, ends)
+    check_absorption(chain, row, c.absorption, lambda: advance(sum(len(each) for each in c.edges)))

@@ -14,9 +14,10 @@ from .cells import Crew
 from .claims import Failed, failing
 from .map_average import check_map_average
 from .map_cells import MapCells, map_tasks
+from .map_chances import check_chances_of_map
 from .map_cycles import Cycle
 from .map_entropy import check_map_entropy
-from .map_file import OF_ORBITS, Goal, MapFile, Part, Regions
+from .map_file import NOISY, OF_ORBITS, Goal, MapFile, Part, Regions
 from .map_long_run import check_long_run_of_map
 from .map_orbits import check_every
 from .map_weights import check_weights
@@ -42,8 +43,9 @@ def check_part(part: Part, number: int, file: MapFile, crew: Crew) -> tuple[Fail
         for name, check in (("average", check_map_average), ("entropy", check_map_entropy)):
             if name in part.of_line and name not in failed:
                 failed |= failing([name], check, the_map, part.cells, part.of_line[name])
-    if "long-run" in part.of_line:
-        failed |= failing(["long-run"], check_long_run_of_map, the_map, part.of_line["long-run"])
+    for name, recheck in (("long-run", check_long_run_of_map), ("probabilities", check_chances_of_map)):
+        if name in part.of_line:
+            failed |= failing([name], recheck, the_map, part.of_line[name])
     return failed, cycles
 
 
@@ -87,7 +89,7 @@ def check_leaving_cycle(cycles: list[Cycle], goal: Goal) -> None:
 def check_cells(part: Part, number: int, file: MapFile, cycles: list[Cycle], crew: Crew) -> Failed:
     """Check the claims about cells: first by whole numbers, then the images; those that fail with the reasons."""
     c, final = part.cells, final_cells(part)
-    claims = [name for name in part.claims if name not in ("cycles", "all-cycles", "long-run")]
+    claims = [name for name in part.claims if name not in ("cycles", "all-cycles", *NOISY)]
     assert c is not None
     attracting = (c.component >= 0) & ~final
     failed = failing(claims, check_drawn, part, c, cycles) or failing(claims, c.check_labels, final)

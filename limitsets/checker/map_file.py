@@ -22,10 +22,12 @@ from .file import (
     whole_number,
 )
 from .map_cells import MapCells
+from .map_chances import MORE_OF_CHANCES, OF_CHANCES, read_chances_of_map
 from .map_cycles import Begins, Listed, read_begins, read_cycles
-from .map_long_run import MORE_OF_LONG_RUN, OF_LONG_RUN, read_long_run_of_map
+from .map_long_run import OF_LONG_RUN, read_long_run_of_map
 from .map_orbits import Every, read_every
 from .map_plane import ParameterAxis, RegionPlace, read_axes, read_region_boxes
+from .noisy_map import MORE_OF_NOISY
 from .observable import KEYS as OF_AVERAGES, Allowed, read_average
 
 CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
@@ -43,9 +45,19 @@ CLAIMS_OF_MAP = {  # the claims that are known, and the keys of their sections
     "average": OF_AVERAGES,
     "entropy": ENTROPY_KEYS,
     "long-run": OF_LONG_RUN,
+    "probabilities": OF_CHANCES,
     "refuted": "",
 }
-OF_LINE = {"average": read_average, "entropy": read_entropy, "long-run": read_long_run_of_map}
+NOISY = {
+    "long-run": MORE_OF_NOISY,
+    "probabilities": MORE_OF_CHANCES,
+}  # the claims about noise, and keys that may be
+OF_LINE = {
+    "average": read_average,
+    "entropy": read_entropy,
+    "long-run": read_long_run_of_map,
+    "probabilities": read_chances_of_map,
+}
 OF_ORBITS = (
     "cycles",
     "all-cycles",
@@ -76,7 +88,9 @@ class Part(NamedTuple):
     max_rank: int
     least: float  # the slope of `expanding`, 0 where that is not claimed
     cells: MapCells | None
-    of_line: dict[str, Any]  # what is read of `average`, `entropy` and `long-run`, those that are claimed
+    of_line: dict[
+        str, Any
+    ]  # what is read of `average`, `entropy` and claims about noise, those that are claimed
 
 
 class MapFile(NamedTuple):
@@ -137,8 +151,7 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
     known = {name: section for name, section in claims.items() if name in CLAIMS_OF_MAP}
     for name, section in known.items():
         more = " begins" if name == "cycles" and shape.closes else ""
-        optional = MORE_OF_LONG_RUN if name == "long-run" else ""
-        table(section, f"{where}: section of {name}", CLAIMS_OF_MAP[name] + more, optional)
+        table(section, f"{where}: section of {name}", CLAIMS_OF_MAP[name] + more, NOISY.get(name, ""))
     rechecked = not shape.closes or not {"all-cycles", "escapes"} & set(known)
     require(
         rechecked, f"{where}: this checker knows neither all-cycles nor escapes beside axes with a period"
@@ -157,7 +170,7 @@ def read_map_part(box: dict[str, Any], shape: Shape, goal: Goal | None, arrays: 
         begins = read_begins(known["cycles"]["begins"], shape, where)
     drawn = read_drawn(known["converges"], cycles, where) if "converges" in known else []
     every = read_every(known["all-cycles"], shape, where) if "all-cycles" in known else None
-    about_cells = set(known) - {"cycles", "all-cycles", "refuted", "long-run"}
+    about_cells = set(known) - {"cycles", "all-cycles", "refuted", *NOISY}
     labels = {"exits": "escapes" in known, "weights": "almost-every" in known}
     cells = MapCells(arrays, box["prefix"], shape, **labels) if about_cells else None
     unknown = [name for name in claims if name not in CLAIMS_OF_MAP]
@@ -185,7 +198,8 @@ def read_of_line(
     require(shape.dimension == 1 or not claimed, f"{where}: {', '.join(claimed)} is of one axis")
     both = "converges" in known and {"average", "entropy"} & set(claimed)
     require(not both, f"{where}: average and entropy do not stand beside converges")
-    require(not (shape.closes and "long-run" in known), f"{where}: long-run is of an axis that ends")
+    of_noise = ", ".join(NOISY.keys() & set(known))
+    require(not (shape.closes and of_noise), f"{where}: {of_noise} is of an axis that ends")
     allowed = Allowed(shape.sides, shape.branches, shape.names)
     return {name: read(known[name], arrays, prefix, allowed, where) for name, read in claimed.items()}
 

@@ -8,7 +8,6 @@ on cells with a pole; there its excess over 0 has a bounded integral, which coun
 
 import math
 from collections.abc import Iterator
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,13 +15,23 @@ from flint import arb
 
 from .any_map import Map
 from .balls import ONE, ZERO, Arb, Array, about, prove
-from .brackets import Place
-from .file import Arrays, decimal, read_box, read_side, require, rows, table
+from .file import Arrays, require, rows
 from .landings import upper
-from .laws import Law, uniform_law
 from .long_run import END_SIGNS, Gain, check_end, check_starts_stay, kept_cells, nodes_of
 from .means import INFLATE
-from .noisy_map import BranchOfCell, Stratum, Varied, chain_of_map, strata_of
+from .noisy_map import (
+    OF_NOISY,
+    BranchOfCell,
+    NoisyMap,
+    Stratum,
+    between_ends,
+    chain_of_map,
+    mesh_of_map,
+    noise_of_map_in_words,
+    read_noisy,
+    strata_of,
+    stretches_in_words,
+)
 from .observable import (
     Allowed,
     Averaged,
@@ -33,30 +42,18 @@ from .observable import (
     observed_of,
     read_function,
 )
-from .program import Program, named, rational
+from .program import Program
 from .steps import Chain
 
-OF_LONG_RUN = "landing starts functions"
-MORE_OF_LONG_RUN = "varied"
-STRATA = (1, 2, 4, 8, 16, 32, 64)
+OF_LONG_RUN = f"{OF_NOISY} functions"
 ENDS = ("lower", "upper")
-MOST_NODES_OF_MAP, FARTHEST = 2_000_000, 2.0**100
 
 
 class LongRunOfMap(NamedTuple):
     """What is claimed: read, and not yet believed."""
 
-    landing: str
-    law: Law
-    varied: Varied | None
-    starts: list[Place]
-    edges: list[Array]
+    noisy: NoisyMap
     functions: list[Averaged]  # `lower` and `upper` are the functions u
-
-    @property
-    def cells(self) -> int:
-        """How many there are, on all sides."""
-        return sum(len(each) - 1 for each in self.edges)
 
 
 # ----------------------------------------------------------------
@@ -67,27 +64,10 @@ def read_long_run_of_map(
     section: dict[str, Any], arrays: Arrays, prefix: str, allowed: Allowed, where: str
 ) -> LongRunOfMap:
     """Read the claim of a box of parameters."""
-    bound = rational(section["landing"], f"{where}: landing")
-    varied = read_varied(section["varied"], allowed.names, where) if "varied" in section else None
-    fits = 0 < bound < FARTHEST or (bound == 0 and varied is not None)  # where a parameter varies
-    require(fits, f"{where}: landing is not above 0, or too large")
-    edges = [arrays.read(f"{prefix}nodes.{side}", "<f8") for side in range(allowed.sides)]
-    sound = all(
-        len(e) >= 4 and bool((np.diff(e) > 0).all()) and float(np.abs(e).max()) < FARTHEST for e in edges
-    )
-    require(
-        sound and sum(map(len, edges)) <= MOST_NODES_OF_MAP,
-        f"{where}: the nodes do not ascend, or are too many",
-    )
-    starts = [
-        (read_side(one["side"], allowed.sides), Fraction(lo), Fraction(hi))
-        for each in rows(section["starts"], f"{where}: starts", 1, 1000)
-        for one in (table(each, f"{where}: starts", "side box"),)
-        for lo, hi in read_box(one["box"], 1, f"{where}: starts")
-    ]
+    noisy = read_noisy(section, arrays, prefix, allowed, where)
     listed = rows(section["functions"], f"{where}: functions", 1, 99)
     columns = [arrays.read(f"{prefix}long-run.{end}", "<f8", len(listed)) for end in ("upper", "lower")]
-    alike = all(len(column) == sum(len(e) + 2 for e in edges) for column in columns)
+    alike = all(len(column) == noisy.nodes for column in columns)
     require(alike, f"{where}: a function has not one number for each node")
     by_function = [column.reshape(len(column), -1).T for column in columns]
     functions = [
@@ -96,30 +76,12 @@ def read_long_run_of_map(
         )
         for k, one in enumerate(listed)
     ]
-    return LongRunOfMap(section["landing"], uniform_law(bound, 1), varied, starts, edges, functions)
-
-
-def read_varied(value: object, names: list[str], where: str) -> Varied:
-    """Read which parameter varies at every step."""
-    known = table(value, f"{where}: varied", "name within strata")
-    bound = rational(known["within"], f"{where}: varied")
-    count = known["strata"]
-    require(known["name"] in names, f"{where}: what varies is no parameter of the map")
-    require(bound > 0, f"{where}: what varies has no bound above 0")
-    require(type(count) is int and count in STRATA, f"{where}: strata is not a power of 2 up to {STRATA[-1]}")
-    return Varied(known["name"], bound, known["strata"])
+    return LongRunOfMap(noisy, functions)
 
 
 def long_run_of_map_in_words(c: LongRunOfMap) -> Iterator[str]:
     """Put the claim in words."""
-    places = ", ".join(f"[{float(lo)!r}, {float(hi)!r}] of side {side}" for side, lo, hi in c.starts)
-    laws = [] if c.law.certain else [f"steps land within {c.landing} of f(x), evenly"]
-    if c.varied is not None:
-        bound = decimal(c.varied.bound)
-        laws.append(
-            f"at every step {named(c.varied.name)} deviates by at most {bound} from its value, evenly"
-        )
-    yield f"{'; '.join(laws)}; deviations are independent of each other; from every start in {places}"
+    yield f"{noise_of_map_in_words(c.noisy)}; from every start in {stretches_in_words(c.noisy.starts)}"
     yield "almost surely averages over n steps, counted from the first landing on, lie in the end between the two"
     for one in c.functions:
         lo, hi = known_bounds(one, 0)
@@ -254,15 +216,16 @@ class GainOfEnd(NamedTuple):
 
 def gains_of(the_map: Map, c: LongRunOfMap) -> tuple[Chain, Array, list[list[GainOfEnd]]]:
     """Prove the steps: the chain, the cells of N by their left nodes, what bounds each function and its negative."""
-    strata = strata_of(the_map, c.varied)
-    chain, pieces = chain_of_map(strata, c.edges, c.law)
-    kept = kept_cells(chain, c.law)
+    law = c.noisy.law
+    strata, mesh = strata_of(the_map, c.noisy.varied), mesh_of_map(c.noisy.edges, law)
+    chain, pieces = chain_of_map(strata, mesh, law, between_ends(mesh), {})
+    kept = kept_cells(chain, law)
     prove(bool(kept.any()), "from every cell some step may lead out")
     nodes, free = nodes_of(kept), np.full(len(chain.mesh.place), -np.inf)
 
     def gain(counted: Majorant) -> GainOfEnd:
-        prove(counted.excess == 0.0 or not c.law.certain, "ln |f'| has a pole: landings have to scatter too")
-        more = counted.excess * c.law.most * INFLATE if counted.excess else 0.0
+        prove(counted.excess == 0.0 or not law.certain, "ln |f'| has a pole: landings have to scatter too")
+        more = counted.excess * law.most * INFLATE if counted.excess else 0.0
 
         def bound(u: Array) -> tuple[Array, Array]:
             return nodes, chain.above(u + counted.values, free, more)[nodes]
@@ -277,7 +240,7 @@ def gains_of(the_map: Map, c: LongRunOfMap) -> tuple[Chain, Array, list[list[Gai
 def check_long_run_of_map(the_map: Map, c: LongRunOfMap) -> None:
     """Check the claim."""
     chain, kept, gains = gains_of(the_map, c)
-    check_starts_stay(c.starts, chain.mesh, kept)
+    check_starts_stay(c.noisy.starts, chain.mesh, kept)
     for k, one in enumerate(c.functions):
         with about(f"function {k}"):
             for sign, u, end, of in zip(

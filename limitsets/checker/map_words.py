@@ -12,6 +12,7 @@ from .claims import entropy_of
 from .entropy import entropy_in_words
 from .file import plain
 from .map_cells import MapCells
+from .map_chances import chances_of_map_in_words
 from .map_cycles import Cycle, interval_in_words
 from .map_file import CLAIMS_OF_MAP, OF_ORBITS, Goal, Part, Regions
 from .map_long_run import long_run_of_map_in_words
@@ -197,6 +198,7 @@ SENTENCES: dict[str, Callable[[Proved], str]] = {
     "average": Proved.averaged,
     "entropy": Proved.entropic,
     "long-run": Proved.scattered,
+    "probabilities": lambda proved: "\n".join(chances_of_map_in_words(proved.part.of_line["probabilities"])),
     "refuted": lambda proved: (
         f"an open set of starts, around a point of a cycle, violates: {proved.of_goal()}"
     ),

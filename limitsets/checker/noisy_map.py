@@ -12,25 +12,120 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb
 
 from .any_map import Map, possible
 from .balls import Arb, Array, Pair, exact, prove
-from .brackets import OUTERMOST, mesh_of
-from .file import decimal
+from .brackets import OUTERMOST, Place, mesh_of
+from .file import Arrays, decimal, read_box, read_side, require, rows, table
 from .landings import upper
-from .laws import Law
+from .laws import Law, uniform_law
 from .links import turn_of
-from .means import INFLATE, Scatter, Spread, mean_rows
+from .means import INFLATE, Mesh, Scatter, Spread, mean_rows
+from .observable import Allowed
+from .program import named, rational
 from .steps import Chain, Parts
 
 NARROW_OF_MAP = 2.0**-30  # cells below this share of the largest place count as jumps
 FAR_OF_MAP = (
     8.0  # images may lie so many times as far out as places and the noise: what is there is off all cells
 )
+
+
+# ----------------------------------------------------------------
+# What claims about such a map say of the noise: read, and put in words.
+
+
+OF_NOISY, MORE_OF_NOISY = "landing starts", "varied"
+STRATA = (1, 2, 4, 8, 16, 32, 64)
+MOST_NODES_OF_MAP, FARTHEST = 2_000_000, 2.0**100
+
+
+class Varied(NamedTuple):
+    """A parameter that deviates at every step within a bound, evenly; the range is cut in so many strata."""
+
+    name: str
+    bound: Fraction
+    strata: int
+
+
+class NoisyMap(NamedTuple):
+    """Noise, starts and nodes: read, and not yet believed."""
+
+    landing: str
+    law: Law
+    varied: Varied | None
+    starts: list[Place]
+    edges: list[Array]
+
+    @property
+    def nodes(self) -> int:
+        """How many there are in a mesh, which has two more on each side."""
+        return sum(len(each) + 2 for each in self.edges)
+
+
+def read_noisy(
+    section: dict[str, Any], arrays: Arrays, prefix: str, allowed: Allowed, where: str
+) -> NoisyMap:
+    """Read what a claim about a box of parameters says of the noise."""
+    bound = rational(section["landing"], f"{where}: landing")
+    varied = read_varied(section["varied"], allowed.names, where) if "varied" in section else None
+    fits = 0 < bound < FARTHEST or (bound == 0 and varied is not None)  # where a parameter varies
+    require(fits, f"{where}: landing is not above 0, or too large")
+    edges = [arrays.read(f"{prefix}nodes.{side}", "<f8") for side in range(allowed.sides)]
+    sound = all(
+        len(e) >= 4 and bool((np.diff(e) > 0).all()) and float(np.abs(e).max()) < FARTHEST for e in edges
+    )
+    require(
+        sound and sum(map(len, edges)) <= MOST_NODES_OF_MAP,
+        f"{where}: the nodes do not ascend, or are too many",
+    )
+    starts = read_stretches(section["starts"], allowed.sides, f"{where}: starts")
+    return NoisyMap(section["landing"], uniform_law(bound, 1), varied, starts, edges)
+
+
+def read_stretches(value: object, sides: int, where: str) -> list[Place]:
+    """Read some places: side, and the box from x to x."""
+    return [
+        (read_side(one["side"], sides), Fraction(lo), Fraction(hi))
+        for each in rows(value, where, 1, 1000)
+        for one in (table(each, where, "side box"),)
+        for lo, hi in read_box(one["box"], 1, where)
+    ]
+
+
+def read_varied(value: object, names: list[str], where: str) -> Varied:
+    """Read which parameter varies at every step."""
+    known = table(value, f"{where}: varied", "name within strata")
+    bound = rational(known["within"], f"{where}: varied")
+    count = known["strata"]
+    require(known["name"] in names, f"{where}: what varies is no parameter of the map")
+    require(bound > 0, f"{where}: what varies has no bound above 0")
+    require(type(count) is int and count in STRATA, f"{where}: strata is not a power of 2 up to {STRATA[-1]}")
+    return Varied(known["name"], bound, known["strata"])
+
+
+def noise_of_map_in_words(c: NoisyMap) -> str:
+    """Say what deviates."""
+    laws = [] if c.law.certain else [f"steps land within {c.landing} of f(x), evenly"]
+    if c.varied is not None:
+        bound = decimal(c.varied.bound)
+        laws.append(
+            f"at every step {named(c.varied.name)} deviates by at most {bound} from its value, evenly"
+        )
+    return f"{'; '.join(laws)}; deviations are independent of each other"
+
+
+def stretches_in_words(places: list[Place]) -> str:
+    """Name places."""
+    return ", ".join(f"[{float(lo)!r}, {float(hi)!r}] of side {side}" for side, lo, hi in places)
+
+
+# ----------------------------------------------------------------
+# Where steps lead.
 
 
 class BranchOfCell(NamedTuple):
@@ -80,14 +175,6 @@ def steps_from(
     return steps
 
 
-class Varied(NamedTuple):
-    """A parameter that deviates at every step within a bound, evenly; the range is cut in so many strata."""
-
-    name: str
-    bound: Fraction
-    strata: int
-
-
 class Stratum(NamedTuple):
     """The map for a part of what a parameter may be: for all of it, and for either end (none where nothing varies)."""
 
@@ -126,30 +213,36 @@ def strata_of(the_map: Map, varied: Varied | None) -> list[Stratum]:
     ]
 
 
-def chain_of_map(
-    strata: list[Stratum], edges: list[Array], law: Law
-) -> tuple[Chain, list[list[BranchOfCell]]]:
-    """Prove the steps from the cells between nodes; with the cells of the chain on their branches, by stratum."""
+def mesh_of_map(edges: list[Array], law: Law) -> Mesh:
+    """Put the nodes of all sides together, with one far out at either end."""
     size = max(float(np.abs(each).max()) for each in edges) + float(law.reach)
-    mesh = mesh_of(edges, OUTERMOST * FAR_OF_MAP * 2.0 ** math.ceil(math.log2(size)))
+    return mesh_of(edges, OUTERMOST * FAR_OF_MAP * 2.0 ** math.ceil(math.log2(size)))
+
+
+def between_ends(mesh: Mesh) -> Array:
+    """List the cells, by their left nodes, but those to the far nodes."""
+    return np.concatenate([np.arange(first + 1, end - 2) for first, end in itertools.pairwise(mesh.first)])
+
+
+def chain_of_map(
+    strata: list[Stratum], mesh: Mesh, law: Law, live: Array, absorbed: dict[str, Array]
+) -> tuple[Chain, list[list[BranchOfCell]]]:
+    """Prove the steps from some cells; with the cells of the chain on their branches, by stratum."""
     scatter = None if law.certain else Scatter(mesh, law, NARROW_OF_MAP)
     collected = CellsOfMap(strata)
-    for side, (first, end) in enumerate(itertools.pairwise(mesh.first.tolist())):
-        known: list[dict[tuple[int, int, float], Arb]] = [{} for _ in strata]
-        for at in range(first + 1, end - 2):
-            ends = float(mesh.place[at]), float(mesh.place[at + 1])
-            collected.add(
-                at,
-                [
-                    steps_from(each.whole, side, at, ends, seen)
-                    for each, seen in zip(strata, known, strict=True)
-                ],
-            )
+    known: list[dict[tuple[int, int, float], Arb]] = [{} for _ in strata]
+    sides = np.searchsorted(mesh.first, live, side="right") - 1
+    for at, side in zip(live.tolist(), sides.tolist(), strict=True):
+        ends = float(mesh.place[at]), float(mesh.place[at + 1])
+        steps = [
+            steps_from(each.whole, side, at, ends, seen) for each, seen in zip(strata, known, strict=True)
+        ]
+        collected.add(at, steps)
     prove(bool(collected.places), "the image of no cell is enclosed")
     goal, spread = mesh if scatter is None else scatter.mesh, spread_of(collected.places, collected.parts)
     # nodes are not raised together: the cells beside a change of branch may be wide
     rows = mean_rows(len(mesh.place), goal, [spread])
-    return Chain(mesh, scatter, rows, {}, collected.parts, 0.0, narrow=0.0), collected.pieces
+    return Chain(mesh, scatter, rows, absorbed, collected.parts, 0.0, narrow=0.0), collected.pieces
 
 
 class Lands(NamedTuple):

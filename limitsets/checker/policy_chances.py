@@ -215,7 +215,7 @@ def bounds_of_policy(c: PolicyChances, advance: Callable[[int], None]) -> dict[s
     prove(bool(falls.all()), "the number of throws left does not fall")
     mesh = mesh_of(c.edges, OUTERMOST * c.setting.noisy.far)
     require(len(c.throw) * len(mesh.place) <= MOST_NUMBERS, "too many states on too many cells")
-    places, row = places_of(c, mesh), start_row(c.setting, mesh)
+    places, row = places_of(c, mesh), start_row(c.setting.starts, mesh)
     made = sorted(set(c.throw.tolist()) - {STOP})
     chains = {throw: chain_on(c.settings[throw], c.edges, advance)[0] for throw in made}
     bounds, most = {}, max((int(c.left[k]) for k in c.game.first if k != NO_STATE), default=0)

@@ -41,7 +41,7 @@ from .goals import content_of_goal, goal_of_scene
 from .long_run import LongRun, check_long_run, long_run_in_words, read_long_run
 from .map_cells import check_map_task, map_of_box
 from .map_claims import check_parts, work_of_maps
-from .map_file import MapFile, read_map_file
+from .map_file import NOISY, MapFile, read_map_file
 from .map_plane import region_in_words
 from .model import FORMULAS
 from .observable import Allowed, read_average
@@ -317,7 +317,8 @@ def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report)
         "boxes": [outcome._asdict() for outcome in outcomes],
     }
     report.cells = sum(len(part.cells.rank) for part in file.parts if part.cells is not None)
-    report.cells += sum(part.of_line["long-run"].cells for part in file.parts if "long-run" in part.of_line)
+    noisy = [part.of_line[name].noisy for part in file.parts for name in NOISY if name in part.of_line]
+    report.cells += sum(len(edges) - 1 for each in noisy for edges in each.edges)
     arithmetic = f"the ball arithmetic of python-flint {flint.__version__} (Arb), numpy and Python"
     report.relied_on = ["exact arithmetic of these formulas (no rounding of a computer's orbits)", arithmetic]
     for k, outcome in enumerate(outcomes):

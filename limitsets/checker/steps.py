@@ -40,8 +40,8 @@ class Parts:
     its largest slope (`steep`, instead of `varied` where that is less).  `ends`: coefficients of G' where the law or
     the branch changes, and `cap`, a coefficient of the variation of G that bounds the same; `inner`: coefficients of
     the variation; `turns`: coefficients whose products with G' may vary, part by part of the law, with `even`, that of
-    the largest fall of G' per length, `eighth`, to be multiplied by the square of the widest cell and added to it, and
-    `bow`, that of the largest size of G', which together bound the same.
+    the largest fall of G' per length, `eighth` of the part's share of the law, to be multiplied by the square of the
+    widest cell and added to it, and `bow`, that of the largest size of G', which together bound the same.
     """
 
     at_cells: Collected = field(default_factory=lambda: Collected(LANDING))
@@ -92,6 +92,7 @@ class Bent:
         )
         if "eighth" in some.columns:
             width = np.diff(mesh.place, append=np.inf)
+            self.share = 8.0 * some.array("eighth")
             self.even += some.array("eighth") * extremes(width, self.span.first, self.span.last)[1] ** 2
 
     def products(self, g: Graph) -> tuple[Array, Array]:
@@ -200,7 +201,9 @@ class Chain:
         falls = self.turns.even * g.falls_on(self.turns.span) + self.turns.bow * g.steepest_on(
             self.turns.span
         )
-        turned = np.bincount(self.turns.at, np.minimum(hi - lo, falls), n)
+        first, last = g.values_on(self.turns.span)  # no part lies farther from its chord than G varies
+        tame = np.minimum(np.minimum(hi - lo, falls), self.turns.share * (last - first))
+        turned = np.bincount(self.turns.at, tame, n)
         least, most = self.cells.ends(g)
         span, gap = np.zeros(n), np.zeros(n)
         span[self.cells.at] = most - least

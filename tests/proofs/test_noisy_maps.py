@@ -18,7 +18,7 @@ from limitsets.checker.balls import PRECISION
 from limitsets.checker.laws import uniform_law
 from limitsets.checker.links import turn_of
 from limitsets.checker.map_long_run import LongRunOfMap, gains_of, pole
-from limitsets.checker.noisy_map import BranchOfCell, steps_from
+from limitsets.checker.noisy_map import BranchOfCell, NoisyMap, steps_from
 from limitsets.checker.observable import Allowed, read_function
 from limitsets.proofs.prover.long_run_of_map import settled
 from tests.proofs.forge import opened
@@ -198,7 +198,7 @@ def bounds_of(places, to, borders):
         )
         for i in range(count)
     ]  # fmt: skip
-    chain, kept, gains = gains_of(the_map, LongRunOfMap("1", law, None, [], edges, functions))
+    chain, kept, gains = gains_of(the_map, LongRunOfMap(NoisyMap("1", law, None, [], edges), functions))
     assert kept.sum() == sum(len(each) - 1 for each in edges)
     mesh = chain.mesh
     low, high = ([settled(each[k].bound, mesh.place, mesh.first)[0] for each in gains] for k in (0, 1))
@@ -288,7 +288,7 @@ def test_a_step_is_bounded_at_every_place_of_wide_cells(case, seed):
             "a test",
             [np.zeros(0)] * 3,
         )
-        claim = LongRunOfMap("0.3", uniform_law(Fraction(3, 10), 1), None, [], [edges], [function])
+        claim = LongRunOfMap(NoisyMap("0.3", uniform_law(Fraction(3, 10), 1), None, [], [edges]), [function])
         chain, kept, ((lower, upper),) = gains_of(checked(the_map), claim)
         assert kept.sum() == len(edges) - 1
         u = rng.normal(size=len(chain.mesh.place)) * (seed > 0)

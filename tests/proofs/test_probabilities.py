@@ -162,11 +162,14 @@ def entries_of(forged, tmp_path):
 def good(tmp_path_factory):
     """The certificate that claims what the checker finds, and no more."""
     with flint.ctx.workprec(checker.balls.PRECISION):
-        module = sys.modules[f"{checker.__name__}.brackets"]
+        module, absorption = (
+            sys.modules[f"{checker.__name__}.{name}"] for name in ("brackets", "absorption")
+        )
         claim = module.read_chances(*entries_of(noisy(), tmp_path_factory.mktemp("probabilities")))
         chain, row = module.chain_on(claim.setting, claim.edges, lambda more: None)
         found = {
-            name: module.brackets_of(chain, row, name, len(said))[0] for name, said in claim.within.items()
+            name: absorption.brackets_of(chain, row, name, len(said))[0]
+            for name, said in claim.absorption.within.items()
         }
     quantiles = [["any", "50 %", *median_of(found["any"])]]
     return noisy(found, quantiles=quantiles, mean=[(12.2).hex(), (12.4).hex()])

@@ -14,7 +14,7 @@ import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.checker.balls import PRECISION
 from limitsets.checker.laws import uniform_law
-from limitsets.checker.noisy_map import Varied, chain_of_map, strata_of
+from limitsets.checker.noisy_map import Varied, between_ends, chain_of_map, mesh_of_map, strata_of
 from tests.proofs.forge import opened
 from tests.proofs.test_noisy_maps import checked, itself, parabola, squared
 
@@ -146,7 +146,9 @@ def test_a_step_with_a_parameter_that_varies_is_bounded_at_every_place(case, see
     slope, turn, bow = rng.uniform(-2.0, 2.0, 3)
     with flint.ctx.workprec(PRECISION):
         strata = strata_of(checked(the_map, {"p": ends}), Varied("p", Fraction(1, 10), count))
-        chain, _ = chain_of_map(strata, [edges], uniform_law(Fraction(0), 1))
+        law = uniform_law(Fraction(0), 1)
+        mesh = mesh_of_map([edges], law)
+        chain, _ = chain_of_map(strata, mesh, law, between_ends(mesh), {})
     place = chain.mesh.place
     near = np.clip(place, -3.0, 3.0)
     u = slope * np.sin(2.0 * near + turn) + bow * near * near

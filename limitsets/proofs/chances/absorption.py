@@ -20,9 +20,12 @@ from limitsets.base import AnswerError, Column, Table, Tabled, added_up, as_tabl
 from limitsets.base.arrays import Array
 from limitsets.feeder.scattering import Scattering, scattering_of, starts_from
 from limitsets.numbers.interval import guard
+from limitsets.proofs.chances.absorption_of_map import chain_of_map, whole_grid
 from limitsets.proofs.chances.chain import EXITS, Chain, Place, chain_of, require_places, write
 from limitsets.proofs.chances.forever import forever
-from limitsets.proofs.prover.certifying import require_cells
+from limitsets.proofs.prover.certifying import require_cells, require_map, require_none
+from limitsets.proofs.prover.noise_of_map import Bounds, Noise
+from limitsets.systems.maps import coerce
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Scene
@@ -44,11 +47,11 @@ class AbsorptionBrackets(Tabled):
 
     Attributes
     ----------
-    source : Scene
-        The scene.
+    source, upper : Scene, or NamedTuple
+        The scene, twice; or the corners of the map's parameters: bounds hold for all between, others at every step too.
     scene, unit : str
-        Name of the scene, unit of lengths.
-    scatter : Scattering
+        Name of the scene or map, unit of lengths.
+    scatter : Scattering or Noise
         The laws of what differs at every throw.
     absorbing : dict of str to tuple of (int, float, float)
         By name side, from x, to x of the places that absorb [length]; the exits ("exits") do too.
@@ -73,10 +76,11 @@ class AbsorptionBrackets(Tabled):
         "proved".
     """
 
-    source: Scene
+    source: Any
+    upper: Any
     scene: str
     unit: str
-    scatter: Scattering
+    scatter: Scattering | Noise
     absorbing: dict[str, tuple[Place, ...]]
     starts: tuple[Place, ...]
     chain: Chain
@@ -87,6 +91,11 @@ class AbsorptionBrackets(Tabled):
     functions: dict[str, Array]
     seconds: float
     how: str = "proved"
+
+    @property
+    def step(self) -> str:
+        """What is counted: throws of a scene, steps of a map."""
+        return "throws" if isinstance(self.scatter, Scattering) else "steps"
 
     def quantile(self, share: float, name: str = ANY) -> tuple[int | None, int | None]:
         """Bound the number of throws within which `share` of the starts end there; None beyond the throws counted.
@@ -107,12 +116,16 @@ class AbsorptionBrackets(Tabled):
         last = self.within[ANY].shape[1] - 1
         rows = [(name, str(last), (low[-1], high[-1])) for name, (low, high) in self.within.items()]
         rows += [(name, "any number of", pair) for name, pair in self.ever.items()]
-        columns = ("ends at", "within throws", Column("probability", show=".6f", ends=True))
+        columns = ("ends at", f"within {self.step}", Column("probability", show=".6f", ends=True))
         return (Table(columns, rows, f"{self.scene}: brackets of probabilities", self.how),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the brackets as JSON takes them."""
+        corners = (
+            {} if self.step == "throws" else {"parameters": [self.source._asdict(), self.upper._asdict()]}
+        )
         return as_table(
+            **corners,
             **picked(self, "scene", "unit", "how", "absorbing", "starts", "seconds"),
             scatter=self.scatter.words(),
             cells=self.chain.nodes.place.size - self.chain.nodes.first.size + 1,
@@ -166,42 +179,53 @@ CELLS, THROWS = 4000, 200
 
 @shown_in_notebooks
 def absorption_brackets(
-    scene: Scene | str,
-    scatter: Scattering | None = None,
+    scene: Any,
+    scatter: Any = None,
     *,
     right: tuple[float, int] | None = None,
     wrong: float | None = None,
     absorbing: Mapping[str, Sequence[Place]] | None = None,
     starts: Sequence[Place] | None = None,
-    cells: int = CELLS,
+    cells: int | None = None,
     throws: int = THROWS,
     mean: bool = True,
+    upper: Any = None,
+    noise: Bounds | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> AbsorptionBrackets:
-    """Prove brackets of the probabilities with which parts end at places, and of how many throws that takes.
+    """Prove brackets of the probabilities with which parts, or orbits, end at places, and of how long that takes.
+
+    ``absorption_brackets(scene, scatter, right=...)`` of a scene, ``absorption_brackets(map, grid, noise=e,
+    absorbing=...)`` of a map of a line, whose orbits also end where they leave the grid.
 
     Parameters
     ----------
-    scene : Scene or str
-        A scene in the minimal model, or the name of one.
-    scatter : Scattering, optional
-        Uniform or Gaussian deviations of speed and landing place, independent of each other and of other throws; by
-        default that of the scene.
+    scene : Scene, str or NamedTuple
+        A scene in the minimal model, or the name of one; or a map of one coordinate, or the lower corner of a box of
+        its parameters.
+    scatter : Scattering or Grid, optional
+        Of a scene: uniform or Gaussian deviations of speed and landing place, independent of each other and of other
+        throws; by default that of the scene.  Of a map: the cells.
     right : (float, int), optional
-        x and side: a part at rest at x or beyond, on this side, has ended "right" [length].
+        Of a scene: x and side: a part at rest at x or beyond, on this side, has ended "right" [length].
     wrong : float, optional
-        x: at rest there or beyond, on any other side, it has ended "wrong"; needs `right` [length].
+        Of a scene: x: at rest there or beyond, on any other side, it has ended "wrong"; needs `right` [length].
     absorbing : mapping of str to sequence of (int, float, float), optional
-        Further places where parts end: by name side, from x, to x [length].
+        Further places where parts or orbits end: by name side, from x, to x [length].
     starts : sequence of (int, float, float), optional
         Side, from x, to x: equally likely per length on all of them.  By default on every side from a twentieth of the
-        arm beyond a_i to x of `right` [length].
-    cells : int
-        Cells per side; the brackets narrow with their square.
+        arm beyond a_i to x of `right`; of a map all of the grid [length].
+    cells : int, optional
+        Of a scene: cells per side, by default 4000; the brackets narrow with their square.
     throws : int
-        n up to which probabilities within n throws are bounded.
+        n up to which probabilities within n throws or steps are bounded.
     mean : bool
         Bound the mean of T too, and the probabilities of ever ending at a place: some hundreds of throws more.
+    upper : NamedTuple, optional
+        Of a map: the upper corner of the parameters; they may be others at every step.
+    noise : float or mapping of str to float, optional
+        Of a map: each step lands evenly within this distance of the image; or by name what deviates evenly, and anew at
+        every step: "landing", and a parameter.  [length, or that of the parameter]
     progress : callable, optional
         Told (stage, done, all).
 
@@ -212,8 +236,8 @@ def absorption_brackets(
     Raises
     ------
     AnswerError
-        Places or starts that are none, a law or an effect of which nothing is proved, or so small a kappa that the
-        impact may not be unique.
+        Places or starts that are none, a law or an effect of which nothing is proved, so small a kappa that the
+        impact may not be unique, or arguments of the other kind.
 
     Examples
     --------
@@ -223,22 +247,41 @@ def absorption_brackets(
     >>> low, high = brackets.within["right"][:, 5]
     >>> bool(low < 0.222 < high < low + 0.05)
     True
+    >>> import limitsets as ls
+    >>> def halved(x): return 0.5 * x
+    >>> top, below = {"top": [(0, 1.0, 3.0)]}, [(0, 0.0, 1.0)]  # a step from x ends there with probability x/4
+    >>> grid = ls.grid([(0.0, 3.0)], cells=300)
+    >>> ends = absorption_brackets(ls.map(halved), grid, noise=1.0, absorbing=top, starts=below)
+    >>> [round(end, 4) for end in (*ends.ever["top"], *ends.mean)]
+    [0.25, 0.25, 2.0, 2.0]
     """
-    from limitsets.feeder.scene import load
+    from limitsets.feeder.scene import Scene, load
 
     begun = time.perf_counter()
     guard()
-    read = load(scene) if isinstance(scene, str) else scene
-    noise = scattering_of(read) if scatter is None else scatter
-    require_cells(cells, "absorption bracket")
-    places = absorbing_places(read, right, wrong, absorbing)
-    begin = tuple(default_starts(read, right) if starts is None else starts)
-    require_places(read, "a start", begin)
     tell = progress or (lambda stage, done, total: None)
-    from limitsets.checker.brackets import brackets_of
+    if isinstance(scene, Scene | str):
+        require_none({"upper": upper, "noise": noise}, "absorption_brackets", "beside a scene")
+        read = load(scene)
+        law = scattering_of(read) if scatter is None else scatter
+        require_cells(cells, "absorption bracket")
+        places = absorbing_places(read, right, wrong, absorbing)
+        begin = tuple(default_starts(read, right) if starts is None else starts)
+        require_places(read, "a start", begin)
+        told = added_up("cells", len(read.sides) * (cells or CELLS), tell)
+        chain = chain_of(read, law, begin, places, cells or CELLS, told)
+        who = read, read, read.name, read.unit
+    else:
+        other = {"right": right, "wrong": wrong, "cells": cells}
+        require_none(other, "absorption_brackets", "beside a map")
+        require_map(scene, scatter, None, "absorption_brackets")
+        read, corner = coerce(scene), coerce(scene if upper is None else upper)
+        places = _named_places(absorbing, {})
+        begin = tuple(whole_grid(scatter) if starts is None else starts)
+        chain, law = chain_of_map(read, corner, scatter, noise, begin, places)
+        who = read, corner, type(read).__name__, ""
+    from limitsets.checker.absorption import brackets_of
 
-    told = added_up("cells", len(read.sides) * cells, tell)
-    chain = chain_of(read, noise, begin, places, cells, told)
     within, values = {}, {}
     for name in (ANY, *chain.steps.absorbed):
         told_of = partial(_told, partial(tell, name), throws)
@@ -248,10 +291,8 @@ def absorption_brackets(
     means, ever, functions = forever(chain, places, values) if mean else ((0.0, math.inf), {}, {})
     tell("mean", 1, 1)
     return AbsorptionBrackets(
-        read,
-        read.name,
-        read.unit,
-        scatter=noise,
+        *who,
+        scatter=law,
         absorbing={name: tuple(each) for name, each in places.items()},
         starts=begin,
         chain=chain,
@@ -286,13 +327,23 @@ def absorbing_places(
         absorbers["wrong"] = [
             (k, float(wrong), math.inf) for k in range(len(scene.sides)) if k != int(right[1])
         ]
-    for name, places in (absorbing or {}).items():
-        if name in (*absorbers, ANY, EXITS):
-            raise AnswerError("the name of absorbing places", name, "one that is not taken", "choose another")
-        absorbers[name] = [(int(side), float(lo), float(hi)) for side, lo, hi in places]
+    absorbers |= _named_places(absorbing, absorbers)
     for name, each in absorbers.items():
         require_places(scene, f'a place that is "{name}"', each)
     return absorbers
+
+
+def _named_places(
+    absorbing: Mapping[str, Sequence[Place]] | None, taken: Mapping[str, object]
+) -> dict[str, list[Place]]:
+    """Read further places by name."""
+    for name in absorbing or {}:
+        if name in (*taken, ANY, EXITS):
+            raise AnswerError("the name of absorbing places", name, "one that is not taken", "choose another")
+    return {
+        name: [(int(side), float(lo), float(hi)) for side, lo, hi in places]
+        for name, places in (absorbing or {}).items()
+    }
 
 
 def default_starts(scene: Scene, right: tuple[float, int] | None) -> list[Place]:

@@ -52,12 +52,15 @@ class Chain:
         The throws, as the checker proves them: `above` bounds the mean of a function after a throw.
     row : checker.means.Rows
         Makes the mean over the starts.
+    pack : callable
+        Writes a certificate: called with the file, the section of the claim, arrays, and whether to recheck it.
     """
 
     section: dict[str, Any]
     nodes: Nodes
     steps: Steps
     row: Rows
+    pack: Callable[[str | Path, dict[str, Any], dict[str, Array], bool], object]
 
 
 def chain_of(
@@ -100,7 +103,12 @@ def chain_of(
     with flint.ctx.workprec(PRECISION):
         section, setting, nodes = setting_of(scene, scatter, starts, absorbing, cells)
         steps, row = chain_on(setting, [nodes.place[nodes.of_side(k)] for k in range(len(scene.sides))], told)
-    return Chain(section, nodes, steps, row)
+
+    def packed(path: str | Path, section: dict[str, Any], arrays: dict[str, Array], recheck: bool) -> None:
+        claims = [{"claim": "probabilities", "section": section}]
+        pack(path, section["scene"]["model"], claims, arrays | edges_of(nodes), recheck=recheck)
+
+    return Chain(section, nodes, steps, row, packed)
 
 
 def setting_of(
@@ -285,15 +293,12 @@ def write(
     arrays = dict(functions) | {
         f"within.{k}": np.ascontiguousarray(pair.T) for k, pair in enumerate(claimed.values())
     }
-    arrays |= edges_of(chain)
-    claims = [{"claim": "probabilities", "section": section}]
-    pack(path, section["scene"]["model"], claims, arrays, recheck=recheck)
+    chain.pack(path, section, arrays, recheck)
     return Path(path)
 
 
-def edges_of(chain: Chain) -> dict[str, Array]:
+def edges_of(nodes: Nodes) -> dict[str, Array]:
     """Give the nodes of each side as a certificate has them."""
-    nodes = chain.nodes
     return {f"edges.{side}": nodes.place[nodes.of_side(side)] for side in range(nodes.first.size - 1)}
 
 

@@ -36,7 +36,7 @@ from limitsets.proofs.chances.chain import EXITS, Place, require_places, setting
 from limitsets.proofs.prover.averages_of_map import cut_at_changes
 from limitsets.proofs.prover.certificate import require_checker
 from limitsets.proofs.prover.certifying import require_cells, require_map, require_none
-from limitsets.proofs.prover.long_run_of_map import as_checked, require_noise
+from limitsets.proofs.prover.noise_of_map import as_checked, require_noise
 from limitsets.systems.cells import Grid
 from limitsets.systems.maps import coerce
 
@@ -253,7 +253,8 @@ def _of_scene(
         words = scatter.words() if isinstance(scatter, Scattering) else shown(scatter)
         allowed = "Scattering(landing=Uniform(e)) with e above 0, and speed=Uniform(d) or none"
         raise AnswerError("the noise", words, allowed, "under other laws a cell leads to nearly every cell")
-    from limitsets.checker.brackets import LEFT, OUTERMOST, kinds_of, mesh_of
+    from limitsets.checker.absorption import LEFT
+    from limitsets.checker.brackets import OUTERMOST, kinds_of, mesh_of
     from limitsets.checker.links import ABSORBED, Links
     from limitsets.checker.steps import Parts
 

@@ -111,7 +111,7 @@ class LongRunAverages(Saved):
         """Write the claim."""
         section = self.chain.section | {"averages": self.averages}
         claims = [{"claim": "long-run", "section": section}]
-        pack(path, section["scene"]["model"], claims, self.functions | edges_of(self.chain), **how)
+        pack(path, section["scene"]["model"], claims, self.functions | edges_of(self.chain.nodes), **how)
 
 
 @shown_in_notebooks

@@ -260,7 +260,7 @@ def _section(claim: str, arrays: Arrays, known: Mapping[str, Any]) -> dict[str, 
         return {"least": (float.fromhex(known["least_slope"]) * (1.0 - LESS)).hex()}
     return (
         dict(known)
-        if claim in ("average", "entropy", "long-run", "cycles", "all-cycles", "converges")
+        if claim in ("average", "entropy", "long-run", "probabilities", "cycles", "all-cycles", "converges")
         else {}
     )
 

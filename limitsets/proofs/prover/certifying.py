@@ -301,6 +301,7 @@ def require_none(given: Mapping[str, Any], function: str, beside: str) -> None:
                 "margin": "a scene has goal=, a map ends=",
                 "average": "a scene has cells=, a map grid=",
                 "entropy": "a scene has cells=, a map grid= and upper=",
+                "absorption_brackets": "a scene has right=, wrong= and cells=, a map noise= and upper=",
                 "interval_chain": "a scene has right=, wrong= and cells=, a map noise= and upper=",
             }
             remedy = f"leave it out; {own[function]}"

@@ -10,44 +10,39 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from limitsets.base import AnswerError, Column, Progress, Table, as_table, picked, shown, silent
+from limitsets.base import AnswerError, Column, Progress, Table, as_table, picked, silent
 from limitsets.base.arrays import Array, Arrays, Ints, Mask
 from limitsets.proofs.prover.averages import outward
 from limitsets.proofs.prover.averages_of_map import asked_of_map, cut_at_changes
-from limitsets.proofs.prover.certificate import Saved, require_checker
-from limitsets.proofs.prover.certificate_of_map import Part, parameters_of, write_map
-from limitsets.proofs.prover.programs import periods_of, recorded_map
+from limitsets.proofs.prover.certificate import Saved
+from limitsets.proofs.prover.certificate_of_map import Part, write_map
+from limitsets.proofs.prover.noise_of_map import (
+    LEAST,
+    Bounds,
+    as_checked,
+    noise_in_words,
+    noise_of,
+    refined,
+    require_noise,
+)
 from limitsets.proofs.prover.proof import Claim
-from limitsets.proofs.prover.recording import decimal, names_of
 from limitsets.systems.cells import Grid
 from limitsets.systems.maps import kind_of
-from limitsets.systems.maps.contract import require_corners
 
-if TYPE_CHECKING:
-    from limitsets.checker.any_map import Map as CheckedMap
-
-# Cells are cut, each so often at most, and all together, where the slope varies by more than this factor, but for cells
-# below this share of a side; and where an image is longer than the mean by this factor.
-MOST_CUTS, MOST_IN_ALL, VARIES, TINY, LONG = 400, 2000, 1.5, 2.0**-33, 2.0
 # Steps at most, and by how much the gain of a step may still differ between nodes.
 MOST_STEPS, STILL = 3000, 1e-6
 # They end too where so many steps bring the bound nearer by less than this share of that difference.
 PATIENCE, SOON = 100, 1e-3
 # A step goes so far towards what it gains, so that nothing swings.
 DAMPED = 0.8
-# The least noise, and its name in a mapping.
-LEAST, LANDING = 1e-90, "landing"
 WITHOUT = "leave it out for averages without noise"
-# Parts in which the range of a parameter that varies is cut.
-STRATA = 32
 # A certificate claims bounds that are wider by this, for the roundings of another machine's sums.
 ALLOWANCE = 1e-9
 
@@ -78,7 +73,7 @@ class LongRunOfMap(Saved):
     map: Any
     upper: Any
     grid: Grid
-    noise: float | Mapping[str, float]
+    noise: Bounds
     starts: tuple[tuple[int, float, float], ...]
     numbers: dict[str, tuple[float, float]]
     section: dict[str, Any]
@@ -152,17 +147,8 @@ def in_words(starts: Sequence[tuple[int, float, float]]) -> str:
     )
 
 
-def noise_in_words(noise: float | Mapping[str, float]) -> str:
-    """Say what deviates."""
-    bounds = dict(noise) if isinstance(noise, Mapping) else {LANDING: noise}
-    landing = bounds.pop(LANDING, 0.0)
-    laws = [f"steps land within {landing:g} of the image"] if landing else []
-    laws += [f"{name} deviates by at most {bound:g} at every step" for name, bound in bounds.items()]
-    return f"{' and '.join(laws)}, evenly"
-
-
 def long_run_of_map(
-    lower: Any, upper: Any, grid: Grid, of: Any, noise: float | Mapping[str, float], progress: Progress | None
+    lower: Any, upper: Any, grid: Grid, of: Any, noise: Bounds, progress: Progress | None
 ) -> LongRunOfMap:
     """Prove between which numbers averages lie in the end where each step lands evenly within `noise` of the image.
 
@@ -175,16 +161,14 @@ def long_run_of_map(
         steps leave.
     """
     begun, tell = time.perf_counter(), progress or silent
-    own, landing, varied = _laws(lower, noise)
-    require_noise(lower, upper, grid, landing, WITHOUT, LEAST if varied is None else 0.0)
+    own = noise_of(lower, noise)
+    require_noise(lower, upper, grid, own.landing, WITHOUT, LEAST if own.varied is None else 0.0)
     import flint
 
     from limitsets.checker.balls import PRECISION, UnprovedError
     from limitsets.checker.file import BadFileError
-    from limitsets.checker.laws import uniform_law
     from limitsets.checker.long_run import END_SIGNS
     from limitsets.checker.map_long_run import ENDS, LongRunOfMap as Claimed, gains_of
-    from limitsets.checker.noisy_map import Varied
     from limitsets.checker.observable import Allowed, read_function
 
     asked = asked_of_map(of, lower, grid)
@@ -199,10 +183,8 @@ def long_run_of_map(
         functions = [read_function(one, [0], allowed, "the function", unknown) for one in listed]
         tell("cells", 0, 1)
         edges = [refined(the_map, side, axes[0], asked.jumps) for side, axes in enumerate(fine.edges)]
-        law = uniform_law(Fraction(decimal(landing)), 1)
-        parameter = None if varied is None else Varied(varied[0], Fraction(decimal(varied[1])), STRATA)
         try:
-            chain, kept, gains = gains_of(the_map, Claimed("", law, parameter, [], edges, functions))
+            chain, kept, gains = gains_of(the_map, Claimed(own.checked([], edges), functions))
         except (BadFileError, UnprovedError) as error:
             allow = "so small that steps stay on some cells, where what is averaged has a bound"
             remedy = f"widen the grid, lower the noise, or let landings scatter too: {error}"
@@ -217,103 +199,19 @@ def long_run_of_map(
         for end, column in zip(ENDS, columns, strict=True)
     }
     starts = stretches(kept, mesh.place, mesh.first)
-    section: dict[str, Any] = {
-        "landing": decimal(landing),
+    section = own.section() | {
         "starts": [{"side": side, "box": [[lo.hex(), hi.hex()]]} for side, lo, hi in starts],
         "functions": listed,
     }
-    if varied is not None:
-        section["varied"] = {"name": varied[0], "within": decimal(varied[1]), "strata": STRATA}
     numbers = {}
     for one, each in zip(asked.functions, listed, strict=True):
         lo, hi = (float.fromhex(each[end][0]) for end in ENDS)
         shares = {"share", "steps"} & set(one.section)  # these lie between 0 and 1 by themselves
         numbers[one.name] = (max(lo, 0.0), min(hi, 1.0)) if shares else (lo, hi)
     return LongRunOfMap(
-        lower, upper, fine, own, tuple(starts), numbers=numbers, section=section,
+        lower, upper, fine, own.given, tuple(starts), numbers=numbers, section=section,
         arrays=arrays, seconds=time.perf_counter() - begun,
     )  # fmt: skip
-
-
-def _laws(
-    lower: Any, noise: float | Mapping[str, float]
-) -> tuple[float | dict[str, float], float, tuple[str, float] | None]:
-    """Read noise: as the answer has it, how far steps land from the image, and the parameter that deviates, and how."""
-    given = noise if isinstance(noise, Mapping) else {LANDING: noise}
-    bounds, parameters = (
-        {LANDING: 0.0} | {name: float(bound) for name, bound in given.items()},
-        dict(names_of(lower)),
-    )
-    if LANDING in parameters:
-        raise AnswerError(
-            "a parameter", LANDING, "another name", "rename it: such noise is of where steps land"
-        )
-    for name, bound in bounds.items():
-        if name != LANDING and not (name in parameters and LEAST <= bound < math.inf):
-            allowed = f"at least {LEAST}, of {' or '.join([LANDING, *parameters])}"
-            raise AnswerError(f"the noise of {name}", bound, allowed, "correct it, or leave it out")
-    if len(bounds) > 2:
-        raise AnswerError("the noise", sorted(bounds), "of one parameter", "leave the others out")
-    landing, *varied = bounds.items()
-    return (bounds if varied else landing[1]), landing[1], next(iter(varied), None)
-
-
-def require_noise(
-    lower: Any, upper: Any, grid: Grid, noise: float | None, without: str, least: float = LEAST
-) -> None:
-    """Refuse what is no map of a line on a grid that ends, with steps that land within `noise` of the image."""
-    require_corners(lower, upper)
-    widest = float((grid.domain.hi - grid.domain.lo).max())
-    if noise is None or not least <= noise < 0.5 * widest:
-        room = f"at least {least}, and below {0.5 * widest:.6g}, half of the grid"
-        raise AnswerError("the noise", noise, room, without)
-    if grid.domain.closes:
-        raise AnswerError("the grid", "an axis that closes", "one that ends", "noise is of lines that end")
-    require_checker()
-    from limitsets.checker.map_long_run import FARTHEST
-
-    if not float(np.abs([grid.domain.lo, grid.domain.hi]).max()) < FARTHEST:
-        raise AnswerError("the grid", shown(grid), f"numbers below {FARTHEST:.6g}", "choose a unit of x")
-
-
-def as_checked(lower: Any, upper: Any, grid: Grid) -> CheckedMap:
-    """Give a map as the checker has it; to be called with its precision."""
-    from limitsets.checker.any_map import Map, read_map, read_parameters
-
-    shape = read_map(recorded_map(lower, grid.sides) | {"periodic": periods_of(grid.domain)})
-    return Map(shape, read_parameters(parameters_of(lower, upper), shape.names, "the map"))
-
-
-def refined(the_map: CheckedMap, side: int, edges: Array, jumps: Sequence[tuple[int, float]]) -> Array:
-    """Cut cells on which the slope varies by a half or has no bounds, and those with an image longer than most.
-
-    Near a pole of ln |f'| cells become the shorter the nearer it is; small ones, of changes and turns, stay.  Beside
-    the places where what is averaged jumps there are nodes so close that the jump costs nothing.
-    """
-    from limitsets.checker.any_map import possible
-
-    tiny, cells = TINY * (edges[-1] - edges[0]), list[tuple[float, float, float]]()
-    left = MOST_IN_ALL + edges.size
-    for ends in itertools.pairwise(edges.tolist()):
-        stack, cuts = [ends], min(MOST_CUTS, left)
-        left -= cuts
-        while stack:
-            lo, hi = stack.pop()
-            piece = the_map.piece([(lo, hi)])
-            branches = possible(the_map, side, piece)[0]
-            slope = the_map.image[side, branches[0]].bend(piece.balls)[1]
-            least, most = (float(each) for each in (slope.abs_lower(), slope.abs_upper()))
-            if len(branches) == 1 and cuts > 0 and hi - lo > tiny and not most <= VARIES * least:
-                stack += [(0.5 * (lo + hi), hi), (lo, 0.5 * (lo + hi))]
-                cuts -= 1
-                continue
-            cells.append((lo, hi, most * (hi - lo) if math.isfinite(most) else 0.0))
-        left += cuts
-    lo, hi, long = np.array(cells).T
-    parts = np.maximum(np.ceil(long / max(LONG * float(long.mean()), tiny)), 1.0).astype(int)
-    inner = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(lo, hi, parts.tolist(), strict=True)]
-    beside = np.array([x + k * tiny for s, x in jumps if s == side for k in (-1, 1)])
-    return np.unique(np.concatenate([*inner, hi[-1:], beside[(beside > edges[0]) & (beside < edges[-1])]]))
 
 
 def stretches(kept: Mask, place: Array, first: Ints) -> list[tuple[int, float, float]]:

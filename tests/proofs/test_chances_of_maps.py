@@ -1,0 +1,345 @@
+"""Where orbits of noisy maps end, and when: closed forms, chains in rationals, random orbits, forged files."""
+
+import random
+from fractions import Fraction
+
+import flint
+import numpy as np
+import pytest
+
+pytest.importorskip("flint", reason="the checker needs python-flint")
+
+from limitsets.robust import absorption_brackets
+
+import limitsets as ls
+from limitsets.base.errors import AnswerError
+from limitsets.checker.absorption import brackets_of
+from limitsets.checker.any_map import Map, read_map
+from limitsets.checker.balls import PRECISION
+from limitsets.checker.laws import uniform_law
+from limitsets.checker.map_chances import chain_that_ends
+from limitsets.checker.noisy_map import NoisyMap
+from limitsets.proofs.chances.chain import Chain
+from limitsets.proofs.chances.forever import forever
+from tests.proofs.forge import opened
+from tests.proofs.test_horizon import solved
+from tests.proofs.test_noisy_maps import half, itself, random_chain, section_of
+
+
+def to_middle(x):
+    return 0.5 + 0.0 * x
+
+
+def to_level(x, p):
+    return p + 0.0 * x
+
+
+def doubled(x, p):
+    return p * x
+
+
+def lower(x):
+    return 1.8 * x + 0.1
+
+
+def upper(x):
+    return 1.9 - 1.8 * x
+
+
+def from_middle(x):
+    return x - 0.45
+
+
+KNOWN = {  # map, grid, noise, places, starts: P(ever at the place), mean of T, both in closed form
+    # from x a step lands in [0, 1] with probability 1/2, evenly, and above 1 with x/4
+    "a half and wide noise": (ls.map(half), (0.0, 3.0), 1.0, {"top": [(0, 1.0, 3.0)]}, (0.0, 1.0), 1 / 4, 2.0),
+    # the ruin of a player whose stakes are as wide as what he has
+    "a walk of one step": (
+        ls.map(itself), (-2.0, 3.0), 1.0, {"top": [(0, 1.0, 3.0)], "ruin": [(0, -2.0, 0.0)]}, (0.0, 1.0), 1 / 2, 2.0,
+    ),
+    # a sixth of all steps lands off the grid, a third at the place
+    "every step lands alike": (
+        ls.map(to_middle), (-1.0, 1.0), 0.75, {"low": [(0, -0.25, 0.25)]}, (0.3, 0.9), 2 / 3, 2.0,
+    ),
+    "a parameter that deviates": (
+        ls.map(to_level, p=0.5), (-1.0, 1.0), {"p": 0.25}, {"top": [(0, 0.6, 0.8)]}, (-0.5, 0.5), 1.0, 10 / 3,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", KNOWN)
+def test_probabilities_and_times_are_those_in_closed_form(case, tmp_path):
+    the_map, ends, noise, places, starts, ever, mean = KNOWN[case]
+    grid = ls.grid([ends], cells=400)
+    answer = absorption_brackets(
+        the_map, grid, noise=noise, absorbing=places, starts=[(0, *starts)], throws=20
+    )
+    # one of 32 strata of a parameter holds the end of the place, and counts as on it or not
+    near = 1.0 / 32.0 if isinstance(noise, dict) else 5e-5
+    for (lo, hi), exact in ((answer.ever[next(iter(places))], ever), (answer.mean, mean)):
+        assert lo - 1e-9 <= exact <= hi + 1e-9
+        assert hi - lo < 2.5 * near * mean**2
+    lo, hi = answer.within["any"]
+    exact = 1.0 - (1.0 - 1.0 / mean) ** np.arange(21)
+    assert ((lo - 1e-9 <= exact) & (exact <= hi + 1e-9) & (hi - lo < 3.0 * near)).all()
+    first, last = answer.quantile(0.55)
+    assert first <= np.argmax(exact >= 0.55) <= last
+    assert "steps" in answer.table().text()
+    report = ls.recheck(answer.save(tmp_path / "known.proof.zip"))
+    assert report.verdict == "proved"
+
+
+def test_orbits_that_never_end_have_no_mean_and_no_probability_from_below():
+    """From -0.2 to 0.2 no step leads out, and the place lies elsewhere."""
+    answer = absorption_brackets(
+        ls.map(half), ls.grid([(-1.0, 1.0)], cells=20), noise=0.1, absorbing={"top": [(0, 0.9, 1.0)]},
+        starts=[(0, -0.1, 0.1)], throws=5,
+    )  # fmt: skip
+    assert answer.mean[1] == np.inf
+    assert answer.ever == {}
+    assert answer.within["top"].max() < 1e-12
+
+
+def test_the_time_to_leave_a_grid_needs_no_place():
+    """From x every step lands off [-1, 1] with probability 1/6; with p from 0.4 to 0.6 with 1/10 to 7/30."""
+    grid = ls.grid([(-1.0, 1.0)], cells=100)
+    lo, hi = absorption_brackets(ls.map(to_middle), grid, noise=0.75).mean
+    assert 6.0 - 1e-4 < lo <= 6.0 <= hi < 6.0 + 1e-4
+    corners = [ls.map(to_level, p=p) for p in (0.4, 0.6)]
+    lo, hi = absorption_brackets(corners[0], grid, noise=0.75, upper=corners[1]).mean
+    assert 4.28 < lo <= 30.0 / 7.0
+    assert 10.0 <= hi < 10.01
+
+
+def ending_chain(rng):
+    """A chain on sides as of `random_chain`, of which the last side is a place and one turn leads off all cells."""
+    places, to, borders = random_chain(rng)
+    return [*places, 0], [*([a, rng.choice([b, len(places), len(places) + 1])] for a, b in to)], borders
+
+
+def exact_rows(places, to, borders):
+    """Probabilities from side to side, the place and the exits last: from the part landed within 1 of a place."""
+    count = len(to)
+    rows = [[Fraction(0)] * (count + 2) for _ in range(count)]
+    for i in range(count):
+        above = min(max((places[i] + 1 - borders[i]) / 2, Fraction(0)), Fraction(1))
+        rows[i][to[i][1]] += above
+        rows[i][to[i][0]] += 1 - above
+    return rows
+
+
+def bounds_of(places, to, borders):
+    """What is proved of the mean, and of the probability of ever ending at the last side."""
+    count, close, far = len(to) + 1, 2.0**-33, 40
+    turns = [(i, b, to[i][b]) for i in range(count - 1) for b in (0, 1)] + [(count - 1, b, 0) for b in (0, 1)]
+    raw = {
+        "dimension": 1, "sides": count, "branches": 2, "parameters": [], "periodic": [[None]] * count,
+        "programs": [
+            {"side": i, "branch": b, "to": min(j, count - 1), "out": [0],
+             "ops": [["c", str(far if j == count else places[j])]]}
+            for i, b, j in turns
+        ],
+        "margins": [
+            {"side": i, "ops": [["x", 0], ["c", repr(float(at))], ["sub", 0, 1]], "out": [2]}
+            for i, at in enumerate([*borders, Fraction(0)])
+        ],
+    }  # fmt: skip
+    edges = []
+    for at in [*borders, Fraction(0)]:
+        around = [float(at) + k * close for k in (-2, -1, 1, 2)]
+        beside = [end + k * close for end in (-12.0, 12.0) for k in (-1, 0, 1)]
+        edges.append(np.array(sorted({*beside, *around})))
+    start = [(0, Fraction(places[0] - 1), Fraction(places[0] + 1))]
+    last = {"place": [(count - 1, Fraction(-12), Fraction(12))]}
+    noisy = NoisyMap("1", uniform_law(Fraction(1), 1), None, start, edges)
+    steps, row = chain_that_ends(Map(read_map(raw), {}), noisy, last)
+    within = {name: brackets_of(steps, row, name, 50)[1] for name in ("any", "exits", "place")}
+    mean, ever, _ = forever(Chain({}, None, steps, row, print), ["place"], within)
+    return mean, ever.get("place", (0.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(14), pytest.param(range(14, 100), marks=pytest.mark.sweep)], ids=["some", "many"]
+)
+def test_chains_that_end_have_the_numbers_of_rationals(seeds):
+    known = 0
+    with flint.ctx.workprec(PRECISION):
+        for seed in seeds:
+            chain = ending_chain(random.Random(seed))
+            rows, count = exact_rows(*chain), len(chain[1])
+            try:
+                mean = solved([*rows, [], []], [Fraction(1)] * count)[0]
+                ever = solved([*rows, [], []], [row[count] for row in rows])[0]
+            except StopIteration:  # some states never end
+                continue
+            (low, high), (least, most) = bounds_of(*chain)
+            assert low <= mean <= high < low + 1e-3 * mean
+            assert least <= ever <= most < least + 1e-3
+            known += 1
+    assert known >= 0.3 * len(seeds)
+
+
+RANDOM = {
+    "two branches": (
+        ls.map(pieces=(lower, upper), margin=from_middle), {}, 0.08,
+        lambda x, _: np.where(x < 0.45, lower(x), upper(x)),
+    ),
+    "a range of a parameter, another at every step": (
+        ls.map(doubled, p=1.2), {"upper": ls.map(doubled, p=1.25)}, 0.3,
+        lambda x, rng: rng.uniform(1.2, 1.25, x.size) * x,
+    ),
+    "a slope that deviates too": (
+        ls.map(doubled, p=-1.1), {}, {"p": 0.2, "landing": 0.15},
+        lambda x, rng: rng.uniform(-1.3, -0.9, x.size) * x,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", RANDOM)
+def test_random_orbits_end_within_the_bounds(case):
+    the_map, how, noise, image = RANDOM[case]
+    place = (0, 0.85, 0.95)
+    answer = absorption_brackets(
+        the_map, ls.grid([(-0.5, 1.2)], cells=300), noise=noise, absorbing={"hit": [place]},
+        starts=[(0, 0.0, 0.5)], throws=10, **how,
+    )  # fmt: skip
+    rng, count = np.random.default_rng(3), 200_000
+    e = noise["landing"] if isinstance(noise, dict) else noise
+    x, ended, hit = rng.uniform(0.0, 0.5, count), np.zeros(count, int), np.zeros(count, bool)
+    for n in range(1, 600):
+        x = image(x, rng) + rng.uniform(-e, e, count)
+        on = ended == 0
+        hit |= on & (place[1] <= x) & (x <= place[2])
+        ended[on & ((x < -0.5) | (x > 1.2) | hit)] = n
+        x = np.where(ended > 0, 0.2, x)
+        if n == 10:
+            some, error = (hit.mean(), (ended > 0).mean()), 5 * 0.5 / np.sqrt(count)
+            for name, share in zip(("hit", "any"), some, strict=True):
+                lo, hi = answer.within[name][:, -1]
+                assert lo - error <= share <= hi + error
+    assert (ended > 0).all()
+    lo, hi = answer.ever["hit"]
+    assert lo - error <= hit.mean() <= hi + error
+    lo, hi = answer.mean
+    error = 5 * ended.std() / np.sqrt(count)
+    assert lo - error <= ended.mean() <= hi + error
+    assert hi - lo < (0.4 if how else 0.06) * ended.mean()
+
+
+# ------------------------------------------------------------------------------------------------- certificates
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    answer = absorption_brackets(
+        ls.map(half), ls.grid([(0.0, 3.0)], cells=100), noise=1.0, absorbing={"top": [(0, 1.0, 3.0)]},
+        starts=[(0, 0.0, 1.0)], throws=4,
+    )  # fmt: skip
+    return answer.save(tmp_path_factory.mktemp("chances") / "half.proof.zip")
+
+
+def test_a_saved_answer_is_said_in_words(saved):
+    said = ls.recheck(saved).statement[-1]
+    for words in (
+        "steps land within 1 of f(x), evenly", "domain: [0.0, 3.0]", "top: [1.0, 3.0]",
+        "starts, equally likely per length: [0.0, 1.0]", 'P(ever ended "top")', "the mean of T: at least 1.99",
+    ):  # fmt: skip
+        assert words in said
+
+
+def box(lo, hi):
+    return [{"side": 0, "box": [[float(lo).hex(), float(hi).hex()]]}]
+
+
+def without_node_at_1(forged):
+    nodes = forged.arrays["0.nodes.0"]
+    at = int(np.searchsorted(nodes, 1.0)) + 1
+    forged.arrays["0.nodes.0"] = np.delete(nodes, at - 1)
+    for name in [name for name in forged.arrays if ".mean." in name or ".ever." in name]:
+        forged.arrays[name] = np.delete(forged.arrays[name], at)
+
+
+FORGED = {
+    "more noise": (lambda f: section_of(f).update(landing="1.1"), "is proved"),
+    "another place": (lambda f: section_of(f).update(absorbing={"top": box(2, 3)}), "no nodes"),
+    "a place that its nodes do not end": (without_node_at_1, "its ends are no nodes"),
+    "a place beyond the domain": (
+        lambda f: section_of(f).update(absorbing={"top": box(1, 3.5)}), "reaches beyond the domain",
+    ),
+    "starts beyond the domain": (lambda f: section_of(f).update(starts=box(-1, 1)), "beyond the domain"),
+    "other starts": (lambda f: section_of(f).update(starts=box(0.5, 1)), "is proved"),
+    "a larger probability": (
+        lambda f: section_of(f)["ever"][0].__setitem__(slice(1, 3), [(0.3).hex(), (0.4).hex()]), "is proved",
+    ),
+    "a longer mean": (lambda f: section_of(f).update(mean=[(2.1).hex(), (3.0).hex()]), "is proved"),
+    "a function that is lower at a node": (
+        lambda f: f.arrays["0.ever.0.upper"].__setitem__(20, 0.0), "upper function is none",
+    ),
+    "a probability within some steps": (
+        lambda f: f.arrays["0.within.0"].__setitem__((3, 1), 0.1), "within 3 throws",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", FORGED)
+def test_what_is_forged_is_denied(case, saved, tmp_path):
+    change, reason = FORGED[case]
+    forged = opened(saved)
+    change(forged)
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    assert (report.verdict, reason in str(report)) == ("failed", True), str(report)
+
+
+BAD = {
+    "no noise": lambda f: section_of(f).update(landing="0"),
+    "a key too many": lambda f: section_of(f).update(more=1),
+    "a place that overlaps another": lambda f: section_of(f).update(
+        absorbing={"top": box(1, 3), "more": box(2, 3)}
+    ),
+    "starts that count twice": lambda f: section_of(f).update(starts=box(0, 1) + box(0.5, 1)),
+    "a place named as the exits": lambda f: section_of(f).update(absorbing={"exits": box(1, 3)}),
+    "a function of other cells": lambda f: f.arrays.update({"0.mean.upper": np.ones(7)}),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_files_are_refused(case, saved, tmp_path):
+    forged = opened(saved)
+    BAD[case](forged)
+    assert ls.recheck(forged.seal().write(tmp_path / "forged.zip")).verdict == "bad file"
+
+
+def inverse(x):
+    return 1.0 / x
+
+
+def turned(x, y):
+    return 0.5 * y, 0.5 * x
+
+
+LINE, TOP = ls.grid([(-1.0, 1.0)], cells=20), {"top": [(0, 0.5, 1.0)]}
+REFUSED = {
+    "no noise": (half, LINE, {}, r"the noise is 0"),
+    "words of a scene": (half, LINE, {"noise": 0.1, "right": (0.5, 0)}, r"right of absorption_brackets"),
+    "no grid": (half, None, {"noise": 0.1}, r"the grid of"),
+    "a plane": (turned, ls.grid([(-1, 1), (-1, 1)], cells=8), {"noise": 0.1}, r"of a line"),
+    "a place off the grid": (half, LINE, {"noise": 0.1, "absorbing": {"a": [(0, 0.5, 2.0)]}}, r"a place is"),
+    "a start on no side": (half, LINE, {"noise": 0.1, "starts": [(1, 0.0, 0.5)]}, r"a place is"),
+    "a name that is taken": (half, LINE, {"noise": 0.1, "absorbing": {"exits": TOP["top"]}}, r"not taken"),
+    "places that overlap": (
+        half, LINE, {"noise": 0.1, "absorbing": TOP | {"more": [(0, 0.6, 0.7)]}}, r"two places that absorb overlap",
+    ),
+    "a pole": (inverse, LINE, {"noise": 0.1, "absorbing": TOP}, r"not enclosed"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_asked_is_told_in_a_line(case):
+    f, grid, how, words = REFUSED[case]
+    with pytest.raises(AnswerError, match=words):
+        absorption_brackets(ls.map(f), grid, **how)
+
+
+def test_a_map_is_no_argument_of_a_scene():
+    with pytest.raises(AnswerError, match="noise of absorption_brackets"):
+        absorption_brackets("paper-initial", noise=0.1, right=(20.0, 2))
