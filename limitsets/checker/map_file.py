@@ -124,6 +124,8 @@ def read_map_file(header: dict[str, Any], entries: dict[str, memoryview]) -> Map
     # the value at which the formulas are evaluated is a part of the map
     begun = [part.cells.first_edges() for part in parts if part.cells is not None]
     begun += [part.begins for part in parts if part.cycles]
+    noisy = [part.of_line[name].noisy.edges for part in parts for name in NOISY if name in part.of_line]
+    begun += [[[float(e[0])] for e in edges] for edges in noisy if shape.closes]
     require(all(one == begun[0] for one in begun), "the domains of the boxes begin elsewhere")
     if not any(part.unknown for part in parts):  # which may need arrays
         arrays.require_no_others()
@@ -198,9 +200,10 @@ def read_of_line(
     require(shape.dimension == 1 or not claimed, f"{where}: {', '.join(claimed)} is of one axis")
     both = "converges" in known and {"average", "entropy"} & set(claimed)
     require(not both, f"{where}: average and entropy do not stand beside converges")
-    of_noise = ", ".join(NOISY.keys() & set(known))
-    require(not (shape.closes and of_noise), f"{where}: {of_noise} is of an axis that ends")
-    allowed = Allowed(shape.sides, shape.branches, shape.names)
+    ends = not (shape.closes and "probabilities" in known)
+    require(ends, f"{where}: probabilities is of an axis that ends")
+    periods = [axes[0] for axes in shape.periods]
+    allowed = Allowed(shape.sides, shape.branches, shape.names, periods)
     return {name: read(known[name], arrays, prefix, allowed, where) for name, read in claimed.items()}
 
 

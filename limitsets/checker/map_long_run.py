@@ -19,6 +19,7 @@ from .file import Arrays, require, rows
 from .landings import upper
 from .long_run import END_SIGNS, Gain, check_end, check_starts_stay, kept_cells, nodes_of
 from .means import INFLATE
+from .noisy_circle import ChainOfCircles, chain_of_circles
 from .noisy_map import (
     OF_NOISY,
     BranchOfCell,
@@ -101,7 +102,10 @@ class Majorant(NamedTuple):
 
 
 def majorants(
-    chain: Chain, strata: list[Stratum], pieces: list[list[BranchOfCell]], functions: list[Averaged]
+    chain: Chain | ChainOfCircles,
+    strata: list[Stratum],
+    pieces: list[list[BranchOfCell]],
+    functions: list[Averaged],
 ) -> list[list[Majorant]]:
     """Bound what is counted from above, by function and sign, its negative for the lower end."""
     values = np.zeros((len(functions), 2, len(chain.mesh.place)))
@@ -214,12 +218,18 @@ class GainOfEnd(NamedTuple):
     size: float
 
 
-def gains_of(the_map: Map, c: LongRunOfMap) -> tuple[Chain, Array, list[list[GainOfEnd]]]:
+def gains_of(the_map: Map, c: LongRunOfMap) -> tuple[Chain | ChainOfCircles, Array, list[list[GainOfEnd]]]:
     """Prove the steps: the chain, the cells of N by their left nodes, what bounds each function and its negative."""
     law = c.noisy.law
-    strata, mesh = strata_of(the_map, c.noisy.varied), mesh_of_map(c.noisy.edges, law)
-    chain, pieces = chain_of_map(strata, mesh, law, between_ends(mesh), {})
-    kept = kept_cells(chain, law)
+    strata = strata_of(the_map, c.noisy.varied)
+    chain: Chain | ChainOfCircles
+    if the_map.shape.closes:
+        chain, pieces = chain_of_circles(the_map, strata, c.noisy.edges, law)
+        kept = np.isin(np.arange(len(chain.mesh.place)), between_ends(chain.mesh))
+    else:
+        mesh = mesh_of_map(c.noisy.edges, law)
+        chain, pieces = chain_of_map(strata, mesh, law, between_ends(mesh), {})
+        kept = kept_cells(chain, law)
     prove(bool(kept.any()), "from every cell some step may lead out")
     nodes, free = nodes_of(kept), np.full(len(chain.mesh.place), -np.inf)
 

@@ -10,20 +10,21 @@ it does along a cell: there x varies, here p.
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb
 
-from .any_map import Map, possible
-from .balls import Arb, Array, Pair, exact, prove
+from .any_map import Map, period_of, possible
+from .balls import ZERO, Arb, Array, Pair, exact, prove
 from .brackets import OUTERMOST, Place, mesh_of
 from .file import Arrays, decimal, read_box, read_side, require, rows, table
 from .landings import upper
 from .laws import Law, uniform_law
 from .links import turn_of
+from .map_cells import closed_axis
 from .means import INFLATE, Mesh, Scatter, Spread, mean_rows
 from .observable import Allowed
 from .program import named, rational
@@ -75,7 +76,10 @@ def read_noisy(
     varied = read_varied(section["varied"], allowed.names, where) if "varied" in section else None
     fits = 0 < bound < FARTHEST or (bound == 0 and varied is not None)  # where a parameter varies
     require(fits, f"{where}: landing is not above 0, or too large")
-    edges = [arrays.read(f"{prefix}nodes.{side}", "<f8") for side in range(allowed.sides)]
+    edges = [
+        closed_axis(arrays.read(f"{prefix}nodes.{side}", "<f8"), period_of(period))
+        for side, period in enumerate(allowed.periods)
+    ]
     sound = all(
         len(e) >= 4 and bool((np.diff(e) > 0).all()) and float(np.abs(e).max()) < FARTHEST for e in edges
     )
@@ -146,6 +150,7 @@ class StepOfMap(NamedTuple):
     to: int
     images: tuple[Arb, Arb]
     range: Pair
+    moved: Arb = ZERO  # along an axis that closes images are moved by whole periods
 
 
 def steps_from(
@@ -190,7 +195,7 @@ class Stratum(NamedTuple):
             return [step.images[end]]
         own = step.piece
         return [
-            each.image[own.side, own.branch].at([arb(own.ends[end]), *each.piece([]).balls])[0]
+            each.image[own.side, own.branch].at([arb(own.ends[end]), *each.piece([]).balls])[0] + step.moved
             for each in self.ends
         ]
 
@@ -225,7 +230,12 @@ def between_ends(mesh: Mesh) -> Array:
 
 
 def chain_of_map(
-    strata: list[Stratum], mesh: Mesh, law: Law, live: Array, absorbed: dict[str, Array]
+    strata: list[Stratum],
+    mesh: Mesh,
+    law: Law,
+    live: Array,
+    absorbed: dict[str, Array],
+    turned: Callable[[list[StepOfMap]], list[StepOfMap]] = list,
 ) -> tuple[Chain, list[list[BranchOfCell]]]:
     """Prove the steps from some cells; with the cells of the chain on their branches, by stratum."""
     scatter = None if law.certain else Scatter(mesh, law, NARROW_OF_MAP)
@@ -235,7 +245,8 @@ def chain_of_map(
     for at, side in zip(live.tolist(), sides.tolist(), strict=True):
         ends = float(mesh.place[at]), float(mesh.place[at + 1])
         steps = [
-            steps_from(each.whole, side, at, ends, seen) for each, seen in zip(strata, known, strict=True)
+            turned(steps_from(each.whole, side, at, ends, seen))
+            for each, seen in zip(strata, known, strict=True)
         ]
         collected.add(at, steps)
     prove(bool(collected.places), "the image of no cell is enclosed")
@@ -300,7 +311,7 @@ def turns_of_stratum(of: Stratum, steps: list[StepOfMap]) -> Iterator[tuple[floa
     """
     if len(steps) > 1:
         return
-    ((own, to, _, reach),) = steps
+    ((own, to, _, reach, _),) = steps
     h = upper(arb(own.ends[1]) - arb(own.ends[0]))
     yield turn_of(own.at, h, own.slope, own.bend, (to, *reach), of.weight)
     if of.ends:

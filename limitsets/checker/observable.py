@@ -5,7 +5,7 @@ docs/certificates.md, "Averages": the claim `average` of a map of a line, and of
 
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -55,6 +55,7 @@ class Allowed(NamedTuple):
     sides: int
     branches: int
     names: list[str]
+    periods: Sequence[str | None] = ()  # of a line by side
 
 
 KEYS = "components functions quotients"

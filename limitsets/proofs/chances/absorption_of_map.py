@@ -33,6 +33,14 @@ def whole_grid(grid: Grid) -> list[Place]:
     return [(side, lo, hi) for side, (lo, hi) in enumerate(ends)]
 
 
+def require_ends(grid: Grid) -> None:
+    """Refuse an axis that closes."""
+    if grid.domain.closes:
+        raise AnswerError(
+            "the grid", "an axis that closes", "one that ends", "orbits end where they leave a line"
+        )
+
+
 def require_on_grid(grid: Grid, places: Sequence[Place]) -> None:
     """Require places of the grid."""
     for side, lo, hi in places:
@@ -63,6 +71,7 @@ def chain_of_map(
         lower, upper, grid, own.landing, "pass noise=e: each step lands within e of the image",
         LEAST if own.varied is None else 0.0,
     )  # fmt: skip
+    require_ends(grid)
     of_places = list(itertools.chain.from_iterable(absorbing.values()))
     require_on_grid(grid, [*starts, *of_places])
     import flint

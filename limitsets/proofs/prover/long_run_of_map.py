@@ -157,8 +157,7 @@ def long_run_of_map(
     Raises
     ------
     AnswerError
-        Noise that is not above 0, or of two parameters, an axis that closes, functions without a bound, or cells that
-        steps leave.
+        Noise that is not above 0, or of two parameters, functions without a bound, or cells that steps leave.
     """
     begun, tell = time.perf_counter(), progress or silent
     own = noise_of(lower, noise)
@@ -168,6 +167,7 @@ def long_run_of_map(
     from limitsets.checker.balls import PRECISION, UnprovedError
     from limitsets.checker.file import BadFileError
     from limitsets.checker.long_run import END_SIGNS
+    from limitsets.checker.map_cells import closed_axis
     from limitsets.checker.map_long_run import ENDS, LongRunOfMap as Claimed, gains_of
     from limitsets.checker.observable import Allowed, read_function
 
@@ -182,7 +182,11 @@ def long_run_of_map(
         allowed = Allowed(shape.sides, shape.branches, shape.names)
         functions = [read_function(one, [0], allowed, "the function", unknown) for one in listed]
         tell("cells", 0, 1)
-        edges = [refined(the_map, side, axes[0], asked.jumps) for side, axes in enumerate(fine.edges)]
+        edges = list[Array]()
+        for side, ((axis,), (period,)) in enumerate(zip(fine.edges, the_map.periods, strict=True)):
+            seam = [] if period is None else [(side, x) for x in axis[[0, -1]].tolist()]
+            nodes = refined(the_map, side, axis, [*asked.jumps, *seam])
+            edges.append(nodes if period is None else closed_axis(nodes[:-1], period))
         try:
             chain, kept, gains = gains_of(the_map, Claimed(own.checked([], edges), functions))
         except (BadFileError, UnprovedError) as error:
@@ -194,7 +198,8 @@ def long_run_of_map(
             tell(asked.functions[k].name, 2 * k + sign, 2 * len(listed))
             bound, columns[sign, :, k] = settled(gains[k][sign].bound, mesh.place, mesh.first)
             listed[k][word] = [(END_SIGNS[sign] * (bound + ALLOWANCE)).hex()]
-    arrays = {f"nodes.{side}": each for side, each in enumerate(edges)} | {
+    written = [each[:-1] if grid.domain.closes else each for each in edges]
+    arrays = {f"nodes.{side}": each for side, each in enumerate(written)} | {
         f"long-run.{end}": column if len(listed) > 1 else column[:, 0]
         for end, column in zip(ENDS, columns, strict=True)
     }

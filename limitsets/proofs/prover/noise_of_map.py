@@ -105,8 +105,6 @@ def require_noise(
     if noise is None or not least <= noise < 0.5 * widest:
         room = f"at least {least}, and below {0.5 * widest:.6g}, half of the grid"
         raise AnswerError("the noise", noise, room, without)
-    if grid.domain.closes:
-        raise AnswerError("the grid", "an axis that closes", "one that ends", "noise is of lines that end")
     require_checker()
     from limitsets.checker.noisy_map import FARTHEST
 
