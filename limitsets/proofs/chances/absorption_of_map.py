@@ -20,8 +20,8 @@ from limitsets.proofs.prover.noise_of_map import (
     Bounds,
     Noise,
     as_checked,
+    nodes_for,
     noise_of,
-    refined,
     require_noise,
 )
 from limitsets.systems.cells import Grid
@@ -33,16 +33,12 @@ def whole_grid(grid: Grid) -> list[Place]:
     return [(side, lo, hi) for side, (lo, hi) in enumerate(ends)]
 
 
-def require_ends(grid: Grid) -> None:
-    """Refuse an axis that closes."""
+def require_on_grid(grid: Grid, places: Sequence[Place]) -> None:
+    """Require a grid of lines that end, and places of it."""
     if grid.domain.closes:
         raise AnswerError(
             "the grid", "an axis that closes", "one that ends", "orbits end where they leave a line"
         )
-
-
-def require_on_grid(grid: Grid, places: Sequence[Place]) -> None:
-    """Require places of the grid."""
     for side, lo, hi in places:
         borders = grid.edges[side][0] if side in range(grid.sides) else np.full(1, np.nan)
         if not borders[0] <= lo < hi <= borders[-1]:
@@ -71,7 +67,6 @@ def chain_of_map(
         lower, upper, grid, own.landing, "pass noise=e: each step lands within e of the image",
         LEAST if own.varied is None else 0.0,
     )  # fmt: skip
-    require_ends(grid)
     of_places = list(itertools.chain.from_iterable(absorbing.values()))
     require_on_grid(grid, [*starts, *of_places])
     import flint
@@ -86,7 +81,7 @@ def chain_of_map(
     section = own.section() | {"starts": [_in_file(each) for each in starts], "absorbing": boxes}
     with flint.ctx.workprec(PRECISION):
         the_map = as_checked(lower, upper, grid)
-        edges = [_beyond(refined(the_map, side, axes[0], jumps)) for side, axes in enumerate(fine.edges)]
+        edges = [_beyond(each) for each in nodes_for(the_map, fine, jumps)]
         noisy = own.checked(starts, edges)
         try:
             places = read_places_of_map(section["absorbing"], noisy.starts, grid.sides, "the map")

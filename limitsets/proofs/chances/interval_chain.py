@@ -32,7 +32,7 @@ from limitsets.feeder.scattering import Scattering, Uniform, scattering_of
 from limitsets.feeder.scene import Scene, load
 from limitsets.numbers.interval import guard
 from limitsets.proofs.chances.absorption import absorbing_places, default_starts
-from limitsets.proofs.chances.absorption_of_map import require_ends, require_on_grid
+from limitsets.proofs.chances.absorption_of_map import require_on_grid
 from limitsets.proofs.chances.chain import EXITS, Place, require_places, setting_of
 from limitsets.proofs.prover.averages_of_map import cut_at_changes
 from limitsets.proofs.prover.certificate import require_checker
@@ -311,7 +311,6 @@ def _of_map(
     if grid.dimension != 1:
         raise AnswerError("the grid", f"{grid.dimension} axes", "one", "interval chains are of a line")
     require_noise(lower, upper, grid, noise, "pass noise=e: each step lands within e of the image")
-    require_ends(grid)
     require_on_grid(grid, [*starts, *itertools.chain.from_iterable(places.values())])
     from limitsets.checker.brackets import OUTERMOST, mesh_of
     from limitsets.checker.noisy_map import steps_from

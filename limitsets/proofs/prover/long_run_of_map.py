@@ -27,9 +27,9 @@ from limitsets.proofs.prover.noise_of_map import (
     LEAST,
     Bounds,
     as_checked,
+    nodes_for,
     noise_in_words,
     noise_of,
-    refined,
     require_noise,
 )
 from limitsets.proofs.prover.proof import Claim
@@ -167,7 +167,6 @@ def long_run_of_map(
     from limitsets.checker.balls import PRECISION, UnprovedError
     from limitsets.checker.file import BadFileError
     from limitsets.checker.long_run import END_SIGNS
-    from limitsets.checker.map_cells import closed_axis
     from limitsets.checker.map_long_run import ENDS, LongRunOfMap as Claimed, gains_of
     from limitsets.checker.observable import Allowed, read_function
 
@@ -182,11 +181,7 @@ def long_run_of_map(
         allowed = Allowed(shape.sides, shape.branches, shape.names)
         functions = [read_function(one, [0], allowed, "the function", unknown) for one in listed]
         tell("cells", 0, 1)
-        edges = list[Array]()
-        for side, ((axis,), (period,)) in enumerate(zip(fine.edges, the_map.periods, strict=True)):
-            seam = [] if period is None else [(side, x) for x in axis[[0, -1]].tolist()]
-            nodes = refined(the_map, side, axis, [*asked.jumps, *seam])
-            edges.append(nodes if period is None else closed_axis(nodes[:-1], period))
+        edges = nodes_for(the_map, fine, asked.jumps)
         try:
             chain, kept, gains = gains_of(the_map, Claimed(own.checked([], edges), functions))
         except (BadFileError, UnprovedError) as error:

@@ -120,6 +120,18 @@ def as_checked(lower: Any, upper: Any, grid: Grid) -> CheckedMap:
     return Map(shape, read_parameters(parameters_of(lower, upper), shape.names, "the map"))
 
 
+def nodes_for(the_map: CheckedMap, fine: Grid, jumps: Sequence[tuple[int, float]]) -> list[Array]:
+    """Give the nodes of each side on cells, which are cut further; to be called with the checker's precision."""
+    from limitsets.checker.map_cells import closed_axis
+
+    nodes = []
+    for side, ((axis,), (period,)) in enumerate(zip(fine.edges, the_map.periods, strict=True)):
+        seam = [] if period is None else [(side, x) for x in axis[[0, -1]].tolist()]
+        cut = refined(the_map, side, axis, [*jumps, *seam])
+        nodes.append(cut if period is None else closed_axis(cut[:-1], period))
+    return nodes
+
+
 def refined(the_map: CheckedMap, side: int, edges: Array, jumps: Sequence[tuple[int, float]]) -> Array:
     """Cut cells on which the slope varies by a half or has no bounds, and those with an image longer than most.
 
