@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 import pytest
@@ -218,6 +218,20 @@ def test_the_mean_of_a_normal_law_cut_at_six_sigma_lies_in_its_bracket(table):
     print(f"mean: operator {solved.numbers['mean throws']:.5f}, proved {found.mean}")
     table.append(limit("mean of the normal law, bracket's width", found.mean[1] - found.mean[0], "", None))
     assert found.mean[0] - 0.008 <= solved.numbers["mean throws"] <= found.mean[1] + 0.008
+
+
+@pytest.mark.parametrize(("cells", "throws"), [(4000, 200), (12_000, 80), (12_000, 1)])
+def test_the_recheck_of_brackets(cells, throws, table, tmp_path):
+    """Throw by throw it took 136 s once, of 12 000 cells and 80 throws (docs/probabilities.md as of 47c8ecf9)."""
+    found = absorption_brackets("paper-designed", BOTH, right=(20.5, 2), cells=cells, throws=throws)
+    path, what = tmp_path / "brackets.proof.zip", f"paper-designed, {cells} cells, {throws} throws"
+    widths = {"mean": found.mean, "P(ever right)": found.ever["right"]}
+    for name, (lo, hi) in widths.items():
+        table.append(limit(f"{what}: width of {name}", hi - lo, "", None))
+    found.save(path, recheck=False)
+    begin = process_time()
+    assert recheck(path, workers=1).verdict == "proved"
+    table.append(limit(f"{what}: recheck, of the processor", process_time() - begin, "s", None))
 
 
 @pytest.mark.parametrize("asked", ["place", "catch"])
