@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 import pytest
@@ -24,8 +24,10 @@ from limitsets.parameters.noise.statistics import noise_statistics
 from limitsets.parameters.noise.ulam import transfer
 from limitsets.proofs.chances.absorption import absorption_brackets
 from limitsets.proofs.chances.long_run import long_run_averages
+from limitsets.proofs.policies import policy_chances
 from limitsets.proofs.prover.certificate import recheck
 from tests.bench.measure import limit, take_turns, versus
+from tests.checker.test_policy_chances import policies, thrown as run_table
 from tests.proofs.test_long_run import thrown as plain_throws
 
 pytestmark = pytest.mark.bench
@@ -216,6 +218,39 @@ def test_the_mean_of_a_normal_law_cut_at_six_sigma_lies_in_its_bracket(table):
     print(f"mean: operator {solved.numbers['mean throws']:.5f}, proved {found.mean}")
     table.append(limit("mean of the normal law, bracket's width", found.mean[1] - found.mean[0], "", None))
     assert found.mean[0] - 0.008 <= solved.numbers["mean throws"] <= found.mean[1] + 0.008
+
+
+@pytest.mark.parametrize(("cells", "throws"), [(4000, 200), (12_000, 80), (12_000, 1)])
+def test_the_recheck_of_brackets(cells, throws, table, tmp_path):
+    """Throw by throw it took 136 s once, of 12 000 cells and 80 throws (docs/probabilities.md as of 47c8ecf9)."""
+    found = absorption_brackets("paper-designed", BOTH, right=(20.5, 2), cells=cells, throws=throws)
+    path, what = tmp_path / "brackets.proof.zip", f"paper-designed, {cells} cells, {throws} throws"
+    widths = {"mean": found.mean, "P(ever right)": found.ever["right"]}
+    for name, (lo, hi) in widths.items():
+        table.append(limit(f"{what}: width of {name}", hi - lo, "", None))
+    found.save(path, recheck=False)
+    begin = process_time()
+    assert recheck(path, workers=1).verdict == "proved"
+    table.append(limit(f"{what}: recheck, of the processor", process_time() - begin, "s", None))
+
+
+@pytest.mark.parametrize("asked", ["place", "catch"])
+def test_1e8_throws_of_a_table_meet_its_bounds(asked, table):
+    """A million parts at a time."""
+    policy, noise = policies()[asked], Scattering(speed=Uniform(0.01), landing=Uniform(0.05))
+    begin = perf_counter()
+    chances = policy_chances(policy, noise, cells=4000)
+    table.append(limit(f"chances of the table asked {asked}", perf_counter() - begin, "s", None))
+    begin, parts, come, sums = perf_counter(), 0, 0, np.zeros(2)
+    while sums[0] < THROWS:
+        made, ended = run_table(policy, noise, 1_000_000, None, seed=parts)
+        parts, come = parts + made.size, come + int(ended.sum())
+        sums += made.sum(), (made**2).sum()
+    table.append(limit(f"{sums[0]:.0f} throws of {parts} parts", perf_counter() - begin, "s", None))
+    mean, square = sums / parts
+    error = stats.norm.isf(MISS) * np.sqrt((square - mean**2) / parts)
+    meet(table, f"table asked {asked}, mean", (mean - error, mean + error), chances.mean)
+    meet(table, f"table asked {asked}, comes", interval_of(come, parts), chances.come)
 
 
 # ----------------------------------------------------------------

@@ -1,9 +1,5 @@
-"""Where orbits of noisy maps end, and when: closed forms, chains in rationals, random orbits, forged files."""
+"""Where orbits of noisy maps end, and when: closed forms, random orbits, forged files."""
 
-import random
-from fractions import Fraction
-
-import flint
 import numpy as np
 import pytest
 
@@ -13,17 +9,8 @@ from limitsets.robust import absorption_brackets
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from limitsets.checker.absorption import brackets_of
-from limitsets.checker.any_map import Map, read_map
-from limitsets.checker.balls import PRECISION
-from limitsets.checker.laws import uniform_law
-from limitsets.checker.map_chances import chain_that_ends
-from limitsets.checker.noisy_map import NoisyMap
-from limitsets.proofs.chances.chain import Chain
-from limitsets.proofs.chances.forever import forever
 from tests.proofs.forge import opened
-from tests.proofs.test_horizon import solved
-from tests.proofs.test_noisy_maps import half, itself, random_chain, section_of
+from tests.proofs.test_noisy_maps import half, itself, section_of
 
 
 def to_middle(x):
@@ -109,74 +96,6 @@ def test_the_time_to_leave_a_grid_needs_no_place():
     lo, hi = absorption_brackets(corners[0], grid, noise=0.75, upper=corners[1]).mean
     assert 4.28 < lo <= 30.0 / 7.0
     assert 10.0 <= hi < 10.01
-
-
-def ending_chain(rng):
-    """A chain on sides as of `random_chain`, of which the last side is a place and one turn leads off all cells."""
-    places, to, borders = random_chain(rng)
-    return [*places, 0], [*([a, rng.choice([b, len(places), len(places) + 1])] for a, b in to)], borders
-
-
-def exact_rows(places, to, borders):
-    """Probabilities from side to side, the place and the exits last: from the part landed within 1 of a place."""
-    count = len(to)
-    rows = [[Fraction(0)] * (count + 2) for _ in range(count)]
-    for i in range(count):
-        above = min(max((places[i] + 1 - borders[i]) / 2, Fraction(0)), Fraction(1))
-        rows[i][to[i][1]] += above
-        rows[i][to[i][0]] += 1 - above
-    return rows
-
-
-def bounds_of(places, to, borders):
-    """What is proved of the mean, and of the probability of ever ending at the last side."""
-    count, close, far = len(to) + 1, 2.0**-33, 40
-    turns = [(i, b, to[i][b]) for i in range(count - 1) for b in (0, 1)] + [(count - 1, b, 0) for b in (0, 1)]
-    raw = {
-        "dimension": 1, "sides": count, "branches": 2, "parameters": [], "periodic": [[None]] * count,
-        "programs": [
-            {"side": i, "branch": b, "to": min(j, count - 1), "out": [0],
-             "ops": [["c", str(far if j == count else places[j])]]}
-            for i, b, j in turns
-        ],
-        "margins": [
-            {"side": i, "ops": [["x", 0], ["c", repr(float(at))], ["sub", 0, 1]], "out": [2]}
-            for i, at in enumerate([*borders, Fraction(0)])
-        ],
-    }  # fmt: skip
-    edges = []
-    for at in [*borders, Fraction(0)]:
-        around = [float(at) + k * close for k in (-2, -1, 1, 2)]
-        beside = [end + k * close for end in (-12.0, 12.0) for k in (-1, 0, 1)]
-        edges.append(np.array(sorted({*beside, *around})))
-    start = [(0, Fraction(places[0] - 1), Fraction(places[0] + 1))]
-    last = {"place": [(count - 1, Fraction(-12), Fraction(12))]}
-    noisy = NoisyMap("1", uniform_law(Fraction(1), 1), None, start, edges)
-    steps, row = chain_that_ends(Map(read_map(raw), {}), noisy, last)
-    within = {name: brackets_of(steps, row, name, 50)[1] for name in ("any", "exits", "place")}
-    mean, ever, _ = forever(Chain({}, None, steps, row, print), ["place"], within)
-    return mean, ever.get("place", (0.0, 1.0))
-
-
-@pytest.mark.parametrize(
-    "seeds", [range(14), pytest.param(range(14, 100), marks=pytest.mark.sweep)], ids=["some", "many"]
-)
-def test_chains_that_end_have_the_numbers_of_rationals(seeds):
-    known = 0
-    with flint.ctx.workprec(PRECISION):
-        for seed in seeds:
-            chain = ending_chain(random.Random(seed))
-            rows, count = exact_rows(*chain), len(chain[1])
-            try:
-                mean = solved([*rows, [], []], [Fraction(1)] * count)[0]
-                ever = solved([*rows, [], []], [row[count] for row in rows])[0]
-            except StopIteration:  # some states never end
-                continue
-            (low, high), (least, most) = bounds_of(*chain)
-            assert low <= mean <= high < low + 1e-3 * mean
-            assert least <= ever <= most < least + 1e-3
-            known += 1
-    assert known >= 0.3 * len(seeds)
 
 
 RANDOM = {

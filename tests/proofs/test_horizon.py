@@ -1,5 +1,6 @@
 """Any number of throws: bounds by functions against chains solved in rationals, and in certificates; forgeries."""
 
+import random
 import sys
 from fractions import Fraction
 from types import SimpleNamespace
@@ -9,9 +10,18 @@ import pytest
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
+import flint
+
+from limitsets.checker import horizon as of_package
+from limitsets.checker.absorption import brackets_of
+from limitsets.checker.balls import PRECISION
+from limitsets.checker.means import Spread, mean_rows
+from limitsets.checker.noisy_map import chain_of_map, mesh_of_map, strata_of
 from limitsets.feeder.scattering import Scattering, Uniform
 from limitsets.proofs.chances.absorption import absorption_brackets
+from limitsets.proofs.chances.forever import forever
 from tests.proofs import forge
+from tests.proofs.test_noisy_maps import WITHIN_1, map_of, probabilities
 from tests.proofs.test_probabilities import section_of
 from tests.proofs.test_recheck import checker, verdict
 
@@ -136,6 +146,70 @@ def test_where_throws_go_on_for_ever_no_probability_is_proved_from_below():
     with pytest.raises(unproved, match="the upper function is none"):
         horizon.check_ever(chain, beside, "right", (0.0, 0.1), (one, np.array([-1.0, 0.0, 1.0, 0.0])), False)
     assert not horizon.proves_mean_above(chain, np.array([1e6, 1e6, 0.0, 0.0]))
+
+
+# ------------------------------------------------------------------------------------------------- chains of throws
+
+
+def random_sides(rng, first):
+    """Sides that wait at a place and turn one of two ways, on the last two of which throws have ended.
+
+    `first` chooses the first way of a side, of so many; the second leads on, so that throws end.
+    """
+    count = rng.randint(5, 8)
+    places = [rng.randint(-8, 8) for _ in range(count)]
+    to = [[first(k, count), rng.randrange(min(k + 1, count - 1), count)] for k in range(count)]
+    return places, to, [place + Fraction(rng.randint(-6, 6), 8) for place in places]
+
+
+def proved_of(places, to, borders):
+    """What the engine finds of mean and ends, for parts that have landed on side 0, with the ends within 10 throws."""
+    the_map, edges = map_of(places, to, borders)
+    mesh = mesh_of_map(edges, WITHIN_1)
+    *sides, right, end = np.split(np.arange(len(mesh.place)), mesh.first[1:-1])
+    live = np.concatenate([side[1:-2] for side in sides])
+    absorbed = {"right": right, "exits": np.concatenate([end, *(k[[0, 1, -2, -1]] for k in sides)])}
+    steps, _ = chain_of_map(strata_of(the_map, None), mesh, WITHIN_1, live, absorbed)
+    start = (np.array([number]) for number in (0, 1.0, 0, places[0] - 1.0, places[0] + 1.0))
+    chain = SimpleNamespace(steps=steps, row=mean_rows(1, steps.mesh, [Spread(*start)]))
+    within = {name: brackets_of(steps, chain.row, name, 10) for name in steps.absorbed}
+    mean, ever, _ = forever(chain, steps.absorbed, {name: values for name, (_, values) in within.items()})
+    return mean, ever, within["right"][0]
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(10), pytest.param(range(10, 210), marks=pytest.mark.sweep)], ids=["some", "many"]
+)
+def test_mean_and_ends_of_random_chains_of_throws_are_those_of_rationals(seeds):
+    """Everything at work: steps as of a scene, functions that are found, and their inequalities."""
+    for seed in seeds:
+        rng = random.Random(seed)
+        sides = random_sides(rng, lambda _, count, rng=rng: rng.randrange(count))
+        rows, n = probabilities(*sides), len(sides[0]) - 2
+        times, ends = solved(rows, [Fraction(1)] * n)[0], solved(rows, [row[n] for row in rows])[0]
+        with flint.ctx.workprec(PRECISION):
+            mean, ever, _ = proved_of(*sides)
+        bounds = (mean, times, 1e-3 * times), (ever["right"], ends, 1e-6), (ever["exits"], 1 - ends, 1e-6)
+        for (low, high), exact, width in bounds:
+            assert low <= exact <= high < low + width, seed
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_random_chains_of_throws_that_may_go_on_for_ever_nothing_is_said(seed, monkeypatch):
+    """Some side leads to itself alone: the mean is infinite, and no end has a lower bound but that of some throws."""
+    monkeypatch.setattr(of_package, "MOST_MEAN", 60)
+    rng = random.Random(seed)
+    places, to, borders = random_sides(rng, lambda k, count: min(k + 1, count - 3))
+    closed = len(places) - 3
+    to[closed] = [closed, closed]
+    with flint.ctx.workprec(PRECISION):
+        (low, high), ever, within = proved_of(places, to, borders)
+    rows = probabilities(places, to, borders)
+    rows[closed] = [Fraction(0)] * len(rows)  # from where no part comes
+    assert low > 10.0
+    assert high == np.inf
+    assert not ever
+    assert within[-1, 0] <= solved(rows, [row[closed + 1] for row in rows])[0]
 
 
 # ------------------------------------------------------------------------------------------------- certificates

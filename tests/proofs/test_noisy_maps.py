@@ -142,8 +142,8 @@ def random_chain(rng):
     return places, to, borders
 
 
-def exact_shares(places, to, borders):
-    """Stationary shares of sides, by rationals: None where the chain has several closed classes."""
+def probabilities(places, to, borders):
+    """Rows of probabilities of the next side, in rationals."""
     count = len(places)
     matrix = [[Fraction(0)] * count for _ in range(count)]
     for i in range(count):
@@ -151,6 +151,12 @@ def exact_shares(places, to, borders):
         above = min(max((places[i] + 1 - borders[i]) / 2, Fraction(0)), Fraction(1))
         matrix[i][to[i][1]] += above
         matrix[i][to[i][0]] += 1 - above
+    return matrix
+
+
+def exact_shares(places, to, borders):
+    """Stationary shares of sides, by rationals: None where the chain has several closed classes."""
+    count, matrix = len(places), probabilities(places, to, borders)
     reach = [{j for j in range(count) if matrix[i][j] > 0} for i in range(count)]
     for _ in range(count):
         reach = [one | {k for j in one for k in reach[j]} for one in reach]
@@ -171,8 +177,8 @@ def exact_shares(places, to, borders):
     return {i: right[k] / rows[k][k] for k, i in enumerate(closed)}
 
 
-def bounds_of(places, to, borders):
-    """What is proved of the shares of steps from each side."""
+def map_of(places, to, borders):
+    """The map of a chain on sides, and nodes for it."""
     count, close = len(places), 2.0**-33
     keys = [(i, b) for i in range(count) for b in (0, 1)]
     raw = {
@@ -185,11 +191,19 @@ def bounds_of(places, to, borders):
             for i in range(count)
         ],
     }  # fmt: skip
-    the_map, law = Map(read_map(raw), {}), uniform_law(Fraction(1), 1)
     edges = []
     for i in range(count):
         ends = [float(borders[i]) + k * close for k in (-2, -1, 1, 2)]
-        edges.append(np.array(sorted({-12.0, 12.0, *ends})))
+        edges.append(np.array(sorted({-12.0, -11.0, 11.0, 12.0, *ends})))
+    return Map(read_map(raw), {}), edges
+
+
+WITHIN_1 = uniform_law(Fraction(1), 1)
+
+
+def bounds_of(places, to, borders):
+    """What is proved of the shares of steps from each side."""
+    count, (the_map, edges) = len(places), map_of(places, to, borders)
     zero = [(0.0).hex()]
     functions = [
         read_function(
@@ -198,7 +212,7 @@ def bounds_of(places, to, borders):
         )
         for i in range(count)
     ]  # fmt: skip
-    chain, kept, gains = gains_of(the_map, LongRunOfMap(NoisyMap("1", law, None, [], edges), functions))
+    chain, kept, gains = gains_of(the_map, LongRunOfMap(NoisyMap("1", WITHIN_1, None, [], edges), functions))
     assert kept.sum() == sum(len(each) - 1 for each in edges)
     mesh = chain.mesh
     low, high = ([settled(each[k].bound, mesh.place, mesh.first)[0] for each in gains] for k in (0, 1))

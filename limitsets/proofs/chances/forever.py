@@ -123,11 +123,11 @@ def _made_up(
     from limitsets.checker import horizon
 
     values = _raised(chain, values, fixed, more)
-    for _ in range(RAISED):
+    for k in range(RAISED):
         lacking = horizon.worst(chain.steps, values, fixed, more)
         if lacking <= 0.0:
             return values
-        values = mend(values, lacking)
+        values = mend(values, lacking * 10.0**k)  # a little more is lost to the roundings of what is added
     return None
 
 
