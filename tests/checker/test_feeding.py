@@ -146,6 +146,10 @@ def test_a_start_that_feeds_another_side_refutes(initial, tmp_path):
     _, _, on = fed(m, 20.0)
     assert report.fed["safety"] <= np.isin(on, [2, -1]).mean() + 0.03
     assert 0.0 < report.fed["safety"] < 0.5
+    # what begins where the arm ends has come there
+    at_end = WRONG | {"start": {"x": (19.5).hex(), "side": 1}}
+    f = ending(initial, {"side": 2, "safety": "cells", "wrong": at_end}, "19.5 in")
+    assert "beyond the end of the arm earlier" in denied(f, tmp_path)
 
 
 def test_scattered_landings(scattered, tmp_path):
@@ -248,6 +252,15 @@ def test_what_is_not_proved_is_denied(request, tmp_path, case):
     assert words in denied(ending(request.getfixturevalue(cells), section, x, **header), tmp_path)
 
 
+def test_almost_every_start_rests_on_what_holds_near_the_joint(good, tmp_path, monkeypatch):
+    def denied_there(c, scene, cells, near):
+        assert near
+        raise checker.balls.UnprovedError("starts of length zero")
+
+    monkeypatch.setattr(checker.feeding, "check_null", denied_there)
+    assert "starts of length zero" in denied(ending(good, ALMOST, "20.5 in"), tmp_path)
+
+
 def test_fewer_throws_than_some_start_takes(good, tmp_path):
     _, throws, _ = fed(forge.Plain(forge.scene("designed")), 19.0)
     few = {"starts": "every", "throws": int(throws.max()) - 1}
@@ -305,6 +318,22 @@ def test_an_orbit_that_is_fed(good, never_fed, tmp_path):
     cycle, most = never_fed
     f = ending(good, ALMOST | {"never_fed": cycle}, f"{most - 0.001:.4f} in")
     assert "may come to the end" in denied(f, tmp_path)
+
+
+def test_an_orbit_lies_on_the_arm_that_reaches_beyond_it_and_on_no_shorter_one(good, never_fed):
+    import flint
+
+    cycle, most = never_fed
+    raw = good.header["boxes"][0]["scene"]
+    with flint.ctx.workprec(checker.balls.PRECISION):
+        (orbit,) = checker.feeding.read_orbits({"cycles": [cycle], "complete": False}, 3)["orbits"]
+        longer, shorter = (
+            checker.scene.read_scene(raw | {"arm": raw["arm"] | {"length": f"{most + off:.4f} in"}}, None)
+            for off in (0.001, -0.001)
+        )
+        assert len(checker.refutations.periodic(longer, orbit)) > len(cycle["itinerary"])
+        with pytest.raises(checker.balls.UnprovedError, match="lie on the arm"):
+            checker.refutations.periodic(shorter, orbit)
 
 
 @pytest.mark.parametrize("change", ["interval", "itinerary", "multiplier", "side"])

@@ -1,6 +1,8 @@
 """The page without a browser: what a visitor does, and what is shown then."""
 
 import math
+import subprocess
+import sys
 import time
 from typing import NamedTuple
 
@@ -8,6 +10,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError, LimitsetsError, SceneError
+from limitsets.face.explorer.atlas_page import Background
 from tests.maps_of_tests import TwoState
 
 LEAD = """
@@ -235,6 +238,15 @@ def test_a_proof_that_has_said_nothing_yet_ends_when_a_slider_moves(page):
     assert page._proofs.wait() == []
 
 
+def test_a_process_whose_answer_is_cut_short_is_ended_and_waited_for(monkeypatch):
+    started, cut = subprocess.Popen, "import time; print('{', flush=True); time.sleep(60)"
+    monkeypatch.setattr(subprocess, "Popen", lambda _, **how: started([sys.executable, "-c", cut], **how))
+    asked = Background()
+    asked.ask({})
+    assert asked.wait() == [{"done": True}]
+    assert asked._process.returncode is not None
+
+
 def test_a_picture_is_sent_when_anything_of_it_has_changed_and_not_otherwise(page):
     page.beat()
     canvas = page.lanes.canvas
@@ -343,6 +355,8 @@ def test_a_stored_atlas_is_shown_and_a_point_of_it_opened(tmp_path):
     axes = "throw.speed=150 deg/s:160 deg/s:3", "arm.surface_height=-0.4 in:-0.2 in:3"
     ls.atlas("paper-designed", *axes, store=tmp_path / "a.zarr")
     page = ls.explore("paper-designed", atlas=tmp_path / "a.zarr").page()
+    assert page.atlas._canvas.visible
+    assert page.atlas._canvas.view["margins"][1] == page.lanes.canvas.view["margins"][1]  # both end there
     assert len(page.atlas._canvas.layer("classes").data["left"]) == 9
     page.atlas._canvas._handle_msg({"what": "tap", "x": 151.0, "y": -0.29})
     page.beat()

@@ -2,6 +2,7 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import AnswerError, LimitsetsError, SceneError
 from limitsets.feeder.thrower import impact_angles
-from limitsets.parameters.design import critical_jacobian, limit_sets_along, solving as trials
+from limitsets.parameters.design import critical_jacobian, for_critical, limit_sets_along, solving as trials
 from tests.inverse import exact
 
 # ----------------------------------------------------------------
@@ -189,6 +190,16 @@ def test_what_cannot_be_reached_says_what_is_in_the_way():
     assert misses == pytest.approx(found.residual, abs=1e-9)
     fixed = ls.design("paper-initial", critical_points=[None, None, 25], vary=["part.sides[0]"], starts=0)
     assert "the critical point of side 2 does not depend on what is varied" in fixed.message
+
+
+def test_an_edge_is_in_the_way_within_twice_what_a_part_is_kept_off_it():
+    scene, none = ls.load("paper-initial"), np.zeros(0)
+    unknowns = SimpleNamespace(lo=none, hi=none, names=())
+    slack = 1e-3 * np.ptp(scene.vertices, axis=0).max() * np.array([9, 2.1, 1.9, 9, 9, 9, 9, 1.0, 2.9])
+    trial = SimpleNamespace(slope=none, at=none, jacobian=SimpleNamespace(slack=slack))
+    said = for_critical._in_the_way(SimpleNamespace(scene=scene, unknowns=unknowns, sides=()), trial)
+    edges = "the level of side 0", "the right end of side 2"
+    assert said == [f"the centre of mass is at {each}: beyond it the part tips over" for each in edges]
 
 
 @pytest.mark.sweep

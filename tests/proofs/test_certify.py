@@ -320,6 +320,7 @@ def test_json_has_the_fixed_words_and_no_nan(paper):
         assert record["cells"] == sum(len(edges) - 1 for (edges,) in paper.attractions[0].cover.grid.edges)
         assert 0 < record["undecided"] < record["cells"]
         assert record["unresolved"] == {}
+        assert (record["max_throws"] is not None) is (record["claim"] == "attracts-all")
 
 
 # ---------------------------------------------------------------- enclosures

@@ -11,6 +11,8 @@ import pytest
 import limitsets as ls
 from limitsets import maps
 from limitsets.base.errors import AnswerError
+from limitsets.proofs.prover import orbits_of_map
+from limitsets.proofs.prover.converging import entries
 from limitsets.proofs.prover.cycles_of_map import MOST_WORDS
 from limitsets.proofs.prover.orbits_of_map import prove_orbit
 from limitsets.systems.sets import Cycle, cycles
@@ -164,6 +166,15 @@ def test_an_orbit_that_is_not_there_for_all_parameters_is_not_proved(low, high):
     proof = ls.certify(Parabola(low), grid, ["invariant"], upper=Parabola(high))
     here = Cycle(np.array([0.5]), np.zeros(1, np.int64), np.zeros(1, np.int64), 1.0, 0.0, True)
     assert isinstance(prove_orbit((proof.map, proof.upper), here, lambda *_: True), str)
+
+
+@pytest.mark.parametrize("size", [0.9, 1.0, 1.1])
+def test_a_fixed_point_of_the_plane_attracts_as_its_eigenvalues_say(size):
+    """They are size and 1/2, -size and 1/2, and +-i size: on the unit circle nothing is proved."""
+    for matrix in ([[size, 0.0], [0.0, 0.5]], [[-size, 0.0], [0.0, 0.5]], [[0.0, -size], [size, 0.0]]):
+        slope = np.array([matrix])
+        expected = None if size == 1.0 else size < 1.0
+        assert orbits_of_map._attracts(entries(slope, slope)) is expected
 
 
 def test_an_orbit_found_badly_is_proved_in_a_box_that_holds_it():

@@ -13,6 +13,7 @@ from limitsets import maps
 from limitsets.base.errors import AnswerError, MapError, SceneError
 from limitsets.base.files import as_json
 from limitsets.parameters.continuation import following
+from limitsets.parameters.continuation.growth import attracting_cycles, recorded
 from limitsets.parameters.continuation.path import Place, between
 from limitsets.systems.maps import advance
 from limitsets.systems.sets import limit_set_of
@@ -242,6 +243,17 @@ def test_a_touch_and_two_collisions_within_a_step():
     assert [event.kind for event in found.events] == ["border collision"] * 2
     for event, sign in zip(found.events, (-1.0, 1.0), strict=True):
         assert abs(sum(event.t) / 2.0 - (0.55 + sign * math.sqrt(0.0005))) < 1e-9
+
+
+def test_a_cycle_begins_with_its_least_point_wherever_an_orbit_is():
+    """From each point of the cycle of period 3 of the logistic map, which rises twice and falls."""
+    place = Place(0.0, {}, {}, maps.Logistic(3.84), ls.grid([(0.0, 1.0)]).domain)
+    x, _, _, _ = advance(place.params, [0.4], 0, 3000)
+    for _ in range(3):
+        (cycle,), _ = attracting_cycles(place, recorded(place, x, np.zeros(1, np.int64), 3))
+        assert cycle.x.tolist() == sorted(cycle.x.tolist())
+        assert cycle.x[1:] == pytest.approx(3.84 * cycle.x[:-1] * (1.0 - cycle.x[:-1]))
+        x = 3.84 * x * (1.0 - x)
 
 
 def test_no_border_where_the_map_is_smooth():

@@ -9,7 +9,7 @@ import limitsets as ls
 from limitsets import maps
 from limitsets.feeder.scene.arrays import throw_stack
 from limitsets.systems.maps.pieces import point_of, stacked
-from limitsets.systems.sets.topology import topologies
+from limitsets.systems.sets.topology import topologies, work
 from limitsets.systems.sets.topology.points import LEVELS
 from tests.maps_of_tests import Tent
 from tests.topology.compare import differences
@@ -45,6 +45,11 @@ PERIODS = {
     8: (3.549, 3.5546438, 3.56),
     3: (1 + math.sqrt(8) + 1e-6, 3.8305, 3.8312, 3.8318740552833155, 3.84),
 }
+
+
+@pytest.mark.parametrize(("nearest", "near"), [(0.0, [0.0]), (1 / 64, [1 / 64, 1 / 32, 1 / 16, 1 / 8])])
+def test_cells_are_equal_or_double_towards_an_anchor(nearest, near):
+    assert work._places(4, nearest).tolist() == [*near, 0.25, 0.5, 0.75, 1.0]
 
 
 @pytest.mark.parametrize("period", PERIODS)

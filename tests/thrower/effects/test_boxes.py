@@ -99,7 +99,7 @@ def test_hold_the_paper_s_parts_over_the_whole_arm(name):
 
 def test_hold_random_parts_with_a_known_speed_and_an_unknown_one():
     random = np.random.default_rng(3)
-    points = lost = cells = 0
+    points = lost = cells = wide = alone = 0
     seen = set()
     for k in range(25):
         case = random_part(random)
@@ -117,8 +117,18 @@ def test_hold_random_parts_with_a_known_speed_and_an_unknown_one():
                 points += x.size
                 turned = (got.side - side) % len(case.sides)
                 seen.update(zip(got.code.tolist(), turned.tolist(), strict=True))
+            # of one scene a place that grows with the start lies between those of the cell's ends
+            ends = [
+                images(case.map, (1.0 - s) * edges[:-1] + s * edges[1:], side)
+                for s in (1e-9, 0.5, 1.0 - 1e-9)
+            ]
+            spread = np.ptp([end.x for end in ends], axis=0)
+            for (to, branch), (least, most) in found.hulls.items() if width == 0.0 else ():
+                own = np.all([(end.side == to) & (end.code == branch) for end in ends], axis=0)
+                alone, wide = alone + int(own.sum()), wide + int((own & (most - least > spread + 1e-6)).sum())
     assert points > 1e5
     assert lost < 0.01 * cells
+    assert wide < 0.01 * alone
     # rolls forward by two, three ... sides, and back by one or more
     assert {turned for code, turned in seen if code == 2} >= {0, 1, 2, 3, 4, 5}
 
