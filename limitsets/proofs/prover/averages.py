@@ -132,7 +132,7 @@ BranchesOf = Callable[[Mask, Mask, float], Iterable[Branch]]
 
 UNSOLVED = (
     "{reason}. An average is proved where steps stretch: no cycle that attracts or is neutral, no slope 0, no change of"
-    " branch that comes back to its own side too soon"
+    " branch that comes back to its own side too soon; of a map whose steps scatter (noise=) none of this is asked"
 )
 
 
