@@ -6,6 +6,8 @@ import pytest
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
+from limitsets.checker.file import BadFileError
+from limitsets.checker.scene import read_scene
 from tests.checker.test_false_sentences import chances, one_throw
 from tests.proofs import forge
 from tests.proofs.forge import leave_out, put
@@ -98,6 +100,12 @@ def test_other_facts_are_named_and_change_nothing(good, tmp_path):
     assert plain.model["left_out"] == []
     assert (report.verdict, report.claims) == (plain.verdict, plain.claims)
     assert report.verdict == "proved"
+
+
+def test_whoever_reads_a_scene_refuses_odd_facts():
+    """Not the report alone."""
+    with pytest.raises(BadFileError, match="scatter is no name of another fact"):
+        read_scene(forge.scene("small") | {"world": {"other": {"scatter": 0.3}}}, None)
 
 
 def alike(certificate, tmp_path):
