@@ -229,6 +229,7 @@ def complete(side: Side, k_lo: Arb) -> None:
 
 
 FACTS = ("friction", "restitution", "bounce_threshold", "stroke")
+WORLD = " ".join((*FACTS, "throw_rate", "scatter", "other"))
 NONE = Quantity(Fraction(0), Fraction(0), False, "")
 SCATTER = {"speed": ("throw.speed", "share speed"), "landing": ("landing.x", "length")}
 
@@ -260,7 +261,8 @@ def check_spread(scene: dict[str, Any], noise: object) -> None:
 
 def not_in_noise(scene: dict[str, Any], noise: object) -> str:
     """Return what the scene scatters at every throw by more than the noise claimed, or ""."""
-    world = table(scene.get("world") or {}, "scene.world", "", " ".join((*FACTS, "throw_rate", "scatter")))
+    world = table(scene.get("world") or {}, "scene.world", "", WORLD)
+    others(world)
     more = ""
     for word, text in table(world.get("scatter") or {}, "scene.world.scatter", "", "speed landing").items():
         name, kinds = SCATTER[word]
@@ -275,6 +277,18 @@ def not_in_noise(scene: dict[str, Any], noise: object) -> str:
     return more
 
 
+def others(world: dict[str, Any]) -> list[str]:
+    """Name the facts of other models: by names that this map has not; their values change nothing here."""
+    known = world.get("other", {})
+    require(isinstance(known, dict), "scene.world.other is not an object")
+    for name, value in known.items():
+        fits = re.fullmatch("[a-z][a-z0-9_]{0,39}", name) and name not in WORLD.split()
+        require(bool(fits), f"scene.world.other: {plain(name)} is no name of another fact")
+        if type(value) not in (int, float):
+            quantity(value, KINDS, f"scene.world.other.{name}")
+    return [*known]
+
+
 def left_out(scene: dict[str, Any], noise: object) -> list[str]:
     """Name the facts of [world] that the throw map, version 1, has not: all but the rate of throws, which moves none.
 
@@ -284,7 +298,7 @@ def left_out(scene: dict[str, Any], noise: object) -> list[str]:
     plain_landing = world.get("restitution") == 0
     stated = [fact for fact in FACTS if world.get(fact) is not None]
     facts = [f for f in stated if not (plain_landing and f in ("restitution", "bounce_threshold"))]
-    return facts + (["scatter"] if not_in_noise(scene, noise) else [])
+    return facts + others(world) + (["scatter"] if not_in_noise(scene, noise) else [])
 
 
 def share_and_more(dev: Quantity) -> tuple[Arb, Arb]:

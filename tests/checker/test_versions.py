@@ -6,6 +6,8 @@ import pytest
 
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
+from limitsets.checker.file import BadFileError
+from limitsets.checker.scene import read_scene
 from tests.checker.test_false_sentences import chances, one_throw
 from tests.proofs import forge
 from tests.proofs.forge import leave_out, put
@@ -31,6 +33,11 @@ def unknown_twice(f):
     f.header["claims"] += [{"claim": "mixing", "section": {}}] * 2
 
 
+def world(**facts):
+    """Facts that the scene states."""
+    return put("boxes", 0, "scene", "world", facts)
+
+
 ODD = {  # what is changed, and what the reason names
     "a key more": (put("state", "x [in]"), "unknown key state"),
     "no noise": (leave_out("noise"), "noise missing"),
@@ -53,6 +60,21 @@ ODD = {  # what is changed, and what the reason names
     "an unknown claim made twice": (unknown_twice, "made twice"),
     "nothing claimed": (put("claims", []), "claims is not a list of a fitting length"),
     "claims in a table": (put("claims", {"invariant": {}}), "claims is not a list of a fitting length"),
+    "a scene with a misspelt table": (put("boxes", 0, "scene", "gravty", {}), "scene: unknown key gravty"),
+    "a fact that is misspelt": (world(frction=0.3), "scene.world: unknown key frction"),
+    "scatter that is misspelt": (world(scater={"speed": "1 %"}), "scene.world: unknown key scater"),
+    "other facts that are no table": (world(other=["lost"]), "scene.world.other is not an object"),
+    "other facts of null": (world(other=None), "scene.world.other is not an object"),
+    "a known fact among others": (world(other={"friction": 0.3}), "friction is no name of another fact"),
+    "scatter among others": (world(other={"scatter": 0.3}), "scatter is no name of another fact"),
+    "others among others": (world(other={"other": 0.3}), "other is no name of another fact"),
+    "a fact with an odd name": (world(other={"no. PROVED": 1}), "no. PROVED is no name of another fact"),
+    "a fact with a line in its name": (world(other={"lost\n": 1}), "lost? is no name of another fact"),
+    "a fact without a name": (world(other={"": 1}), " is no name of another fact"),
+    "another fact in no unit": (world(other={"creep": "1 parsec"}), "parsec is not a unit of"),
+    "another fact in words": (world(other={"creep": "much"}), "much is not a decimal number and a unit"),
+    "another fact that is true": (world(other={"creep": True}), "True is not a decimal number and a unit"),
+    "another fact that is a table": (world(other={"creep": {}}), "creep: {} is not a decimal number"),
     "an array of no box": (beside("1.rank"), "arrays that no claim needs"),
     "an array more in a box": (beside("0.exit"), "arrays that no claim needs"),
     "version 4": (put("version", 4), "not limitsets-proof, version 2 or 3"),
@@ -68,6 +90,22 @@ def test_an_array_in_the_file_alone_is_refused(good, tmp_path):
     report = verdict(spoiled, tmp_path)  # which the header does not describe
     assert report.verdict == "bad file"
     assert "arrays.npz holds entries that no claim needs" in report.reason
+
+
+def test_other_facts_are_named_and_change_nothing(good, tmp_path):
+    plain, more = verdict(good, tmp_path), good.copy()
+    world(friction=0.3, other={"lost": 0.1, "creep": "1e-3 in", "b2": 1})(more)
+    report = verdict(more.seal(), tmp_path)
+    assert report.model["left_out"] == ["friction", "lost", "creep", "b2"]
+    assert plain.model["left_out"] == []
+    assert (report.verdict, report.claims) == (plain.verdict, plain.claims)
+    assert report.verdict == "proved"
+
+
+def test_whoever_reads_a_scene_refuses_odd_facts():
+    """Not the report alone."""
+    with pytest.raises(BadFileError, match="scatter is no name of another fact"):
+        read_scene(forge.scene("small") | {"world": {"other": {"scatter": 0.3}}}, None)
 
 
 def alike(certificate, tmp_path):

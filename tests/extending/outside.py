@@ -18,10 +18,10 @@ import limitsets as ls
 from limitsets.face.plot import style
 from limitsets.feeder.goals import Found, Goal, Place, Verdict
 from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.facts import Fact
 from limitsets.feeder.thrower.effects import Effect
 from limitsets.feeder.thrower.motion import Contact, Face, FullSide, at_kappa, impacted, moved, thrown
 from limitsets.feeder.thrower.params import Throw
+from limitsets.feeder.world import Fact
 from limitsets.proofs.prover.goals import Answer, Kind
 from limitsets.proofs.prover.goals.kind import against, below, common, place_text, undecided
 from limitsets.proofs.prover.goals.recurrent_orbits import recurrent_violation
@@ -59,8 +59,6 @@ thrown.on(Wear, slower)
 impacted.on(Wear, gripped)
 moved.on(Wear, crept)
 
-FACTS = {"lost": Fact("the lost share", most=0.5, words="0.1"), "creep": Fact("the creep", "length")}
-
 GRIP = {"loose": 0.0, "firm": 1.0}
 
 WEAR = Effect(
@@ -70,6 +68,7 @@ WEAR = Effect(
     "the arm is as new",
     needs=("lost", "creep"),
     words=("loose", "firm"),
+    facts={"lost": Fact("the lost share", most=0.5, words="0.1"), "creep": Fact("the creep", "length")},
 )
 
 

@@ -3,6 +3,9 @@
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from json import loads
+from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -14,10 +17,10 @@ from limitsets.face.cli.app import app
 from limitsets.face.report.pages import goal_sentence, page, verdict_of
 from limitsets.face.report.writing import summary
 from limitsets.feeder.goals import GOALS, OrientedBeyond, declare, evaluate
-from limitsets.feeder.scene.facts import FACTS
 from limitsets.feeder.thrower import effects, impact_angles
 from limitsets.feeder.thrower.effects import EFFECTS
 from limitsets.feeder.thrower.motion import all_enclosed
+from limitsets.feeder.world import FACTS, Fact
 from limitsets.parameters.analysis import GoalOutcome
 from limitsets.proofs.prover.goals import KINDS, sentence
 from limitsets.proofs.prover.query import Query
@@ -25,6 +28,7 @@ from limitsets.systems.graph.images import METHODS
 from limitsets.systems.graph.images.sampled import sampled
 from limitsets.systems.maps import contract, images
 from tests.extending import outside
+from tests.proofs.forge import rewritten
 
 DESIGNED = ls.load("paper-designed")
 X = np.linspace(9.0, 27.0, 200)
@@ -33,7 +37,6 @@ X = np.linspace(9.0, 27.0, 200)
 @pytest.fixture
 def added() -> Iterator[None]:
     """Add everything, and take it away again."""
-    FACTS.update(outside.FACTS)
     effects.declare(outside.WEAR)
     declare(outside.KeepsBelow)
     KINDS["keeps_below"] = outside.KEEPS_BELOW
@@ -43,7 +46,7 @@ def added() -> Iterator[None]:
     try:
         yield
     finally:
-        for table, names in ((FACTS, outside.FACTS), (EFFECTS, ["wear"]), (GOALS, ["keeps_below"])):
+        for table, names in ((FACTS, outside.WEAR.facts), (EFFECTS, ["wear"]), (GOALS, ["keeps_below"])):
             for name in names:
                 del table[name]
         del KINDS["keeps_below"], METHODS["thirds"], contract._KINDS[outside.Tent]
@@ -99,13 +102,20 @@ def test_the_effect_is_read_and_refused_as_others_are():
     for tables, words in (
         ({"world": {"creep": "1 in"}}, r"the fact world.lost is 'missing'"),
         ({"world": {"lost": 0.6, "creep": "1 in"}}, r"the lost share.*from 0 to 0.5"),
+        ({"world": {"lost": 0.1, "creep": "1 deg"}}, r"this length.*deg.*a unit of m, cm"),
+        ({"world": {"lsot": 0.1, "creep": "1 in"}}, r"lsot.*it is not known.*lost"),
         ({"effects": {"wear": True}}, '"loose" or "firm"'),
         ({"model": {"flight": "small-angle"}}, "the flight"),
     ):
         with pytest.raises(SceneError, match=words):
             worn(**tables)
-    with pytest.raises(MapError, match="wear"):
+    with pytest.raises(MapError, match=r"the name of the effect.*wear"):
         effects.declare(outside.WEAR)
+    for taken in ("creep", "friction", "scatter"):
+        again = outside.WEAR._replace(name="tear", facts={taken: Fact("another", words="1")})
+        with pytest.raises(MapError, match=f"the name of the fact.*{taken}"):
+            effects.declare(again)
+    assert "tear" not in EFFECTS
 
 
 @pytest.mark.usefixtures("added")
@@ -113,6 +123,30 @@ def test_nothing_is_proved_of_the_effect():
     assert all_enclosed((outside.Wear(0.1, 0.0, 0.0),)) is False
     with pytest.raises(AnswerError, match=r"wear.*landing, roll and bounded spread"):
         ls.certify(worn())
+
+
+@pytest.mark.usefixtures("added")
+def test_a_certificate_names_its_facts_as_left_out(tmp_path):
+    """The checker knows neither: they stand apart in the file, and other keys of [world] are refused as before."""
+    stated = {"friction": 0.3, "lost": 0.1, "creep": "1e-3 in"}
+    proof = ls.certify(ls.load({**DESIGNED.as_dict(), "world": stated}), claims=["invariant"])
+    file = proof.save(tmp_path / "p.proof.zip")
+    report = ls.recheck(file)
+    assert (report.verdict, report.model["left_out"]) == ("proved", ["friction", "lost", "creep"])
+    assert report.model["left_out"] == list(proof.model.left_out)
+    assert proof.model.sentence.endswith("friction, lost and creep of [world] are not in it")
+    with ZipFile(file) as zipped:
+        (box,) = loads(zipped.read("header.json"))["boxes"]
+    assert box["scene"]["world"] == {"friction": 0.3, "other": {"lost": 0.1, "creep": "1e-3 in"}}
+    for world in ({"friction": 0.3, "lost": 0.1}, {"other": stated}):
+        assert ls.recheck(forged(file, world)).verdict == "bad file"
+
+
+def forged(file: Path, world: dict) -> Path:
+    """The same certificate, with another [world] in its scene."""
+    return rewritten(
+        file, file.with_name("q.zip"), lambda header: header["boxes"][0]["scene"].update(world=world)
+    )
 
 
 @pytest.mark.usefixtures("added")

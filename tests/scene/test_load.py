@@ -68,7 +68,8 @@ def test_every_section(whole: dict[str, Any]) -> None:
     assert scene.gravity == pytest.approx(386.0885826771653 / 2, rel=1e-15)
     assert scene.kappa == pytest.approx(386.0885826771653 / 2 / rate**2, rel=1e-15)
     scatter = Scatter(Deviation(0.01, relative=True), Deviation(0.05, relative=False))
-    assert scene.world == World(0.9, 0.4, 0.01, math.radians(5), scatter, {"throw_rate": 2.0})
+    stated = {"friction": 0.9, "restitution": 0.4, "bounce_threshold": 0.01, "stroke": math.radians(5)}
+    assert scene.world == World(stated | {"throw_rate": 2.0}, scatter)
     assert scene.effects == Effects(auto=True)
     assert scene.tolerance == {
         "throw.speed": Deviation(0.01, relative=True),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import numpy as np
 from limitsets.feeder.geometry import RestingSides
 from limitsets.feeder.goals import GOALS, Goal, words_of
 from limitsets.feeder.scene.facts import (
-    FACTS,
     NOT_TIPPING,
     SCATTERED,
     WITHOUT_EDGE,
@@ -24,6 +22,7 @@ from limitsets.feeder.scene.quantities import Resolver, deviation, require
 from limitsets.feeder.scene.surroundings import resolve_cavity, resolve_feedback, resolve_tray
 from limitsets.feeder.scene.units import parse
 from limitsets.feeder.scene.validation import Tree, plain, validate
+from limitsets.feeder.world import FACTS
 
 # ----------------------------------------------------------------
 # The goal, the world and the effects of a scene.
@@ -69,17 +68,15 @@ def resolve_goal(table: Tree, rests: list[bool], arm_length: float, resolver: Re
 
 def resolve_world(table: Tree, resolver: Resolver) -> World:
     """Resolve ``[world]``."""
-    facts, own = {}, {each.name for each in fields(World)}
+    facts, noise, file = {}, {}, resolver.file
     for name in (name for name in FACTS if name in table):
         fact, key = FACTS[name], f"world.{name}"
         facts[name] = resolver.positive(key, fact.dimension) if fact.dimension else float(table[name])
         resolver.require(not fact.dimension or facts[name] < fact.most, key, fact.thing, fact.words)
-    noise, file = {}, resolver.file
     for word, text in table.get("scatter", {}).items():
         key = f"world.scatter.{word}"
         noise[word] = deviation(text, SCATTERED[word], resolver.unit, zero=True, key=key, file=file)
-    more = {name: facts.pop(name) for name in facts.keys() - own}
-    return World(**facts, scatter=Scatter(**noise) if noise else None, more=more)
+    return World(facts, Scatter(**noise) if noise else None)
 
 
 def resolve_effects(table: Tree, world: World, flight: str, resolver: Resolver) -> Effects:

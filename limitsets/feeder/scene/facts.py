@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
+
+from limitsets.feeder.world import FACTS
 
 TIPPING = ("landing", "roll")
 """Effects by which a part that comes down on a side on which it cannot rest goes on to the next."""
@@ -64,75 +65,28 @@ class Scatter:
 
 
 @dataclass(frozen=True)
-class Fact:
-    """How `[world]` writes a number.
-
-    Parameters
-    ----------
-    thing : str
-        What it is, for refusals: "the coefficient of friction".
-    dimension : str
-        Of a quantity, which is above 0; empty for a plain number from 0.
-    most : float
-        The largest value; below it where it has a dimension [scene's units].
-    words : str
-        A plain number's example; of a quantity with a largest value the range: "above 0 and below 90 deg".
-    meaning : str
-        What it says, where its name does not.
-    """
-
-    thing: str
-    dimension: str = ""
-    most: float = math.inf
-    words: str = ""
-    meaning: str = ""
-
-
-FACTS: dict[str, Fact] = {
-    "friction": Fact("the coefficient of friction", most=1e6, words="0.9"),
-    "restitution": Fact("the coefficient of restitution", most=1.0, words="0.4"),
-    "bounce_threshold": Fact(
-        "the threshold", "length", meaning="height of a bounce below which a part stays put"
-    ),
-    "stroke": Fact(
-        "the stroke", "angle", math.pi / 2, "above 0 and below 90 deg", "angle over which the arm accelerates"
-    ),
-    "throw_rate": Fact("the rate of throws", "frequency", meaning="throws per time"),
-}
-"""The numbers that `[world]` may have, by name; what an effect needs that none needed before is added here."""
-
-
-@dataclass(frozen=True)
 class World:
-    """Facts, known whether or not an effect is simulated; None where not known.
+    """Facts, known whether or not an effect is simulated.
+
+    Each number of `FACTS` is an attribute, too: None where the scene does not state it.
 
     Parameters
     ----------
-    friction : float or None
-        Coefficient of friction.
-    restitution : float or None
-        Coefficient of restitution of the normal impulse, 0 to 1.
-    bounce_threshold : float or None
-        Height of the bounce below which the impact is plastic [length].
-    stroke : float or None
-        Angle over which the arm accelerates [rad].
+    numbers : mapping of str to float
+        What the scene states, in the order of `FACTS` [scene's units; angles in rad].
     scatter : Scatter or None
         Noise at every throw.
-    more : mapping of str to float
-        All other numbers of `FACTS` that are given, read as attributes too.
     """
 
-    friction: float | None = None
-    restitution: float | None = None
-    bounce_threshold: float | None = None
-    stroke: float | None = None
+    numbers: Mapping[str, float] = field(default_factory=dict)
     scatter: Scatter | None = None
-    more: Mapping[str, float] = field(default_factory=dict)
 
     def __getattr__(self, name: str) -> float | None:
-        """Give a fact that only effects from outside the package need."""
+        """Give a number by its name."""
+        if not name.startswith("_") and name not in FACTS:
+            import limitsets.feeder.thrower.effects  # noqa: F401 - lazily: effects declare facts, and load numba
         if name in FACTS:
-            return self.more.get(name)
+            return self.numbers.get(name)
         raise AttributeError(name)
 
 
@@ -159,14 +113,12 @@ class Effects:
 
     def __getattr__(self, name: str) -> Any:
         """Give what the scene writes after the name of an effect."""
-        if name.startswith("_"):
-            raise AttributeError(name)
-        if name not in self.words:
+        if not name.startswith("_"):
             from limitsets.feeder.thrower.effects import EFFECTS  # lazily: its room loads numba
 
-            if name not in EFFECTS:
-                raise AttributeError(name)
-        return self.words.get(name)
+            if name in EFFECTS:
+                return self.words.get(name)
+        raise AttributeError(name)
 
     def also(self, **words: bool | str) -> Effects:
         """Give them with more switched on.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from limitsets.base import as_table, picked, proposed
-from limitsets.feeder.scene.facts import FACTS, SCATTERED
+from limitsets.feeder.scene.facts import SCATTERED
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene.scene import Scene
@@ -15,12 +15,6 @@ if TYPE_CHECKING:
 
 WITHOUT_SCATTER = "of the scene without its scatter"
 """Said of what holds where all throws are alike, in a scene that scatters its throws."""
-
-# The rate of throws turns numbers of throws into times; no throw depends on that rate.
-CLOCK = "throw_rate"
-
-# What an effect takes into account where the scene has it, besides what the effect needs.
-READ_IF_GIVEN = {"drive": ("friction",)}
 
 
 @dataclass(frozen=True)
@@ -61,20 +55,18 @@ class Model:
         'of the minimal model: friction and restitution of [world] are not in it'
         """
         on, world = scene.effects.on(), scene.world
-        has = {CLOCK}
+        has = {"throw_rate"}  # it turns numbers of throws into times, and no throw depends on it
         if on:
             from limitsets.feeder.thrower.effects import (
                 EFFECTS,  # lazily: a scene without effects loads no kernel
             )
 
-            has |= {
-                fact for effect in on for fact in (*EFFECTS[effect].needs, *READ_IF_GIVEN.get(effect, ()))
-            }
+            has |= {fact for effect in on for fact in (*EFFECTS[effect].needs, *EFFECTS[effect].reads)}
         if world.restitution == 0.0:  # the minimal model's own landing
             has |= {"restitution", "bounce_threshold"}
         if _allows_for_scatter(scene, noise or {}):
             has.add("scatter")
-        stated = (name for name in (*FACTS, "scatter") if getattr(world, name) is not None)
+        stated = (*world.numbers, *(() if world.scatter is None else ("scatter",)))
         return cls(on, tuple(name for name in stated if name not in has))
 
     @property

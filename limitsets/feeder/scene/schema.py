@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, TypeAlias
 
 from limitsets.base import SceneError, shown
 from limitsets.feeder.goals import GOALS, Goal, words_of
-from limitsets.feeder.scene.facts import FACTS, Fact
-from limitsets.feeder.scene.units import density_dimension, parse
+from limitsets.feeder.scene.units import UNITS, density_dimension, parse
+from limitsets.feeder.world import FACTS, Fact
 
 # ----------------------------------------------------------------
 # What a value has to be: each check carries the allowed values and the remedy, so that errors read alike.
@@ -360,8 +360,8 @@ def _fact_key(fact: Fact) -> Key:
     says = fact.meaning or fact.thing
     if not fact.dimension:
         return Key(number(fact.thing, fact.most, fact.words), says, float(fact.words))
-    examples = {"length": "1 mm", "angle": "20 deg", "frequency": "2 Hz"}
-    return Key(quantity(fact.dimension), says, examples[fact.dimension])
+    example = {"length": "1 mm", "angle": "20 deg", "frequency": "2 Hz"}.get(fact.dimension)
+    return Key(quantity(fact.dimension), says, example or f"1 {UNITS[fact.dimension][0]}")
 
 
 def _effect_key(words: tuple[str, ...], assumption: str) -> Key:

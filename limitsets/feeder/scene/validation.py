@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeAlias
 from limitsets.base import SceneError, shown
 from limitsets.feeder.scene.schema import ByName, Section, Several, schema
 from limitsets.feeder.scene.units import UNITS
+from limitsets.feeder.world import FACTS
 
 Tree: TypeAlias = dict[str, Any]
 """A scene as TOML holds it: tables, lists, text, switches and numbers."""
@@ -126,9 +127,11 @@ def respelled(tree: Tree, file: str | None) -> tuple[Tree, list[SceneError]]:
 
 def _wrong(tree: Tree, file: str | None) -> Iterator[Wrong]:
     """Check a scene by the schema, in the schema's order."""
-    on = tree.get("effects")
-    whole = schema(with_effects=isinstance(on, dict) and bool(on.keys() - {"auto", "contact"}))
-    return _wrong_in(tree, whole, "", file)
+    on, stated = (
+        {*each} if isinstance(each := tree.get(word), dict) else set() for word in ("effects", "world")
+    )
+    unknown = (on - {"auto", "contact"}) | (stated - {"scatter", *FACTS})  # effects may know them
+    return _wrong_in(tree, schema(with_effects=bool(unknown)), "", file)
 
 
 def _wrong_in(value: Any, of: Any, key: str, file: str | None) -> Iterator[Wrong]:

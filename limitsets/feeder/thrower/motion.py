@@ -12,7 +12,7 @@ part came to lie on side k without its vertex k moving.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from limitsets.base import MapError
 from limitsets.feeder.thrower.flight import Turned
 from limitsets.feeder.thrower.params import Side, SideBox, Throw, gather_box, with_kappa
+from limitsets.feeder.world import FACTS, Fact
 from limitsets.numbers.interval import Interval
 from limitsets.numbers.jit import cover_foreign_class, entries_of, generic, kernel, proof_kernel
 from limitsets.systems.maps import codes
@@ -475,11 +476,15 @@ class Effect(NamedTuple):
     lifts : str
         What the minimal model assumes without it, a clause for reports: "it does not bounce".
     needs : tuple of str
-        Facts of the world that have to be given, of `limitsets.feeder.scene.facts.FACTS`.
+        Facts of the world that have to be given, of `limitsets.feeder.world.FACTS`, its own among them.
     excludes : tuple of str
         Effects whose kernels do not know this one.
     words : tuple of str
         What a scene may write after its name, the first where an audit switches it on; none: true.
+    reads : tuple of str
+        Facts that it takes into account where they are given.
+    facts : mapping of str to Fact
+        Facts of its own, by name (small letters, digits and _): how `[world]` writes what no effect needed before.
     """
 
     name: str
@@ -489,6 +494,8 @@ class Effect(NamedTuple):
     needs: tuple[str, ...] = ()
     excludes: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
+    reads: tuple[str, ...] = ()
+    facts: Mapping[str, Fact] = {}
 
     @property
     def enclosed(self) -> bool:
@@ -503,15 +510,20 @@ _PLACES = (thrown, varied, possible, impacted, moved, stays, encloses, thrown_bo
 
 
 def declare(effect: Effect) -> None:
-    """Let scenes switch an effect on, once its methods are in their places.
+    """Let scenes switch an effect on and state its facts, once its methods are in their places.
 
     Raises
     ------
     MapError
-        For a name that is taken.
+        For a name that is taken, of the effect or of a fact of its own.
     """
-    if effect.name in EFFECTS:
-        raise MapError("the name of the effect", effect.name, "a new one", "choose another")
+    for thing, names in (
+        ("effect", {effect.name} & EFFECTS.keys()),
+        ("fact", effect.facts.keys() & {"scatter", *FACTS}),
+    ):
+        for name in names:
+            raise MapError(f"the name of the {thing}", name, "a new one", "choose another")
     kernels = [place.methods[effect.numbers] for place in _PLACES if effect.numbers in place.methods]
     cover_foreign_class(effect.numbers, kernels)
+    FACTS.update(effect.facts)
     EFFECTS[effect.name] = effect

@@ -41,6 +41,7 @@ KERNEL_FREE = (
     "feeder/goals/",
     "feeder/scattering.py",
     "feeder/scene/",
+    "feeder/world.py",
     "proofs/auditing/",
     "proofs/chances/",
     "proofs/policies/",

@@ -21,7 +21,7 @@ from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.quantities import NOISE_ONLY, find
 from limitsets.feeder.scene.units import parse
 from limitsets.parameters.regions.record import Record
-from limitsets.proofs.prover.certificate import pack, tidy
+from limitsets.proofs.prover.certificate import in_certificate, pack
 from limitsets.proofs.prover.parameters import DIGITS, decimal
 from limitsets.proofs.prover.proof import require_checkable
 
@@ -153,11 +153,9 @@ def write(
 ) -> Path:
     """Write it, replacing an older file whole; `arrays` are those of the plane."""
     require_checkable((), (scene.goal,), "the records hold what is proved")
-    model = {"flight": scene.flight, "flip": scene.flip}
     borders = [[axis.text(k) for k in range(len(axis.borders))] for axis in axes]
     section = {
-        "scene": tidy({word: each for word, each in scene.text.items() if word not in ("effects", "model")})
-        | {"model": model},
+        "scene": in_certificate(scene.text, "effects"),
         "axes": [
             {"quantity": axis.quantity, "borders": texts} for axis, texts in zip(axes, borders, strict=True)
         ],
@@ -170,7 +168,7 @@ def write(
         | _of_chains(records)
     )
     held = {name: np.ascontiguousarray(value) for name, value in held.items()}
-    pack(path, model, claims, held, recheck=recheck, workers=workers)
+    pack(path, {"flight": scene.flight, "flip": scene.flip}, claims, held, recheck=recheck, workers=workers)
     return Path(path)
 
 

@@ -19,7 +19,7 @@ from limitsets.base.arrays import Array, Mask
 from limitsets.feeder.scattering import SIGMAS, Gaussian, Scattering, Uniform
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.chances.nodes import CLOSE, Nodes, extra, nodes_of
-from limitsets.proofs.prover.certificate import pack, require_checker, tidy
+from limitsets.proofs.prover.certificate import in_certificate, pack, require_checker
 from limitsets.proofs.prover.parameters import parameter_box
 
 if TYPE_CHECKING:
@@ -127,8 +127,7 @@ def setting_of(
     from limitsets.checker.file import BadFileError
 
     section: dict[str, Any] = {
-        "scene": tidy({word: each for word, each in scene.text.items() if word not in _LEFT_OUT})
-        | {"model": {"flight": scene.flight, "flip": scene.flip}},
+        "scene": in_certificate(scene.text, "effects", "cavity", "feedback", "tray"),
         "laws": _laws(scatter, scene.unit),
         "starts": in_words(starts, scene.unit),
         "absorbing": {name: in_words(each, scene.unit) for name, each in absorbing.items()},
@@ -300,9 +299,6 @@ def write(
 def edges_of(nodes: Nodes) -> dict[str, Array]:
     """Give the nodes of each side as a certificate has them."""
     return {f"edges.{side}": nodes.place[nodes.of_side(side)] for side in range(nodes.first.size - 1)}
-
-
-_LEFT_OUT = ("effects", "model", "cavity", "feedback", "tray")
 
 
 def _laws(scatter: Scattering, unit: str) -> dict[str, dict[str, str]]:

@@ -22,7 +22,7 @@ from limitsets.base.arrays import Arrays
 from limitsets.feeder.scene import BeyondSensor, Model, Scene, Sensor, exact_text, load
 from limitsets.proofs.policies.board import Board, Progress, Starts, board_of
 from limitsets.proofs.policies.policy import NONE, NOT_DECIDED, SOLVED, Found, Policy, search
-from limitsets.proofs.prover.certificate import Saved, brackets, pack, tidy
+from limitsets.proofs.prover.certificate import Saved, brackets, in_certificate, pack
 from limitsets.proofs.prover.cover import targets
 from limitsets.systems.cells import CellSet, Grid
 
@@ -69,7 +69,7 @@ def game_section(board: Board, sensor: Sensor | None, policy: Policy) -> dict[st
     """Say what is played, and the states to begin in, as certificates have it."""
     x, side = board.goal
     return {
-        "scene": _scene(board, sensor) | {"model": {"flight": board.scene.flight, "flip": board.scene.flip}},
+        "scene": _scene(board, sensor),
         "mode": board.mode,
         "goal": {"x": f"{exact_text(x)} {board.scene.unit}", "side": side},
         "first": policy.to_json()["first"],
@@ -79,16 +79,12 @@ def game_section(board: Board, sensor: Sensor | None, policy: Policy) -> dict[st
 def _scene(board: Board, sensor: Sensor | None) -> dict[str, Any]:
     """Write the scene with the sensor that is asked; its own goal may be another one and is left out."""
     scene = board.scene
-    text: dict[str, Any] = tidy(
-        {word: each for word, each in scene.text.items() if word not in ("effects", "goal")}
-    )
+    text = in_certificate(scene.text, "goal")
     text["feedback"].pop("sensor", None)
     if sensor is not None:
         text["feedback"]["sensor"] = dict(sensor.as_text(scene.unit))
     if board.mode == "catch" and scene.cavity is not None:
         text["cavity"]["position"] = f"{exact_text(board.goal[0])} {scene.unit}"
-    if scene.effects.spread:
-        text["effects"] = {"spread": scene.effects.spread}
     return text
 
 

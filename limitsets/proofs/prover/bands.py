@@ -14,7 +14,7 @@ import numpy as np
 from limitsets.base.arrays import Mask
 from limitsets.feeder.scene.units import spelled_plainly
 from limitsets.proofs.prover.attraction import Attraction
-from limitsets.proofs.prover.certificate import arrays_of, scene_of
+from limitsets.proofs.prover.certificate import arrays_of, in_certificate
 
 # Throws that are followed, and boxes of parameters: more of them gain little, as the certificate may be cut as well.
 MOST_THROWS, MOST_BOXES = 4, 24
@@ -54,7 +54,7 @@ def throws_below(attraction: Attraction, bad: Mask, x: float) -> int:
     names = ("jog", "flip", "branch", "rank", "component", "phi")
     with flint.ctx.workprec(PRECISION):
         try:
-            scene = read_scene(*spelled_plainly([scene_of(attraction.cover), dict(box.noise) or None]))
+            scene = read_scene(in_certificate(box.scene), spelled_plainly(dict(box.noise)) or None)
             return bands.throws_below(
                 Cells(edges, *(arrays[name] for name in names)), scene, bad, x, MOST_THROWS, MOST_BOXES
             )

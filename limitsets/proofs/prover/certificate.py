@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from limitsets.base import AnswerError, Tabled, arguments_checked, bar, in_notebook, replaced
 from limitsets.base.arrays import Array, Arrays
 from limitsets.feeder.scene.units import spelled_plainly
-from limitsets.feeder.thrower import Energy, Exact, Signed, SmallAngle, SmallAngle2
+from limitsets.feeder.thrower.effects import EFFECTS
 from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.cover import Cover, targets
 
@@ -197,9 +197,6 @@ MOST_TEXT = 4 << 20
 # Brackets of the impact are widened by this share of the angle, so that another arithmetic can confirm them.
 SLACK = 2.0**-34
 
-FLIGHTS = {Exact: "exact", SmallAngle: "small-angle", SmallAngle2: "small-angle-2"}
-FLIPS = {Signed: "signed", Energy: "energy"}
-
 
 def brackets(cover: Cover) -> Array:
     """Brackets of the impact angle, shape (n_cells, 2), widened by the slack."""
@@ -238,11 +235,6 @@ def _say_nothing(arrays: Arrays, cover: Cover) -> None:
         arrays["phi"][cells] = SLACK, 2.0 * math.pi
 
 
-def _model(cover: Cover) -> dict[str, str]:
-    first = cover.box.bare[0]
-    return {"flight": FLIGHTS[type(first.flight)], "flip": FLIPS[type(first.flip)]}
-
-
 def _parameters(cover: Cover) -> dict[str, Any]:
     lo, hi = cover.box.lo, cover.box.hi
 
@@ -261,22 +253,22 @@ def _parameters(cover: Cover) -> dict[str, Any]:
     }
 
 
-def tidy(table: Any) -> Any:
-    """Write the texts of a scene with single blanks, as a certificate has them."""
-    if isinstance(table, Mapping):
-        return {key: tidy(value) for key, value in table.items()}
-    if isinstance(table, list):
-        return [tidy(value) for value in table]
-    return " ".join(table.split()) if isinstance(table, str) else table
+def in_certificate(scene: Mapping[str, Any], *without: str) -> dict[str, Any]:
+    """Write a scene as a certificate has it, less some of its tables: with its model, and of its effects the spread.
 
-
-def scene_of(cover: Cover) -> dict[str, Any]:
-    """Return the scene of a cover as a certificate has it: its only effect is a spread, and it names its model."""
-    scene = {word: tidy(table) for word, table in cover.box.scene.items() if word != "effects"}
-    scene["model"] = _model(cover)
-    if cover.box.scene.get("effects", {}).get("spread"):
-        scene["effects"] = {"spread": cover.box.scene["effects"]["spread"]}
-    return scene
+    Facts that effects declare stand apart, in `other`: the checker need not know their names.
+    """
+    text: dict[str, Any] = spelled_plainly(
+        {word: table for word, table in scene.items() if word not in ("effects", *without)}
+        | {"model": {"flight": "exact", "flip": "signed"} | scene.get("model", {})}
+    )
+    world, spread = text.get("world", {}), scene.get("effects", {}).get("spread")
+    own = {name: world.pop(name) for effect in EFFECTS.values() for name in effect.facts if name in world}
+    if own:
+        world["other"] = own
+    if spread and "effects" not in without:
+        text["effects"] = {"spread": spread}
+    return text
 
 
 def write(
@@ -320,14 +312,19 @@ def write(
         The checker does not confirm it: it is kept as NAME.denied.zip.
     """
     packed: Arrays = {f"0.{name}": array for name, array in (arrays or {}).items()}
-    boxes = []
+    boxes: list[dict[str, Any]] = []
     for number, proof in enumerate(proofs):
         packed |= arrays_of(proof, f"{number}.")
-        parameters = _parameters(proof.cover)
-        boxes.append({"scene": scene_of(proof.cover), "parameters": parameters, "prefix": f"{number}."})
+        boxes.append(
+            {
+                "scene": in_certificate(proof.cover.box.scene),
+                "parameters": _parameters(proof.cover),
+                "prefix": f"{number}.",
+            }
+        )
     return pack(
         path,
-        _model(proofs[0].cover),
+        boxes[0]["scene"]["model"],
         claims,
         packed,
         boxes=boxes,

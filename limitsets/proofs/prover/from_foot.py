@@ -17,7 +17,7 @@ import numpy as np
 from limitsets.feeder.scene.units import spelled_plainly
 from limitsets.proofs.prover.attraction import Attraction
 from limitsets.proofs.prover.basin import MOST_UNEXPLAINED, ROUNDING
-from limitsets.proofs.prover.certificate import scene_of
+from limitsets.proofs.prover.certificate import in_certificate
 
 # Halvings of a range of angles, and by which share an angle is moved, so that the checker can confirm it.
 HALVINGS, ROOM = 60, 2.0**-20
@@ -77,7 +77,7 @@ def starts_from_foot(attraction: Attraction) -> FromFoot | None:
 
     with flint.ctx.workprec(PRECISION):
         try:
-            scene = read_scene(*spelled_plainly([scene_of(attraction.cover), dict(box.noise)]))
+            scene = read_scene(in_certificate(box.scene), spelled_plainly(dict(box.noise)))
             ends = [_side(scene, side, until) for side, until in enumerate(_first_ranked(attraction))]
         except (BadFileError, UnprovedError):
             return None

@@ -17,4 +17,5 @@ def environment_of_copy(folder: Path, word: str) -> dict[str, str]:
         shutil.rmtree(copy / "feeder" / "thrower" / "effects")
         (copy / "feeder" / "thrower" / "full.py").unlink()
     cache = folder / word / "cache"
-    return {**os.environ, "PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}
+    safe = {"PYTHONSAFEPATH": "1"}  # not the folder in which tests are run, which has the package itself
+    return {**os.environ, **safe, "PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}

@@ -123,4 +123,14 @@ def _of(world: Any, how: Any) -> Drive:
 thrown.on(Drive, _driven)
 possible.on(Drive, _holds_in_stroke)
 stays.on(Drive, _rests_leant)
-declare(Effect("drive", Drive, _of, "the throw is impulsive", ("stroke",), ("slip", "pivot", "bounce")))
+declare(
+    Effect(
+        "drive",
+        Drive,
+        _of,
+        "the throw is impulsive",
+        ("stroke",),
+        ("slip", "pivot", "bounce"),
+        reads=("friction",),
+    )
+)
