@@ -286,6 +286,11 @@ HOPELESS = {
         line,
         "that it holds one change of branch at most is not proved",
     ),
+    "two branches on a circle": (
+        ls.map(pieces=(rising, falling), margin=narrow, b=1.7),
+        circle,
+        "an axis closes, of a map of two branches",
+    ),
 }
 
 

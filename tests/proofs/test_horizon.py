@@ -254,6 +254,16 @@ def test_with_one_place_all_end_there_and_nothing_is_known_of_the_others(tmp_pat
     assert (report.verdict, report.reason) == ("proved", "")
 
 
+@pytest.mark.sweep
+def test_what_is_ever_proved_hardly_depends_on_the_throws_that_are_counted():
+    """After 2 throws the search begins far off, and what its function lacks is of the size of roundings."""
+    for throws in (2, 200):
+        answer = absorption_brackets(
+            "paper-designed", Scattering(landing=Uniform(0.1)), right=(20.5, 2), cells=600, throws=throws
+        )
+        assert 0.99999 < answer.ever["right"][0] <= answer.ever["right"][1] == 1.0
+
+
 def said(name, by):
     """Move both ends of what is said of a name, or of the mean."""
 

@@ -195,7 +195,9 @@ def averaged(proof: ProofOfMap, of: Any) -> ProofOfMap:
 
     open_cells = np.sum([each[:, 0] != IMPOSSIBLE for each in _targets(proof)], axis=0) > 1
     if open_cells.any() and proof.graph.grid.domain.closes:
-        why = "an axis closes, of a map of two branches; pass noise= for averages of those whose steps scatter"
+        why = (
+            "an axis closes, of a map of two branches; pass noise= for averages of those whose steps scatter"
+        )
         return replace(proof, claims=(undecided("average", why),))
     average = confirmed(
         proof.graph.grid, proof.arrays["component"], open_cells,
