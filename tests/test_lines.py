@@ -167,6 +167,15 @@ def test_the_checker_imports_nothing_of_ours():
         assert imported_names(source) <= {*sys.stdlib_module_names, "numpy", "flint"}
 
 
+def test_the_checker_tells_of_each_of_its_files():
+    folder = lines.PACKAGE / "checker"
+    told = set(
+        re.findall(r"^    (\w+)  +\w", (folder / "__init__.py").read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    files = {path.stem for path in folder.glob("*.py")}
+    assert told == files - {"__init__", "__main__", "build"}
+
+
 def test_every_name_of_the_checker_is_defined_once():
     """In one of its files, once: a second definition would silently change what the first one's readers see."""
     defined = []

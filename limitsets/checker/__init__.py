@@ -43,10 +43,16 @@ The files follow docs/certificates.md, and each imports only from those before i
     entropy      intervals that images meet and cover                             "Entropy"
     throw_entropy  the laps of the throw
     claims       the claims of a file, and what each needs
-    averages     means over a throw's deviations, in floats                       20, 21
+    laws         the laws of what deviates, in strata                             20
+    noisy_throw  a throw with a speed that deviates, and its derivatives          18
+    means        means over what deviates, in floats                              20
     landings     the throws of one side of a noisy chain, and their branches      18, 19
+    steps        one step of a noisy chain                                        21
+    horizon      any number of steps                                              23
+    absorption   where a chain ends, and when: what is claimed, and its brackets  22
     links        what a step needs of every cell, and the chain of it             20, 21
-    brackets     a claim of probabilities, and its brackets                       22, "Probabilities"
+    brackets     the noisy chain of a scene, and its claim                        22, "Probabilities"
+    log_slopes   ln |dx'/dx| of throws whose speed deviates
     long_run     averages of a noisy chain over ever more throws                  "Long-run averages"
     policy_chances  throws of a policy in the mean, and parts that come           "Chances of a policy"
     any_map      the map of a file, and one cell of it
@@ -56,6 +62,10 @@ The files follow docs/certificates.md, and each imports only from those before i
     map_plane    regions of parameters, and shares of them
     map_average  what averages need of the cells of a map
     map_entropy  its laps
+    noisy_map    steps of a map of a line that scatter                            "Steps that land with noise"
+    noisy_circle  the same on axes that close
+    map_chances  where such orbits end, and when                                  "Where orbits with noise end"
+    map_long_run  averages along such orbits
     map_file     the file of a map
     map_words    what is proved, in sentences
     map_weights  almost every start
