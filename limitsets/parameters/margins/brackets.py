@@ -220,7 +220,7 @@ def _grow(
         else:
             reason, share = outcome.reason, (high - low) / (wall - low) * Fraction(2, 3)
             step = share * (wall - low)
-            if step < min((wall - target) / 8, target / 4000):
+            if step < min((wall - target) / 8, target / 16000):
                 break
     return low, pieces, reason
 
