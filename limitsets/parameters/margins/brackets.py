@@ -213,13 +213,14 @@ def _grow(
         outcome = query.prove(scale.piece(scale.between(sign * low, sign * high)), finest=finest)
         if outcome.verdict == "proved":
             pieces.append(outcome)
-            low, share = high, min(share * Fraction(33, 32), Fraction(3))
+            # pieces grow fast until one fails
+            low, share = high, min(share * Fraction(33 if reason else 40, 32), Fraction(3))
             step = share * (wall - high)
             tell(float(low / target))
         else:
-            reason, share = outcome.reason, share * Fraction(2, 3)
+            reason, share = outcome.reason, (high - low) / (wall - low) * Fraction(2, 3)
             step = share * (wall - low)
-            if step < min((wall - target) / 8, target / 1000):
+            if step < min((wall - target) / 8, target / 16000):
                 break
     return low, pieces, reason
 
@@ -257,7 +258,7 @@ def _fixed_proof(query: Asked, scale: Scale, bracket: Bracket, goal: Fraction, t
     if goal <= NONE * scale.least:
         return bracket
     # all at once first: two throws with the same parameters may settle it
-    whole = query.prove(scale.piece(scale.between(-goal, goal)), finest=1)
+    whole = query.prove(scale.piece(scale.between(-goal, goal)), finest=0)
     if whole.verdict == "proved":
         bracket.pieces, bracket.proved = [whole], goal
         return bracket

@@ -404,8 +404,8 @@ class _Spans(Numbers):
     def narrow_body(self) -> tuple[list[tuple[Any, ...]], RationalInterval]:
         """As `body`, but narrower where several of its numbers are known to a tolerance only."""
         plain, radius = self.body()
-        # a pair of texts is a quantity with a tolerance
-        names = [name for name, text in texts(self.tree["part"], "part") if isinstance(text, list)]
+        # a pair of texts is a quantity with a tolerance, or a single value of a search
+        names = [n for n, t in texts(self.tree["part"], "part") if isinstance(t, list) and t[0] != t[1]]
         if not names:
             return plain, radius
         box = [self.span(name) for name in names]

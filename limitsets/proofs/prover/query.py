@@ -36,6 +36,7 @@ from limitsets.proofs.prover.goals.violating_orbits import (
 )
 from limitsets.proofs.prover.parameters import ParameterBox, SceneBox, parameter_box
 from limitsets.proofs.prover.proof import Claim
+from limitsets.systems.graph.images.enclosed import least_known
 from limitsets.systems.maps import Orbit, orbit
 
 # ----------------------------------------------------------------
@@ -329,13 +330,10 @@ class Query:
         The scene.
     goals : tuple of Goal
         What is asked.
-    known : dict
-        "base": cells per side, outside what attracts, with which the goals were proved last.
     """
 
     scene: Scene
     goals: tuple[Goal, ...]
-    known: dict[str, int] = field(default_factory=dict)
 
     @classmethod
     def of(cls, scene: Scene, goals: tuple[Goal, ...]) -> Query:
@@ -386,12 +384,11 @@ class Query:
         noise = dict(noise or {})
         try:
             box = self.box(piece, noise)
-            for base in self._bases():
+            for base in BASES[:1] if self.anywhere else BASES:
                 coarse = self._coarse(box, bases, base)
                 attractors, answers = self._refined(coarse, box, finest, base)
                 missing = answers[-1]
                 if missing.verdict == "proved":
-                    self.known["base"] = base
                     return Outcome("proved", "", attractors, answers, piece=piece, noise=noise)
                 # finer cells off the attracting ones are needed only for starts that are not proved to reach these
                 if missing.final or missing.verdict != "proved-on-cells":
@@ -407,20 +404,19 @@ class Query:
             reason = f"{reason}: from some of them, parts may leave the arm"
         return Outcome("undecided", reason, attractors, piece=piece, noise=noise)
 
-    def _bases(self) -> tuple[int, ...]:
-        """Cells per side outside what attracts: first as many as proved the goals last, or the fewest; then more."""
-        return BASES[:1] if self.anywhere else BASES[BASES.index(self.known.get("base", BASE)) :]
-
     def _refined(
         self, attractors: Attraction, box: ParameterBox, finest: int, base: int
     ) -> tuple[Attraction, tuple[Answer, ...]]:
         """Refine what attracts until the goals are proved, or finer cells cannot do it."""
+        # the cells of other starts stay as they are: only pieces of a parameter help these, last of all
+        cut = self.anywhere or (base == BASES[-1] and least_known(box.lo, box.hi) is not None)
         for step in range(finest + 1):
             if step:
                 attractors = self._finer(attractors, box, step, base)
             answers = self._each(attractors)
             missing = answers[-1]
-            if missing.verdict == "proved" or missing.final or not (attractors.component >= 0).any():
+            settled = missing.final or (missing.verdict == "proved-on-cells" and not cut)
+            if missing.verdict == "proved" or settled or not (attractors.component >= 0).any():
                 break
         return attractors, answers
 

@@ -44,8 +44,9 @@ from limitsets.systems.cells import CellSet
 # grows until it meets a critical point, so the topological entropy is at least the logarithm of the least slope.
 
 
-# Cells are cut into this many pieces, so that the slope is not lost in the width of a cell.
-PIECES = 8
+# Cells are cut into this many pieces, so that the slope is not lost in the width of a cell; where a slope of each cell
+# is asked for, and there are more cells than this on a side, into fewer.
+PIECES, MANY = 8, 512
 
 
 @proof_kernel(entry=True)
@@ -84,21 +85,22 @@ def least_slope(cover: Cover, cells: CellSet) -> tuple[float, str]:
 def slopes(cover: Cover, cells: CellSet) -> Array:
     """Lower bounds of the slope on each of the given cells; nan on the others, -1 where nothing is proved."""
     least = np.full(cover.grid.n_cells, np.nan)
-    for side, k, _, out in _pieces(cover, cells):
+    for side, k, _, out in _pieces(cover, cells, MANY):
         least[cover.grid.offset[side] + k] = out.min(axis=1)
     return least
 
 
-def _pieces(cover: Cover, cells: CellSet) -> Iterator[tuple[int, Any, Any, Any]]:
+def _pieces(cover: Cover, cells: CellSet, many: float = np.inf) -> Iterator[tuple[int, Any, Any, Any]]:
     """Per side: the cells, the cuts between their pieces, and a lower bound of the slope on each piece."""
     for side, (edges,) in enumerate(cover.grid.edges):
         k = np.flatnonzero(cells.mask[cover.grid.of_side(side)])
         if not k.size:
             continue
-        weights = np.arange(PIECES + 1) / PIECES
+        pieces = int(np.ceil(PIECES * min(1.0, many / k.size)))
+        weights = np.arange(pieces + 1) / pieces
         cuts = edges[k][:, None] + weights * (edges[k + 1] - edges[k])[:, None]
         cuts[:, -1] = edges[k + 1]
-        out = np.empty((k.size, PIECES))
+        out = np.empty((k.size, pieces))
         _slopes(*cover.box.bare, side, cuts, out)
         lowest = cover.box.lo
         if isinstance(lowest, FullThrow) and entry_of(lowest.effects, Landing) is not None:

@@ -198,7 +198,7 @@ def _numbers(lo_map: Any, hi_map: Any) -> Iterator[tuple[str, float, float]]:
             yield from ((f"{name}.{inner}", a, b) for inner, a, b in _numbers(low, high))
 
 
-def _least_known(lo_map: Any, hi_map: Any) -> tuple[str, float, float] | None:
+def least_known(lo_map: Any, hi_map: Any) -> tuple[str, float, float] | None:
     """Scalar parameter of largest relative width, None where all are known to some ulp."""
     widths = {
         number: (number[2] - number[1]) / max(abs(number[1]), abs(number[2]), 1e-300)
@@ -210,7 +210,7 @@ def _least_known(lo_map: Any, hi_map: Any) -> tuple[str, float, float] | None:
 
 
 def _parameter_pieces(lo_map: Any, hi_map: Any, pieces: int) -> list[tuple[Any, Any]]:
-    widest = _least_known(lo_map, hi_map)
+    widest = least_known(lo_map, hi_map)
     if widest is None:
         return [(lo_map, hi_map)]
     name, low, high = widest
