@@ -122,14 +122,14 @@ def brackets_of(
     return brackets, np.stack([-bound[0], bound[1]])
 
 
-def check_within(name: str, said: Array, brackets: Array) -> None:
+def check_within(name: str, said: Array, brackets: Array, step: str) -> None:
     """Check that the brackets claimed of one name hold those that are proved."""
     wrong = np.flatnonzero(~((said[:, 0] <= brackets[:, 0]) & (brackets[:, 1] <= said[:, 1])))
     if len(wrong):
         n = int(wrong[0])
         lo, hi = rounded(float(brackets[n, 0]), up=False), rounded(float(brackets[n, 1]), up=True)
         claimed = f"[{float(said[n, 0])!r}, {float(said[n, 1])!r}]"
-        what = f"P({plain(name)} within {n} throws)"
+        what = f"P({plain(name)} within {n} {step}s)"
         raise UnprovedError(f"{what}: {claimed} is claimed, [{lo}, {hi}] is proved")
 
 
@@ -143,13 +143,13 @@ def check_quantiles(a: Absorption, brackets: dict[str, Array]) -> None:
         prove(none_before and there, quantile)
 
 
-def check_absorption(chain: Chain, row: Rows, a: Absorption, told: Callable[[], None]) -> None:
-    """Check everything that is claimed; tells when a name is done."""
+def check_absorption(chain: Chain, row: Rows, a: Absorption, step: str, told: Callable[[], None]) -> None:
+    """Check everything that is claimed; tells when a name is done.  `step` says what is counted."""
     brackets: dict[str, Array] = {}
     for name, said in a.within.items():
         brackets[name], _ = brackets_of(chain, row, name, len(said))
         told()
-        check_within(name, said, brackets[name])
+        check_within(name, said, brackets[name], step)
     check_quantiles(a, brackets)
     lower, upper = (a.functions.get(f"mean.{end}") for end in ("lower", "upper"))
     if a.mean is not None:

@@ -281,4 +281,4 @@ def chain_on(c: Setting, edges: list[Array], advance: Callable[[int], None]) -> 
 def check_chances(c: Chances, advance: Callable[[int], None]) -> None:
     """Check everything that is claimed."""
     chain, row = chain_on(c.setting, c.edges, advance)
-    check_absorption(chain, row, c.absorption, lambda: advance(sum(len(each) for each in c.edges)))
+    check_absorption(chain, row, c.absorption, "throw", lambda: advance(sum(len(each) for each in c.edges)))

@@ -18,7 +18,10 @@ NARROW = 2.0**-20
 INFLATE = 1.0 + 2.0**-30  # against the roundings of the few operations that make a coefficient or add it up
 FINER = 4  # cells of W for each cell of V
 FINEST = 500.0  # so many of them at most for each reach of the scatter
-MOST_FINER, MOST_OVERLAPS = 1e7, 5e7  # cells of W, and cells of V that all its nodes meet: memory
+MOST_FINER, MOST_OVERLAPS = (
+    1e7,
+    5e7,
+)  # cells of W on all sides, and cells of V that all its nodes meet: memory
 AT_ONCE = 50_000  # ranges shared out to cells at a time
 
 
@@ -215,6 +218,9 @@ class Scatter:
             return Spread(np.repeat(some, strata), weights, np.repeat(side[some], strata), lo, hi)
 
         reach = float(law.reach)
+        outer = coarse.place[coarse.first[side]], coarse.place[coarse.first[side + 1] - 1]
+        followed = bool(((outer[0] < y - reach) & (y + reach < outer[1])).all())
+        prove(followed, "landings scatter beyond the outermost nodes")
         self.whole = coarse.within(side, y - reach, y + reach)
         met = int((self.whole.last - self.whole.first + 1).sum()) + len(y) * strata
         prove(met < MOST_OVERLAPS, "landings scatter over too many cells")
@@ -264,7 +270,7 @@ def finer_mesh(coarse: Mesh, law: Law, narrow: float) -> Mesh:
     """Place nodes for W: at even distances, and where a jump of V leads to a bend."""
     pad, reach = 4.0 * PAD * coarse.size(), float(law.reach)
     bends = np.array([0.0] if law.ripple else [float(law.ends[j]) for j, _ in law.jumps])
-    rows = []
+    rows, room = [], MOST_FINER
     for begin, end in zip(coarse.first[:-1], coarse.first[1:], strict=True):
         inner = coarse.place[begin + 1 : end - 1]
         width = np.diff(inner)
@@ -276,7 +282,8 @@ def finer_mesh(coarse: Mesh, law: Law, narrow: float) -> Mesh:
         special = np.unique(around[:, None] + bends)
         special = special[np.diff(special, prepend=-np.inf) > 0.25 * pad]  # the same but for roundings
         lo, hi = inner[0] - reach - 4.0 * pad, inner[-1] + reach + 4.0 * pad
-        prove(float(hi - lo) < MOST_FINER * float(step), "landings scatter over too many cells")
+        room -= float(hi - lo) / float(step)
+        prove(room > 0.0, "landings scatter over too many cells")
         even = np.linspace(lo, hi, int(np.ceil((hi - lo) / step)) + 1)
         at = np.searchsorted(special, np.stack([even - 0.1 * step, even + 0.1 * step]))
         even = even[(at[0] == at[1]) | (even == lo) | (even == hi)]  # none close to a special place

@@ -172,9 +172,9 @@ def steps_from(
             image = first.union(last)
         elif slope.is_finite():  # from either end on, no farther than the slope allows
             image = first.union(last) + (x - x.mid()) * abs(slope).upper()
-        if not (image.is_finite() and first.is_finite() and last.is_finite()):
-            return []
         lo, hi = -upper(-image), upper(image)
+        if not (first.is_finite() and last.is_finite() and math.isfinite(hi - lo)):
+            return []
         own = BranchOfCell(at, side, branch, ends, slope, bend)
         steps.append(StepOfMap(own, the_map.shape.to[side, branch], (first, last), (lo, hi)))
     return steps
@@ -220,7 +220,8 @@ def strata_of(the_map: Map, varied: Varied | None) -> list[Stratum]:
 
 def mesh_of_map(edges: list[Array], law: Law) -> Mesh:
     """Put the nodes of all sides together, with one far out at either end."""
-    size = max(float(np.abs(each).max()) for each in edges) + float(law.reach)
+    # not nearer than in units of 1, in which roundings of places are allowed for (`Mesh.size`)
+    size = 1.0 + max(float(np.abs(each).max()) for each in edges) + float(law.reach)
     return mesh_of(edges, OUTERMOST * FAR_OF_MAP * 2.0 ** math.ceil(math.log2(size)))
 
 

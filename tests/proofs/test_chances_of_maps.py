@@ -1,5 +1,7 @@
 """Where orbits of noisy maps end, and when: closed forms, random orbits, forged files."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,9 @@ from limitsets.robust import absorption_brackets
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
+from limitsets.checker.laws import uniform_law
+from limitsets.checker.map_chances import places_on
+from limitsets.checker.noisy_map import mesh_of_map
 from tests.proofs.forge import opened
 from tests.proofs.test_noisy_maps import half, itself, section_of
 
@@ -35,6 +40,10 @@ def upper(x):
 
 def from_middle(x):
     return x - 0.45
+
+
+def from_level(x, c):
+    return x - c
 
 
 KNOWN = {  # map, grid, noise, places, starts: P(ever at the place), mean of T, both in closed form
@@ -103,6 +112,11 @@ RANDOM = {
         ls.map(pieces=(lower, upper), margin=from_middle), {}, 0.08,
         lambda x, _: np.where(x < 0.45, lower(x), upper(x)),
     ),
+    "a border that moves over the end of the place": (
+        ls.map(pieces=(lower, upper), margin=from_level, c=0.85),
+        {"upper": ls.map(pieces=(lower, upper), margin=from_level, c=0.86)}, 0.08,
+        lambda x, rng: np.where(x < rng.uniform(0.85, 0.86, x.size), lower(x), upper(x)),
+    ),
     "a range of a parameter, another at every step": (
         ls.map(doubled, p=1.2), {"upper": ls.map(doubled, p=1.25)}, 0.3,
         lambda x, rng: rng.uniform(1.2, 1.25, x.size) * x,
@@ -145,6 +159,24 @@ def test_random_orbits_end_within_the_bounds(case):
     assert hi - lo < (0.4 if how else 0.1) * ended.mean()
 
 
+def test_on_the_scale_of_atoms_all_that_lands_outside_has_ended():
+    """Every first step lands off the grid, by far; places are told apart to 1e-12 only, so that less is proved."""
+    answer = absorption_brackets(
+        ls.map(to_middle), ls.grid([(-1e-14, 1e-14)], cells=10), noise=9e-15, absorbing={"top": [(0, 5e-15, 1e-14)]},
+        starts=[(0, -1e-14, 0.0)], throws=3, mean=False,
+    )  # fmt: skip
+    for name in ("any", "exits"):
+        assert answer.within[name][1, 1] == 1.0
+
+
+def test_the_cells_beyond_the_domain_are_exits():
+    mesh = mesh_of_map([np.array([-0.5, 0.0, 0.4, 1.0, 1.5])], uniform_law(Fraction(1, 2), 1))
+    live, absorbed = places_on(mesh, {"top": [(0, Fraction(0.4), Fraction(1))]})
+    assert live.tolist() == [2]
+    assert absorbed["exits"].tolist() == [0, 1, 2, 4, 5, 6]
+    assert absorbed["top"].tolist() == [3, 4]
+
+
 # ------------------------------------------------------------------------------------------------- certificates
 
 
@@ -164,6 +196,37 @@ def test_a_saved_answer_is_said_in_words(saved):
         "starts, equally likely per length: [0.0, 1.0]", 'P(ever ended "top")', "the mean of T: at least 1.99",
     ):  # fmt: skip
         assert words in said
+
+
+def test_a_slope_beyond_the_domain_proves_no_mean(tmp_path):
+    """A hostile reader's: an orbit goes to and fro between two sides for ever, and its images pass the far node."""
+    answer = absorption_brackets(
+        ls.map(to_level, p=0.5), ls.grid([(-1.0, 1.0)], cells=20), noise={"p": 0.1}, throws=2, mean=False
+    )
+    forged = opened(answer.save(tmp_path / "base.proof.zip"))
+    steep = 2**20
+    programs = [
+        ([["x", 0], ["c", str(steep)], ["mul", 1, 0], ["c", "0.9375"], ["add", 2, 3]], 1),
+        ([["c", repr(7.0 / (128.0 * steep))]], 0),
+    ]
+    listed = [
+        {"side": k, "branch": 0, "to": to, "ops": ops, "out": [len(ops) - 1]}
+        for k, (ops, to) in enumerate(programs)
+    ]
+    forged.header["map"].update(sides=2, periodic=[[None], [None]], programs=listed)
+    first, last = np.array([-0.0625, 0.0, 0.0625, 0.125]), np.array([0.875, 63.0 / 64.0, 1.0, 1.0625])
+    section_of(forged).update(
+        varied={"name": "p", "within": "0.1", "strata": 1}, absorbing={}, names=["any"],
+        mean=[(0.0).hex(), (13.0).hex()], starts=[{"side": 1, "box": [[(63.0 / 64.0).hex(), (1.0).hex()]]}],
+    )  # fmt: skip
+    far = mesh_of_map([first, last], uniform_law(Fraction(0), 1)).place[-1]
+    rising = 8.0 + 64.0 * (np.append(last, far) - 0.9375)
+    v = np.array([0.0, 0.0, 9.01, rising[-1] + 1.01, 0.0, 0.0, 0.0, *rising])
+    forged.arrays = {
+        "0.nodes.0": first, "0.nodes.1": last, "0.within.0": np.array([[0.0, 1.0]] * 3), "0.mean.upper": v,
+    }  # fmt: skip
+    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    assert (report.verdict, "not constant beyond the domain" in str(report)) == ("failed", True), str(report)
 
 
 def box(lo, hi):
@@ -195,7 +258,13 @@ FORGED = {
         lambda f: f.arrays["0.ever.0.upper"].__setitem__(20, 0.0), "upper function is none",
     ),
     "a probability within some steps": (
-        lambda f: f.arrays["0.within.0"].__setitem__((3, 1), 0.1), "within 3 throws",
+        lambda f: f.arrays["0.within.0"].__setitem__((3, 1), 0.1), "within 3 steps",
+    ),
+    "a probability from below where nothing says that orbits end": (
+        lambda f: section_of(f)["mean"].__setitem__(1, None) or f.arrays.pop("0.mean.upper") is None, "the throws end",
+    ),
+    "a function with a slope beyond the domain": (
+        lambda f: f.arrays["0.mean.upper"].__setitem__(-1, 9.0), "not constant beyond the domain",
     ),
 }  # fmt: skip
 
@@ -232,6 +301,10 @@ def inverse(x):
     return 1.0 / x
 
 
+def huge(x):
+    return (1e80 * x) ** 4
+
+
 def turned(x, y):
     return 0.5 * y, 0.5 * x
 
@@ -248,6 +321,13 @@ REFUSED = {
     "places that overlap": (
         half, LINE, {"noise": 0.1, "absorbing": TOP | {"more": [(0, 0.6, 0.7)]}}, r"two places that absorb overlap",
     ),
+    "no start": (half, LINE, {"noise": 0.1, "starts": []}, r"the number of starts is 0"),
+    "a start of two numbers": (half, LINE, {"noise": 0.1, "starts": [(0, 0.5)]}, r"starts is"),
+    "more steps than a file takes": (half, LINE, {"noise": 0.1, "throws": 2001}, r"0 to 2000"),
+    "a name with a blank": (half, LINE, {"noise": 0.1, "absorbing": {"my place": TOP["top"]}}, r"without blanks"),
+    "all of the grid": (half, LINE, {"noise": 0.1, "absorbing": {"a": [(0, -1.0, 1.0)]}}, r"no cell from which"),
+    "noise that is no number": (half, LINE, {"noise": {"landing": None}}, r"the noise is"),
+    "images beyond all numbers": (huge, LINE, {"noise": 0.1}, r"not enclosed"),
     "a pole": (inverse, LINE, {"noise": 0.1, "absorbing": TOP}, r"not enclosed"),
 }  # fmt: skip
 

@@ -7,6 +7,7 @@ below and one from above (`limitsets/checker/brackets.py`).
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +17,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from limitsets.base import AnswerError, Column, Table, Tabled, added_up, as_table, picked, shown_in_notebooks
+from limitsets.base import (
+    AnswerError,
+    Column,
+    Table,
+    Tabled,
+    added_up,
+    arguments_checked,
+    as_table,
+    picked,
+    shown,
+    shown_in_notebooks,
+)
 from limitsets.base.arrays import Array
 from limitsets.feeder.scattering import Scattering, scattering_of, starts_from
 from limitsets.numbers.interval import guard
@@ -175,9 +187,12 @@ class AbsorptionBrackets(Tabled):
 
 
 CELLS, THROWS = 4000, 200
+# What a certificate takes.
+MOST_THROWS, MOST_PLACES, MOST_NAMES, LONGEST = 2000, 1000, 99, 80
 
 
 @shown_in_notebooks
+@arguments_checked
 def absorption_brackets(
     scene: Any,
     scatter: Any = None,
@@ -260,6 +275,10 @@ def absorption_brackets(
     begun = time.perf_counter()
     guard()
     tell = progress or (lambda stage, done, total: None)
+    if not 0 <= throws <= MOST_THROWS:
+        raise AnswerError("the throws counted", throws, f"0 to {MOST_THROWS}", "`ever` is of any number")
+    if starts is not None:
+        starts = _places("starts", starts)
     if isinstance(scene, Scene | str):
         require_none({"upper": upper, "noise": noise}, "absorption_brackets", "beside a scene")
         read = load(scene)
@@ -337,13 +356,29 @@ def _named_places(
     absorbing: Mapping[str, Sequence[Place]] | None, taken: Mapping[str, object]
 ) -> dict[str, list[Place]]:
     """Read further places by name."""
+    if len(absorbing or {}) > MOST_NAMES:
+        raise AnswerError(
+            "the names of absorbing places", len(absorbing or {}), f"at most {MOST_NAMES}", "join some"
+        )
     for name in absorbing or {}:
         if name in (*taken, ANY, EXITS):
             raise AnswerError("the name of absorbing places", name, "one that is not taken", "choose another")
-    return {
-        name: [(int(side), float(lo), float(hi)) for side, lo, hi in places]
-        for name, places in (absorbing or {}).items()
-    }
+        if not isinstance(name, str) or not re.fullmatch(rf"[!-~]{{1,{LONGEST}}}", name):
+            allowed = f"1 to {LONGEST} letters, digits and signs of ASCII, without blanks"
+            raise AnswerError("the name of absorbing places", name, allowed, "choose another")
+    return {name: _places(f'places "{name}"', places) for name, places in (absorbing or {}).items()}
+
+
+def _places(thing: str, places: Sequence[Place]) -> list[Place]:
+    """Read places."""
+    if not 1 <= len(places) <= MOST_PLACES:
+        raise AnswerError(
+            f"the number of {thing}", len(places), f"1 to {MOST_PLACES}", "give (side, from x, to x)"
+        )
+    try:
+        return [(int(side), float(lo), float(hi)) for side, lo, hi in places]
+    except (TypeError, ValueError):
+        raise AnswerError(thing, shown(places), "(side, from x, to x) each", "correct them") from None
 
 
 def default_starts(scene: Scene, right: tuple[float, int] | None) -> list[Place]:

@@ -76,7 +76,12 @@ def chain_of_map(
     from limitsets.checker.map_chances import chain_that_ends, read_places_of_map
 
     jumps = [(side, x) for side, *ends in [*whole_grid(grid), *of_places] for x in ends]
-    fine = cut_at_changes(lower, upper, grid, jumps)
+    # where the branch changes nodes were taken out
+    cut = [
+        (np.union1d(axis, [x for k, x in jumps if k == side]),)
+        for side, (axis,) in enumerate(cut_at_changes(lower, upper, grid, jumps).edges)
+    ]
+    fine = Grid(grid.domain, tuple(cut))
     boxes = {name: [_in_file(each) for each in some] for name, some in absorbing.items()}
     section = own.section() | {"starts": [_in_file(each) for each in starts], "absorbing": boxes}
     with flint.ctx.workprec(PRECISION):

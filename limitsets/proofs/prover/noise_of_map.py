@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from numbers import Real
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -69,16 +70,14 @@ class Noise(NamedTuple):
 def noise_of(lower: Any, noise: Bounds) -> Noise:
     """Read the noise of a map."""
     given = noise if isinstance(noise, Mapping) else {LANDING: noise}
-    bounds, parameters = (
-        {LANDING: 0.0} | {name: float(bound) for name, bound in given.items()},
-        dict(names_of(lower)),
-    )
+    numbers = {name: float(each) if isinstance(each, Real) else math.nan for name, each in given.items()}
+    bounds, parameters = {LANDING: 0.0} | numbers, dict(names_of(lower))
     if LANDING in parameters:
         raise AnswerError(
             "a parameter", LANDING, "another name", "rename it: such noise is of where steps land"
         )
     for name, bound in bounds.items():
-        if name != LANDING and not (name in parameters and LEAST <= bound < math.inf):
+        if not (name == LANDING or (name in parameters and LEAST <= bound < math.inf)):
             allowed = f"at least {LEAST}, of {' or '.join([LANDING, *parameters])}"
             raise AnswerError(f"the noise of {name}", bound, allowed, "correct it, or leave it out")
     if len(bounds) > 2:
