@@ -1,8 +1,9 @@
 """A noisy map whose axes close: one period of cells, and functions that are continued by copies on both sides.
 
 docs/certificates.md, "Steps that land with noise".  Images are moved by whole periods to near the cells, so that an
-image with its noise lies within three periods.  The nodes of a copy are those of the cells moved by a period, rounded:
-by at most `off`.  A function between such nodes is off by at most that times its steepest slope.
+image with its noise lies within three periods.  A function is what it is on the cells, on [e_0, e_0 + P); the last cell
+ends no earlier.  The nodes of a copy are those of the cells moved by a period, off by at most `off`: between them the
+copy is off by at most four times that times its steepest slope.
 """
 
 import itertools
@@ -75,7 +76,7 @@ def chain_of_circles(
         places = [*itertools.chain(*moved), arb(float(e[0])) + period]
         floats = [*before, *after, e[-1]]
         off = max(off, *(upper(abs(x - float(y))) for x, y in zip(places, floats, strict=True)))
-        copies.append(np.concatenate([before[:-1], e[:-1], after]))
+        copies.append(np.concatenate([before[:-1], e, after[1:]]))
         prove(bool((np.diff(copies[-1]) > 0.0).all()), "the nodes of a copy do not ascend")
         narrow = float(np.diff(copies[-1]).min())
         prove(4.0 * off < narrow, "the nodes of an axis that closes are too close to each other")
@@ -85,7 +86,6 @@ def chain_of_circles(
         n, first, at = len(e) - 1, int(mesh.first[side]) + 1, int(whole.first[side]) + 1
         own[first : first + n + 1] = at + n + np.arange(n + 1)
         source[at - 1 : at + 3 * n + 2] = first + np.clip(np.arange(-1, 3 * n + 2), 0, 3 * n) % n
-    reach = float(law.reach)
 
     def turned(steps: list[StepOfMap]) -> list[StepOfMap]:
         moved = []
@@ -95,7 +95,7 @@ def chain_of_circles(
             turns = math.floor((0.5 * lo + 0.5 * hi - float(edges[step.to][0])) / float(period.mid()))
             by = -turns * period
             lo, hi = -upper(-(arb(lo) + by)), upper(arb(hi) + by)
-            if not (e[0] + reach < lo and hi < e[-1] - reach):
+            if not (arb(float(e[0])) + exact(law.reach) < lo and hi < arb(float(e[-1])) - exact(law.reach)):
                 return []
             images = step.images[0] + by, step.images[1] + by
             moved.append(step._replace(images=images, range=(lo, hi), moved=by))
