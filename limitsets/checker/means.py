@@ -4,6 +4,7 @@ docs/certificates.md, "Probabilities", number 20.  A function V is continuous an
 of V(y + e) over the deviations e of the landing, is bounded in the same form, at finer nodes.
 """
 
+import functools
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -18,10 +19,8 @@ NARROW = 2.0**-20
 INFLATE = 1.0 + 2.0**-30  # against the roundings of the few operations that make a coefficient or add it up
 FINER = 4  # cells of W for each cell of V
 FINEST = 500.0  # so many of them at most for each reach of the scatter
-MOST_FINER, MOST_OVERLAPS = (
-    1e7,
-    5e7,
-)  # cells of W on all sides, and cells of V that all its nodes meet: memory
+# Of memory: cells of W on all sides, and cells of V that all its nodes meet.
+MOST_FINER, MOST_OVERLAPS = 1e7, 5e7
 AT_ONCE = 50_000  # ranges shared out to cells at a time
 
 
@@ -53,25 +52,73 @@ class Mesh(NamedTuple):
         return Ranges(self.cells(side, lo - pad), self.cells(side, hi + pad))
 
 
-class Ranges(NamedTuple):
-    """Ranges of cells, by the left nodes of the first and the last."""
+class TwoRuns(NamedTuple):
+    """Ranges of numbers, each as two runs of 2^level numbers that cover it: where these begin."""
 
-    first: Array
-    last: Array
+    level: Array
+    one: Array
+    two: Array
 
 
-def extremes(values: Array, first: Array, last: Array) -> tuple[Array, Array]:
-    """Return the least and the largest of values[first..last] of each range."""
-    level = np.frexp((last - first + 1).astype(np.float64))[1] - 1
-    lo, hi = np.empty(len(first)), np.empty(len(first))
-    least = most = values
-    for k in range(int(level.max(initial=0)) + 1):
-        q = np.flatnonzero(level == k)
-        end = last[q] - (1 << k) + 1
-        lo[q], hi[q] = np.minimum(least[first[q]], least[end]), np.maximum(most[first[q]], most[end])
-        least = np.minimum(least[: -(1 << k)], least[1 << k :])
-        most = np.maximum(most[: -(1 << k)], most[1 << k :])
-    return lo, hi
+def runs_of(first: Array, last: Array) -> TwoRuns:
+    """Cover ranges by runs."""
+    level = np.frexp((last - first + 1).astype(np.float64))[1].astype(np.int64) - 1
+    return TwoRuns(level, first, last - (1 << level) + 1)
+
+
+class Ranges:
+    """Ranges of cells, by the left nodes of the first and the last; their runs are found once, for all functions."""
+
+    def __init__(self, first: Array, last: Array):
+        self.first, self.last = first, last
+
+    @functools.cached_property
+    def cells(self) -> TwoRuns:
+        """The runs of their cells."""
+        return runs_of(self.first, self.last)
+
+    @functools.cached_property
+    def nodes(self) -> TwoRuns:
+        """The runs of their nodes."""
+        return runs_of(self.first, self.last + 1)
+
+    @functools.cached_property
+    def inner(self) -> TwoRuns:
+        """The runs of the cells to the left of their inner nodes, or of the one cell."""
+        return runs_of(self.first, np.maximum(self.last - 1, self.first))
+
+
+def lengthened(values: Array, rows: int, better: np.ufunc) -> Array:
+    """Return by row k the best of 2^k values from each on; of runs that would end beyond the last nothing is asked."""
+    table = np.empty((rows, len(values)))
+    table[0] = values
+    for k in range(1, rows):
+        half = 1 << (k - 1)
+        table[k] = table[k - 1]
+        better(table[k - 1, :-half], table[k - 1, half:], out=table[k, :-half])
+    return table
+
+
+class Extremes:
+    """The least and the largest of some values over runs: row k of the tables is of runs of 2^k values."""
+
+    def __init__(self, values: Array):
+        self.least = self.most = values[None, :]
+
+    def on(self, runs: TwoRuns) -> tuple[Array, Array]:
+        """Return the least and the largest value of each range."""
+        rows, n = int(runs.level.max(initial=0)) + 1, self.least.shape[1]
+        if len(self.least) < rows:
+            self.least, self.most = (
+                lengthened(self.least[0], rows, np.minimum),
+                lengthened(self.most[0], rows, np.maximum),
+            )
+        begin = runs.level * n
+        one, two = begin + runs.one, begin + runs.two
+        return (
+            np.minimum(self.least.take(one), self.least.take(two)),
+            np.maximum(self.most.take(one), self.most.take(two)),
+        )
 
 
 class Graph:
@@ -92,16 +139,17 @@ class Graph:
         self.falls = np.append(
             fall * 2.0 / (width[:-1] + width[1:]), 0.0
         )  # per length, at the node after each cell
+        self.of_values, self.of_slopes, self.of_falls = map(Extremes, (values, self.slopes, self.falls))
         self.climbed = np.concatenate([[0.0], np.cumsum(np.abs(rise))])
         self.rounding = len(rise) * 2.0**-52 * float(self.climbed[-1])
 
     def values_on(self, span: Ranges) -> tuple[Array, Array]:
         """Return the least and the largest value on each range of cells."""
-        return extremes(self.values, span.first, span.last + 1)
+        return self.of_values.on(span.nodes)
 
     def slopes_on(self, span: Ranges) -> tuple[Array, Array]:
         """Return the least and the largest slope."""
-        return extremes(self.slopes, span.first, span.last)
+        return self.of_slopes.on(span.cells)
 
     def steepest_on(self, span: Ranges) -> Array:
         """Return the largest size of a slope."""
@@ -110,7 +158,7 @@ class Graph:
 
     def falls_on(self, span: Ranges) -> Array:
         """Return the largest fall of the slope per length, at the nodes inside."""
-        return extremes(self.falls, span.first, np.maximum(span.last - 1, span.first))[1]
+        return self.of_falls.on(span.inner)[1]
 
     def variation_on(self, span: Ranges) -> Array:
         """Bound the total variation from above."""

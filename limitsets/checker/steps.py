@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .balls import Array
-from .means import INFLATE, NARROW, Graph, Mesh, Rows, Scatter, extremes, lifts
+from .means import INFLATE, NARROW, Extremes, Graph, Mesh, Rows, Scatter, lifts
 
 
 @dataclass
@@ -93,7 +93,7 @@ class Bent:
         if "eighth" in some.columns:
             width = np.diff(mesh.place, append=np.inf)
             self.share = 8.0 * some.array("eighth")
-            self.even += some.array("eighth") * extremes(width, self.span.first, self.span.last)[1] ** 2
+            self.even += some.array("eighth") * Extremes(width).on(self.span.cells)[1] ** 2
 
     def products(self, g: Graph) -> tuple[Array, Array]:
         """Return the least and the largest of coefficient times slope."""
@@ -201,9 +201,11 @@ class Chain:
         falls = self.turns.even * g.falls_on(self.turns.span) + self.turns.bow * g.steepest_on(
             self.turns.span
         )
-        first, last = g.values_on(self.turns.span)  # no part lies farther from its chord than G varies
-        tame = np.minimum(np.minimum(hi - lo, falls), self.turns.share * (last - first))
-        turned = np.bincount(self.turns.at, tame, n)
+        rises = np.minimum(hi - lo, falls)
+        if self.scatter is None:  # G may jump, and no part lies farther from its chord than G varies
+            first, last = g.values_on(self.turns.span)
+            rises = np.minimum(rises, self.turns.share * (last - first))
+        turned = np.bincount(self.turns.at, rises, n)
         least, most = self.cells.ends(g)
         span, gap = np.zeros(n), np.zeros(n)
         span[self.cells.at] = most - least

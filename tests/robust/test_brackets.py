@@ -15,7 +15,7 @@ from flint import arb
 import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.checker.laws import normal_law, uniform_law
-from limitsets.checker.means import Graph, Mesh, Ranges, Spread, mean_rows
+from limitsets.checker.means import Extremes, Graph, Mesh, Ranges, Spread, mean_rows
 from limitsets.feeder.scattering import Gaussian, Given, Scattering, Uniform, starts_from
 from limitsets.parameters.noise.sampling import throw_many
 from limitsets.proofs.chances.absorption import absorption_brackets
@@ -162,6 +162,18 @@ def test_speed_alone_has_its_closed_form():
     exact = float(_arrived(starts, x_right, p).mean())
     assert low <= exact <= high
     assert high - low < 0.01
+
+
+def test_extremes_over_ranges_are_those_of_the_values():
+    rng = np.random.default_rng(1)
+    for n in (3, 4, 37, 64):
+        values, ends = Extremes(rng.normal(size=n)), np.sort(rng.integers(1, n - 1, (50, 2)), axis=1)
+        given, span = values.least[0], Ranges(*ends.T)
+        for runs, more in ((span.cells, 1), (span.nodes, 2), (span.inner, 0)):
+            slices = [given[a : max(b, a + 1 - more) + more] for a, b in ends.tolist()]
+            least, most = values.on(runs)
+            assert least.tolist() == [each.min() for each in slices]
+            assert most.tolist() == [each.max() for each in slices]
 
 
 def test_sums_over_spans_keep_small_numbers_beside_large_ones():
