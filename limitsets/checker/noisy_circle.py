@@ -36,10 +36,8 @@ class ChainOfCircles:
 
     def __init__(self, mesh: Mesh, copied: Chain, own: Array, source: Array, off: float):
         self.mesh, self.copied, self.own, self.source, self.off = mesh, copied, own, source, off
-        self.seam = (
-            mesh.first[:-1] + 1,
-            mesh.first[1:] - 2,
-        )  # the first and the last node of each side are one place
+        # the first and the last node of each side are one place
+        self.seam = mesh.first[:-1] + 1, mesh.first[1:] - 2
 
     def joined(self, values: Array) -> Array:
         """Let a function have its larger value on both sides of a seam."""

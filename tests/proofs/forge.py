@@ -179,6 +179,13 @@ def opened(path: Path) -> Forged:
         return Forged(json.loads(file.read("header.json")), dict(arrays))
 
 
+def spoiled(path: Path, change: Callable[[Forged], object], to: Path) -> Path:
+    """A certificate that is changed, and sealed again as another file."""
+    forged = opened(path)
+    change(forged)
+    return forged.seal().write(to)
+
+
 def _place(header: dict, path: tuple) -> tuple:
     *words, last = path
     for word in words:

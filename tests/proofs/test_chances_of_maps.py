@@ -14,7 +14,7 @@ from limitsets.base.errors import AnswerError
 from limitsets.checker.laws import uniform_law
 from limitsets.checker.map_chances import places_on
 from limitsets.checker.noisy_map import mesh_of_map
-from tests.proofs.forge import opened
+from tests.proofs.forge import opened, spoiled
 from tests.proofs.test_noisy_maps import half, itself, section_of
 
 
@@ -272,9 +272,7 @@ FORGED = {
 @pytest.mark.parametrize("case", FORGED)
 def test_what_is_forged_is_denied(case, saved, tmp_path):
     change, reason = FORGED[case]
-    forged = opened(saved)
-    change(forged)
-    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    report = ls.recheck(spoiled(saved, change, tmp_path / "forged.zip"))
     assert (report.verdict, reason in str(report)) == ("failed", True), str(report)
 
 
@@ -292,9 +290,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_files_are_refused(case, saved, tmp_path):
-    forged = opened(saved)
-    BAD[case](forged)
-    assert ls.recheck(forged.seal().write(tmp_path / "forged.zip")).verdict == "bad file"
+    assert ls.recheck(spoiled(saved, BAD[case], tmp_path / "forged.zip")).verdict == "bad file"
 
 
 def inverse(x):

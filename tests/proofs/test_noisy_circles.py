@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("flint", reason="the checker needs python-flint")
 
 import limitsets as ls
-from tests.proofs.forge import opened
+from tests.proofs.forge import opened, spoiled
 from tests.proofs.test_noisy_maps import itself, section_of
 
 TAU = 2.0 * math.pi
@@ -117,9 +117,7 @@ FORGED = {
 @pytest.mark.parametrize("case", FORGED)
 def test_what_is_forged_is_denied(case, saved, tmp_path):
     change, reason = FORGED[case]
-    forged = opened(saved)
-    change(forged)
-    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    report = ls.recheck(spoiled(saved, change, tmp_path / "forged.zip"))
     assert (report.verdict, reason in str(report)) == ("failed", True), str(report)
 
 

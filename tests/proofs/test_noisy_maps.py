@@ -21,7 +21,7 @@ from limitsets.checker.map_long_run import LongRunOfMap, gains_of, pole
 from limitsets.checker.noisy_map import BranchOfCell, NoisyMap, steps_from
 from limitsets.checker.observable import Allowed, read_function
 from limitsets.proofs.prover.long_run_of_map import settled
-from tests.proofs.forge import opened
+from tests.proofs.forge import opened, spoiled
 
 A, B = 19 / 42 * (7 / 5) ** (1 / 3), 0.02328852830307032
 C = 20 / (3**20 * 7) * (7 / 5) ** (1 / 3) * math.exp(18.7)
@@ -433,9 +433,7 @@ FORGED = {
 @pytest.mark.parametrize("case", FORGED)
 def test_what_is_forged_is_denied(case, saved, tmp_path):
     change, reason = FORGED[case]
-    forged = opened(saved)
-    change(forged)
-    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
+    report = ls.recheck(spoiled(saved, change, tmp_path / "forged.zip"))
     assert report.verdict == "failed"
     assert reason in str(report)
 
@@ -462,9 +460,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_files_are_refused(case, saved, tmp_path):
-    forged = opened(saved)
-    BAD[case](forged)
-    assert ls.recheck(forged.seal().write(tmp_path / "forged.zip")).verdict == "bad file"
+    assert ls.recheck(spoiled(saved, BAD[case], tmp_path / "forged.zip")).verdict == "bad file"
 
 
 MADNESS = {
@@ -478,9 +474,7 @@ MADNESS = {
 
 @pytest.mark.parametrize("case", MADNESS)
 def test_files_that_ask_for_all_memory_fail_at_once(case, saved, tmp_path):
-    forged = opened(saved)
-    MADNESS[case](forged)
-    assert ls.recheck(forged.seal().write(tmp_path / "forged.zip")).verdict == "failed"
+    assert ls.recheck(spoiled(saved, MADNESS[case], tmp_path / "forged.zip")).verdict == "failed"
 
 
 def by_share(x, a):
