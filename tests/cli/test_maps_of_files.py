@@ -1,6 +1,7 @@
-"""`certify`, `atlas` and `explore` of a map in a Python file, FILE.py:NAME."""
+"""`certify`, `average`, `absorption`, `atlas` and `explore` of a map in a Python file, FILE.py:NAME."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -41,6 +42,10 @@ class Half(NamedTuple):
 
 def half(params, x, side):
     return params.slope * x, side, 0
+
+
+def halved(x):
+    return x / 2
 
 
 ls.register(Half, image=half)
@@ -214,4 +219,56 @@ def test_averages_under_noise_of_a_parameter(capfd, mymap):
         ("r=", "noise of r is ''"),
     ):
         code, _, err = run_of_file(capfd, *how, "--noise", noise)
+        assert (code, why in err) == (2, True), err
+
+
+# ----------------------------------------------------------------
+# `limitsets absorption`: where orbits of a noisy map end.
+
+
+def test_an_orbit_ends_as_surely_and_as_soon_as_in_closed_form(capfd, mymap):
+    # a step from x lands evenly in [x/2 - 1, x/2 + 1]: above 1 with probability x/4, below 0 with 1/2 - x/4; so p(x) =
+    # x/4 + p/2 with p the mean over [0, 1]: p = 1/4; and half of all orbits end at each step: 2 steps
+    how = ["absorption", f"{mymap}:halved", "--domain", "0:3", "--noise", "1", "--absorbing", "top=1:3"]
+    some = ["--starts", "0:0.5", "--starts", "0.5:1", "--cells", "300", "--steps", "20"]
+    code, out, _ = run_of_file(capfd, *how, *some, "--json", "--csv", "t.csv")
+    record = json.loads(out)
+    (least, most), (soonest, latest) = record["ever"]["top"].values(), record["mean"].values()
+    assert code == 0
+    assert 0.2499 < least <= 0.25 <= most < 0.2501
+    assert 1.9999 < soonest <= 2 <= latest < 2.0001
+    lo, hi = record["within"]["any"].values()
+    assert all(low <= 1 - 0.5**n <= high for n, (low, high) in enumerate(zip(lo, hi, strict=True)))
+    assert set(record) == set(documented("absorption"))
+    assert record["certificate"]["file"] == "halved.absorption.proof.zip"
+    Path(mymap).unlink()
+    assert ls.recheck("halved.absorption.proof.zip").verdict == "proved"
+
+
+def test_orbits_that_need_not_end_have_no_mean(capfd, mymap):
+    # |x| <= 0.2 leads to |x| <= 0.2
+    how = [
+        "--domain",
+        "-3:3",
+        "--noise",
+        "0.1",
+        "--absorbing",
+        "high=1:2",
+        "--starts",
+        "0:0.1",
+        "--cells",
+        "20",
+    ]
+    words = ["absorption", f"{mymap}:halved", *how, "--steps", "5", "--no-recheck"]
+    code, out, _ = run_of_file(capfd, *words)
+    assert code == 0
+    assert re.search(r"until an orbit ends: at least [\d.e+]+; nothing is proved from above", out)
+    assert "not rechecked" in out
+    for wrong, why in (
+        (["paper-designed"], "limitsets feed SCENE --brackets N"),
+        ([f"{mymap}:halved", "--noise", "1", "--domain", "0:3", "--absorbing", "1:3"], "NAME=LO:HI"),
+        ([f"{mymap}:halved", "--noise", "1", "--domain", "0:3", "--starts", "1"], "--starts: the box is '1'"),
+        ([f"{mymap}:halved", "--domain", "0:3"], "pass noise=e"),
+    ):
+        code, _, err = run_of_file(capfd, "absorption", *wrong)
         assert (code, why in err) == (2, True), err

@@ -29,6 +29,7 @@ NO_FIGURE = {
     "throw",
     "certify",
     "average",
+    "absorption",
     "recheck",
     "new",
     "check",

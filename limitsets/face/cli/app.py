@@ -18,7 +18,18 @@ from typing import Annotated, Any
 import typer
 
 from limitsets.base import InterruptedRun, LimitsetsError
-from limitsets.face.cli import analyse, average, cell, certify, design, feedback, margin, scenes, throw
+from limitsets.face.cli import (
+    absorption,
+    analyse,
+    average,
+    cell,
+    certify,
+    design,
+    feedback,
+    margin,
+    scenes,
+    throw,
+)
 from limitsets.face.cli.commands import COMMANDS
 
 app = typer.Typer(
@@ -48,7 +59,7 @@ def limitsets(
     """
 
 
-for file in (scenes, analyse, throw, certify, average, margin, design, cell, feedback):
+for file in (scenes, analyse, throw, certify, average, absorption, margin, design, cell, feedback):
     for command in COMMANDS[file.__name__]:
         # click would cut the summary where a line ends
         app.command(short_help=(command.__doc__ or "").partition("\n")[0])(command)

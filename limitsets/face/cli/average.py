@@ -74,7 +74,7 @@ def average(
             "map": chosen.lower,
             "grid": line,
             "upper": chosen.upper,
-            "noise": _noise(noise),
+            "noise": noise_of_words(noise),
         }
         file = with_ending(run.out or Path(f"{chosen.name}{KIND}.proof.zip"))
     else:
@@ -100,7 +100,7 @@ def average(
     return Answer(records_of(proof, written), words, shown, code=0 if proof.average else 1, about=about)
 
 
-def _noise(words: list[str] | None) -> dict[str, float] | None:
+def noise_of_words(words: list[str] | None) -> dict[str, float] | None:
     """Read what deviates; a number alone is of the landing."""
     given = [word if "=" in word else f"landing={word}" for word in words or []]
     noise = dict[str, float]()
