@@ -327,7 +327,10 @@ def scene():
 def proofs(scene, tmp_path_factory):
     folder = tmp_path_factory.mktemp("laid")
     found = {name: ls.certify(scene, laid=laid) for name, laid in (("good", GOOD), ("partly", PARTLY))}
-    return {name: (proof, proof.save(folder / f"{name}.proof.zip")) for name, proof in found.items()}
+    return {
+        name: (proof, proof.save(folder / f"{name}.proof.zip", recheck=False))
+        for name, proof in found.items()
+    }
 
 
 def forged(path, tmp_path, **entries):
@@ -438,7 +441,7 @@ def test_what_is_proved_of_some_cells_is_not_of_all(proofs, tmp_path):
     "goal",
     [
         {"stays_on_arm": True, "from_anywhere": True},
-        {"reaches": {"x": "16 in", "side": 2}},
+        pytest.param({"reaches": {"x": "16 in", "side": 2}}, marks=pytest.mark.repeats),
         {"reaches": {"x": "16 in", "side": 2}, "from_anywhere": True},
         {"flip_order": [0, 1, 2], "from_anywhere": True},
         {"attracts_all": True},
