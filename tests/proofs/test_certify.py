@@ -12,10 +12,9 @@ from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.feeder.scene.units import parse
 from limitsets.proofs.prover.attraction import attraction
 from limitsets.proofs.prover.certificate import arrays_of
-from limitsets.proofs.prover.cover import cover, targets
+from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.parameters import parameter_box
-from limitsets.proofs.prover.thinning import _Largest, perron_frobenius_bound, slopes
-from limitsets.systems.cells import CellSet
+from limitsets.proofs.prover.thinning import _Largest, perron_frobenius_bound
 from limitsets.systems.maps import images
 from tests.test_paper import LIMIT_SETS, THRESHOLDS
 from tests.thrower import reference
@@ -385,60 +384,19 @@ def test_effects_that_are_not_enclosed_are_refused_rather_than_left_out():
         ls.certify(ls.load(tree))
 
 
-# ----------------------------------------------------------------
-# The bounds of thinning out, against what their definition says cell by cell.
+@pytest.mark.parametrize(("x", "stay"), [(22.65, False), (22.7, True)])
+def test_how_bounds_of_thinning_go_on_is_known_before_they_are_there(monkeypatch, x, stay):
+    """Orbits leave the attracting cells before x by side 2 alone: slowly, and beyond 22.7 in not within 4000 throws.
 
-
-def throws_by_definition(found, left, steep):
-    """After each throw in turn: the bounds, from 1 everywhere, as number 8 of docs/certificates.md has them."""
-    new = left & ~np.append(False, left[:-1] & ~np.isin(np.arange(1, left.size), found.grid.offset))
-    pairs = [
-        (to, 2 * run + branch, cell)
-        for branch in (0, 1)
-        for cell, (run, (first, last)) in enumerate(zip(np.cumsum(new), targets(found, branch), strict=True))
-        for to in range(first, last + 1)
-        if first >= 0 and left[cell] and left[to]
-    ]
-    slots, slot = np.unique([pair[:2] for pair in pairs], axis=0, return_inverse=True)
-    source, bound = np.array([cell for *_, cell in pairs]), left.astype(float)
-    while True:
-        most = np.zeros(len(slots))
-        np.maximum.at(most, slot.ravel(), (bound / steep)[source])
-        bound = np.bincount(slots[:, 0], most, minlength=left.size)
-        yield bound
-
-
-@pytest.fixture
-def asked(monkeypatch):
-    """How often bounds are thrown."""
+    How many throws are enough the checker counts again, of every certificate that is saved.
+    """
     plain, calls = _Largest.__call__, []
     monkeypatch.setattr(_Largest, "__call__", lambda self, values: calls.append(1) or plain(self, values))
-    return calls
-
-
-def slowly_left(x):
-    """The cells that attract before x, which orbits leave by side 2 alone, and the slopes on them."""
     found = cover(parameter_box(ls.load("paper-designed")), 1000, {2: [x]})
     left = attraction(found).component >= 0
     left[found.grid.of_side(2)] &= found.grid.edges[2][0][1:] <= x
-    return found, left, slopes(found, CellSet(found.grid, left))
-
-
-def test_bounds_that_fall_slowly_are_known_to_fall_before_they_are_below_1(asked):
-    found, left, steep = slowly_left(22.65)
     throws, thick, reason = perron_frobenius_bound(found, left)
-    assert (thick.any(), reason) == (False, "")
-    bounds = throws_by_definition(found, left, steep)
-    needed = next(n for n, bound in enumerate(bounds, 1) if bound.max() < 1.0)
-    assert 5 * len(asked) < needed <= throws <= 4000
-
-
-def test_bounds_that_stay_are_given_up_soon(asked):
-    """Beyond 22.7 in there are so few places that bounds by 1000 cells a side do not fall in 4000 throws."""
-    found, left, steep = slowly_left(22.7)
-    _, thick, reason = perron_frobenius_bound(found, left)
-    assert (thick == left).all()
-    assert "not proved to thin out" in reason
-    assert len(asked) < 200
-    bounds = throws_by_definition(found, left, steep)
-    assert min(bound.max() for _, bound in zip(range(4000), bounds, strict=False)) >= 1.0
+    assert (thick == (left & stay)).all()
+    assert ("not proved to thin out" in reason) is stay
+    assert len(calls) < (200 if stay else throws / 5)
+    assert stay or throws <= 4000

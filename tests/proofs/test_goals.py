@@ -10,7 +10,7 @@ import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.feeder.goals import OrientedBeyond, Reaches, StaysOnArm
 from limitsets.feeder.scene.laid import laid_goal, read_laid
-from limitsets.proofs.prover.goals import reaches, sentence
+from limitsets.proofs.prover.goals import sentence
 from limitsets.proofs.prover.query import Query
 from limitsets.systems.maps import advance
 from tests.proofs import forge
@@ -201,19 +201,6 @@ def test_every_orbit_gets_as_far_as_none_fails_to(tmp_path, anywhere):
     assert arrive(proof.scene, x, side, claim.section["throws"] + 1, 20.0).all()
 
 
-def test_what_the_first_cells_miss_is_sought_on_finer_ones(monkeypatch):
-    """2048 cells a side are made to miss something, where landings do not scatter."""
-    known = reaches.common
-
-    def missing(attraction, *, anywhere):
-        few = anywhere and attraction.cover.grid.n_cells < 3 * 4096
-        return "too few" if few else known(attraction, anywhere=anywhere)
-
-    monkeypatch.setattr(reaches, "common", missing)
-    goal = {"reaches": {"x": "12 in", "side": 2, "every_orbit": True}, "from_anywhere": True}
-    assert asked(scene_with(goal))[1].verdict == "proved"
-
-
 def test_every_orbit_is_refuted_by_a_periodic_one_with_noise_as_well():
     """Without: test_refutations.py."""
     at = PERIOD_13_UP_TO + 0.002
@@ -367,18 +354,6 @@ def test_the_goal_is_proved_of_the_starts_laid_down_though_others_leave(scene, p
     assert (report.verdict, report.open) == ("proved", 0.0)
     assert report.starts == {"within": {"0": [(11.0, 14.0)], "2": [(5.0, 17.0)]}}
     assert "11.0 <= x <= 14.0 on side 0" in report.statement[0]
-
-
-def test_thrown_parts_do_what_is_proved(scene, proofs):
-    x, side = drawn(GOOD)
-    for _ in range(60):
-        x, side, code, _ = advance(scene.map, x, side, 5)
-        assert (code >= 0).all()
-    assert not ((x > 16.2) & (side != 2)).any()
-    assert ((x > 16.2) & (side == 2)).any()
-    # and those that are laid down where nothing is claimed do leave
-    x, side = drawn({1: [(3.0, 8.0)]})
-    assert (advance(scene.map, x, side, 300)[2] < 0).mean() > 0.5
 
 
 @pytest.mark.sweep

@@ -145,8 +145,23 @@ class Spoiler:
     def put(self, name, place, value):
         (self.A[name] if isinstance(name, str) else name)[place] = value
 
+    def add(self, name, place, value):
+        self.A[name][place] += value
+
+    def draw(self, *values):
+        return self.rng.choice(values)
+
     def small(self, least, most):
         return 10 ** self.rng.uniform(least, most)
+
+    def off(self, number, least, most):
+        return number * (1 + self.sign * self.small(least, most))
+
+    def steeper(self, least):
+        return float(1 + (float.fromhex(least) - 1) * self.rng.uniform(1.45, 3)).hex()
+
+    def change(self, claim, word, change):
+        self.sections[claim][word] = change(self.sections[claim][word])
 
     def where(self, cell):
         side = int(np.searchsorted(self.starts, cell, "right") - 1)
@@ -269,6 +284,7 @@ def steeper_near_joint(s):
     s.near["q"] = s.rng.choice([q, 1.0, 0.5, 1e300]).hex()
 
 
+NEARER = {"designed": 19.7, "small": 12.8, "above": 15.0}  # within what orbits reach
 # Ways to make the statement or its proof false.
 WAYS = {
     "rank too low": lambda s: s.put("rank", (c := s.pick(~s.inside)), s.A["rank"][s.targets(c)].max()),
@@ -285,55 +301,37 @@ WAYS = {
     "edge short of arm": lambda s: s.put(s.edges, -1, s.edges[-1] * (1 - 1e-9)),
     "edges swapped": lambda s: s.swap(s.edges, (k := s.rng.randrange(len(s.edges) - 1)), k + 1),
     "target narrowed": target_narrowed,
-    "target on another side": lambda s: s.put(
-        "jog", (c := s.pick(s.A["jog"][:, 0] >= s.starts[1])), s.A["jog"][c] - s.starts[1]
-    ),
+    "target on another side": lambda s: s.add("jog", s.pick(s.A["jog"][:, 0] >= s.starts[1]), -s.starts[1]),
     "target out of range": lambda s: s.put(
-        "flip",
-        (s.pick(s.A["flip"][:, 0] >= 0), s.end),
-        s.rng.choice([2**31 - 1, -(2**31), len(s.inside), -2]),
+        "flip", (s.pick(s.A["flip"][:, 0] >= 0), s.end), s.draw(2**31 - 1, -(2**31), len(s.inside), -2)
     ),
     "component cell dropped": component_cell_dropped,
     "component cell added": component_cell_added,
     "component renamed": lambda s: s.put("component", s.pick(s.inside), 1),
     "parameter shifted": parameter_shifted,
-    "other speed": lambda s: s.other_scene(
-        "throw", "kappa", f"{s.m.kappa * (1 + s.sign * s.small(-7, -2))!r} in"
-    ),
+    "other speed": lambda s: s.other_scene("throw", "kappa", f"{s.off(s.m.kappa, -7, -2)!r} in"),
     "other centre": lambda s: s.other_scene(
-        *("part", "mass", "center", "along"), f"{s.m.a[2] + s.sign * s.small(-6, -2)!r} in"
+        "part", "mass", "center", "along", f"{s.m.a[2] + s.sign * s.small(-6, -2)!r} in"
     ),
     "other height": other_height,
     "longer arm": lambda s: s.other_scene("arm", "length", f"{s.m.arm + s.small(-9, 1)!r} in"),
-    "other unit": lambda s: s.other_scene(
-        "throw", "kappa", f"{s.m.kappa!r} {s.rng.choice(['cm', 'ft', 'm'])}"
-    ),
+    "other unit": lambda s: s.other_scene("throw", "kappa", f"{s.m.kappa!r} {s.draw('cm', 'ft', 'm')}"),
     "other flight": other_flight,
     "noise added": noise_added,
-    "fewer throws": lambda s: s.sections["attracts-all"].update(
-        max_rank=s.rng.randrange(int(s.A["rank"].max()))
-    ),
+    "fewer throws": lambda s: s.change("attracts-all", "max_rank", s.rng.randrange),
     "steeper near joint": steeper_near_joint,
-    "steeper": lambda s: s.sections["expanding"].update(
-        least_slope=float(
-            1 + (float.fromhex(s.sections["expanding"]["least_slope"]) - 1) * s.rng.uniform(1.45, 3)
-        ).hex()
-    ),
-    "goal nearer": lambda s: s.goal.update(
-        x=f"{s.rng.uniform(1, {'designed': 19.7, 'small': 12.8, 'above': 15}[s.model]):.6f} in"
-    ),
+    "steeper": lambda s: s.change("expanding", "least_slope", s.steeper),
+    "goal nearer": lambda s: s.goal.update(x=f"{s.rng.uniform(1, NEARER[s.model]):.6f} in"),
     "goal on another side": lambda s: s.goal.update(side=s.rng.randrange(2)),
     "another goal": lambda s: s.goal.update(kind="reaches"),
     "sides swapped": lambda s: s.swap(s.f.arrays, f"0.edges.{s.side}", f"0.edges.{(s.side + 1) % 3}"),
     "arrays swapped": lambda s: s.swap(s.f.arrays, "0.jog", "0.flip"),
     "value not finite": lambda s: s.put(
-        s.A[s.rng.choice(["phi", "edges.1"])].reshape(-1),
-        s.rng.randrange(50),
-        s.rng.choice([math.nan, math.inf, -math.inf]),
+        s.A[s.draw("phi", "edges.1")].reshape(-1), s.rng.randrange(50), s.draw(math.nan, math.inf, -math.inf)
     ),
     "of another type": lambda s: s.cast(
         ["0.phi", "0.jog", "0.branch", "0.rank"],
-        lambda array: array.astype(s.rng.choice(["<f4", "<i8", ">i4", "<i2"])),
+        lambda array: array.astype(s.draw("<f4", "<i8", ">i4", "<i2")),
     ),
     "of another shape": lambda s: s.cast(
         ["0.phi", "0.jog", "0.branch", "0.rank", "0.edges.1"], lambda array: array[:-1]
@@ -656,3 +654,11 @@ def test_the_march_finds_the_smallest_root_where_f_is_not_concave():
         refused += len(beyond)
         assert not any(map(proved, beyond))
     assert refused > 40
+
+
+def test_range_max_is_the_maximum():
+    rng = np.random.default_rng(2)
+    values, first = rng.integers(-5, 1000, 700).astype(np.int32), rng.integers(0, 700, 3000)
+    last = np.minimum(699, first + (rng.exponential(60, 3000)).astype(int))
+    want = [values[a : b + 1].max() for a, b in zip(first, last, strict=True)]
+    assert (checker.labels.range_max(values, first, last) == want).all()

@@ -11,13 +11,11 @@ import pytest
 
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
-from limitsets.proofs.prover.attraction import attraction
-from limitsets.proofs.prover.cover import cover
 from limitsets.proofs.prover.parameters import parameter_box
 from tests.inverse import exact
 from tests.plates import LEAD_QUAD
 from tests.proofs import forge
-from tests.proofs.test_certify import landed_where_the_cells_say, require_rechecked, thrown_again, verdicts
+from tests.proofs.test_certify import require_rechecked, thrown_again, verdicts
 from tests.proofs.test_recheck import checker, verdict
 from tests.thrower import reference
 
@@ -308,19 +306,6 @@ def test_a_landing_beyond_the_arm_counts_as_leaving():
 def test_no_noise_of_the_landing_place_is_none():
     proof = ls.certify("paper-designed", noise={"landing.x": "0 in"})
     assert verdicts(proof) == {"attracts-all": "proved", "goal": "proved"}
-
-
-def test_random_points_land_where_the_cells_say_with_all_noise_together():
-    rng = np.random.default_rng(4)
-    scene = tilted_scene()
-    noise = {"throw.speed": "0.2 %", "gravity.tilt": "0.1 deg", "landing.x": "0.5 mm"}
-    found = attraction(cover(parameter_box(scene, noise=noise), 300))
-    met = 0
-    for _ in range(10):
-        speed, tilt = rng.uniform(-0.002, 0.002), math.radians(30 + rng.uniform(-0.1, 0.1))
-        thrown = scene.map._replace(kappa=scene.kappa * 2 * math.sin(tilt) / (1 + speed) ** 2)
-        met += landed_where_the_cells_say(found, thrown, rng, 500, 0.05 / 2.54)
-    assert met > 5_000
 
 
 # ---------------------------------------------------------------- the tilt
