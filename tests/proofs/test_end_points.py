@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from functools import cache
+from types import SimpleNamespace
 
 import mpmath
 import numpy as np
@@ -18,6 +19,8 @@ from limitsets.proofs.prover.cover import Cover, cover
 from limitsets.proofs.prover.end_points import proved_ends
 from limitsets.proofs.prover.orbits import proved_cycle, proved_cycles
 from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.proofs.prover.proof import Claim
+from limitsets.proofs.prover.query import weakest_of
 from limitsets.systems.cells import Domain, grid
 from limitsets.systems.graph.images.enclosed import enclosures
 from limitsets.systems.sets import cycles_of
@@ -123,6 +126,22 @@ def test_cells_without_the_first_or_last_are_not_trapping(which):
         component[first + np.flatnonzero(component[first:] >= 0)[which]] = -1
     fewer = dataclasses.replace(found, component=component)
     assert trapping(fewer).startswith("not interior to the component is the image of side")
+
+
+def test_an_image_that_ends_on_the_border_is_not_interior():
+    found = cells_of("paper-designed")
+    (lo, _), *_ = [pair for (to, _), pair in found.cover.images[1].hulls.items() if to == 2]
+    least = np.flatnonzero(found.component[found.cover.grid.of_side(1)] >= 0)[0]
+    edges = found.cover.grid.edges[2][0]
+    bottom = edges[np.flatnonzero(found.component[found.cover.grid.of_side(2)] >= 0)[0]]
+    before = lo[least]
+    try:
+        lo[least] = np.nextafter(bottom, np.inf)
+        assert trapping(found) == ""
+        lo[least] = bottom
+        assert "side 1" in trapping(found)
+    finally:
+        lo[least] = before
 
 
 # ---------------------------------------------------------------- as claims
@@ -353,3 +372,43 @@ def test_a_repelling_cycle_off_the_attractor_takes_a_set_of_length_zero():
             path = ls.orbit(scene.map, float(x), side, 400)
             (last,) = found.cover.grid.index([path.x[-1]], int(path.side[-1]))
             assert found.component[last] >= 0
+
+
+def test_pieces_of_a_tolerance_claim_the_fewest_starts():
+    def claim(starts, share, **section):
+        return Claim("goal", "proved", "", {"kind": "stays_on_arm", "starts": starts} | section, starts=starts,
+                     shares={"share": share, "leaves": 0.0, "creeps": 0.0, "open": 1.0 - share})  # fmt: skip
+
+    near = {"0": {"q": (1.5).hex()}}
+    far = {"0": {"q": (1.25).hex()}}
+    every = claim("every", 1.0, near_joint=near)
+    almost = claim("almost-every", 1.0, thinning=7, near_joint=far)
+
+    def cells(first, *, counts=True):
+        def shares_from(section):  # as much as the starts claimed leave of 0 to 10
+            share = 1.0 - 0.1 * float.fromhex(section["starts"]["from"]["0"])
+            return {"share": share, "leaves": 0.0, "creeps": 0.0, "open": 1.0 - share}, counts
+
+        covered = SimpleNamespace(grid=SimpleNamespace(edges=[(np.array([first, 9.0]),)]))
+        return SimpleNamespace(cover=covered, shares_from=shares_from)
+
+    joined = weakest_of([every, almost], [cells(1.5), cells(3.5)])
+    assert joined.starts == joined.section["starts"] == "almost-every"
+    assert joined.section["thinning"] == 7
+    assert joined.section["near_joint"] == far
+    some = claim({"from": {"0": 2.0}}, 0.9, lost={"0": (1.9).hex()})
+    more = claim({"from": {"0": 2.5}}, 0.8, lost={"0": (1.8).hex()})
+    joined = weakest_of([some, more], [cells(1.5), cells(2.0)])
+    assert joined.starts == {"from": {"0": 2.5}}
+    assert joined.section["starts"] == {"from": {"0": (2.5).hex()}}
+    assert joined.section["lost"] == {"0": (1.8).hex()}
+    assert joined.shares["share"] == 0.75
+    assert joined.verdict == "proved"
+    apart = weakest_of([some, more], [cells(1.5), cells(2.0, counts=False)])
+    assert apart.verdict == "proved-on-cells"  # of the starts of both together, less than of each alone
+    assert "of 25 % of the starts the same is not proved for all" in apart.reason
+    joined = weakest_of([every, some], [cells(2.25), cells(1.5)])
+    # before its cells nothing is claimed of the first piece any more
+    assert joined.starts == {"from": {"0": 2.25}}
+    assert "near_joint" not in joined.section
+    assert "lost" not in joined.section  # of every start it is proved, there, that none is

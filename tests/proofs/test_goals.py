@@ -10,7 +10,7 @@ import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.feeder.goals import OrientedBeyond, Reaches, StaysOnArm
 from limitsets.feeder.scene.laid import laid_goal, read_laid
-from limitsets.proofs.prover.goals import sentence
+from limitsets.proofs.prover.goals import reaches, sentence
 from limitsets.proofs.prover.query import Query
 from limitsets.systems.maps import advance
 from tests.proofs import forge
@@ -199,6 +199,19 @@ def test_every_orbit_gets_as_far_as_none_fails_to(tmp_path, anywhere):
         x = np.concatenate([x, *(rng.uniform(lo, 28.0, 300) for lo in begin)])
         side = np.concatenate([side, np.repeat([0, 1, 2], 300)])
     assert arrive(proof.scene, x, side, claim.section["throws"] + 1, 20.0).all()
+
+
+def test_what_the_first_cells_miss_is_sought_on_finer_ones(monkeypatch):
+    """2048 cells a side are made to miss something, where landings do not scatter."""
+    known = reaches.common
+
+    def missing(attraction, *, anywhere):
+        few = anywhere and attraction.cover.grid.n_cells < 3 * 4096
+        return "too few" if few else known(attraction, anywhere=anywhere)
+
+    monkeypatch.setattr(reaches, "common", missing)
+    goal = {"reaches": {"x": "12 in", "side": 2, "every_orbit": True}, "from_anywhere": True}
+    assert asked(scene_with(goal))[1].verdict == "proved"
 
 
 def test_every_orbit_is_refuted_by_a_periodic_one_with_noise_as_well():
