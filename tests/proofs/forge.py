@@ -216,13 +216,7 @@ def leave_out(*path: object) -> Callable[[Forged], None]:
 
 def rewritten(path: Path, target: Path, change: Callable[[dict], None]) -> Path:
     """The same certificate with another header."""
-    with zipfile.ZipFile(path) as file:
-        header, arrays = json.loads(file.read("header.json")), file.read("arrays.npz")
-    change(header)
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as file:
-        file.writestr("header.json", json.dumps(header))
-        file.writestr("arrays.npz", arrays)
-    return target
+    return spoiled(path, lambda f: change(f.header), target)
 
 
 def with_section(path: Path, target: Path, change: Callable[[dict], None]) -> Path:
@@ -394,9 +388,9 @@ def forge(
     return Forged(header, arrays).seal()
 
 
-# ------------------------------------------------------------------------------ end points, and periodic orbits
+# ------------------------------------------------------------------------------------------------ periodic orbits
 
-# Critical points are cut out by this much, and images moved outward or inward by it; cycles get as much room [in].
+# The room of cycles [in].
 GAP = 1e-10
 
 
@@ -412,61 +406,6 @@ def attracting(f: Forged) -> list[list[tuple[float, float]]]:
             [(float(edges[a]), float(edges[b])) for a, b in np.flatnonzero(np.diff(own)).reshape(-1, 2)]
         )
     return spans
-
-
-def pieces_of(m: Plain, spans: list) -> list[tuple]:
-    """Cut the spans where the decision changes: side, ends, branch (2: either), sign of the slope."""
-    pieces = []
-    for i, parts in enumerate(spans):
-        for lo, hi in parts:
-            x = np.linspace(lo, hi, 4001)
-            assert (m.slope(i, x, m.kappa) > 0).all()
-            flips = m.decision(i, x, m.kappa) > 0
-            borders, branches = [lo], [int(flips[0])]
-            for k in np.flatnonzero(flips[1:] != flips[:-1]):
-                a, b = x[k], x[k + 1]
-                for _ in range(60):
-                    middle = 0.5 * (a + b)
-                    same = (m.decision(i, np.array([middle]), m.kappa)[0] > 0) == flips[k]
-                    a, b = (middle, b) if same else (a, middle)
-                borders += [float(a) - GAP, float(a) + GAP]
-                branches += [2, int(flips[k + 1])]
-            borders.append(hi)
-            pieces += [(i, borders[k], borders[k + 1], branch, 1) for k, branch in enumerate(branches)]
-    return pieces
-
-
-def joined(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    union: list[tuple[float, float]] = []
-    for lo, hi in sorted(intervals):
-        if union and lo <= union[-1][1]:
-            union[-1] = (union[-1][0], max(hi, union[-1][1]))
-        else:
-            union.append((lo, hi))
-    return union
-
-
-def at_rest(m: Plain, union: list, pieces: list[tuple], grow: float) -> tuple[list, int]:
-    """Intersect with the image, moved outward (grow > 0, by all branches) or inward, until nothing moves."""
-    for count in range(1, 100):
-        images: list = [[], [], []]
-        for i, a, b, branch, _ in pieces:
-            for lo, hi in [(max(a, lo), min(b, hi)) for lo, hi in union[i] if lo <= b and hi >= a]:
-                for throw in {0: (0,), 1: (1,), 2: (0, 1) if grow > 0 else ()}[branch]:
-                    x0, x1 = (m.jog, m.flip)[throw](i, np.array([lo, hi]), m.kappa).tolist()
-                    if x0 - grow <= x1 + grow:
-                        images[(i + throw) % 3].append((x0 - grow, x1 + grow))
-        pairs = (
-            [(*a, *b) for a in one for b in joined(other)] for one, other in zip(union, images, strict=True)
-        )
-        smaller = [
-            joined([(max(a, c), min(b, d)) for a, b, c, d in side if max(a, c) <= min(b, d)])
-            for side in pairs
-        ]
-        if smaller == union:
-            return union, count
-        union = smaller
-    raise AssertionError
 
 
 def throw(m: Plain, side: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -546,26 +485,3 @@ def average_changed(word: str, change: Callable[[np.ndarray], np.ndarray]) -> Ca
         f.arrays[name] = np.ascontiguousarray(change(f.arrays[name]))
 
     return forged
-
-
-def with_sets(f: Forged, model: str) -> Forged:
-    """The claims of end points and of some periodic orbits besides "invariant", and no others."""
-    m, spans = Plain(scene(model)), attracting(f)
-    pieces = pieces_of(m, spans)
-    outer, images = at_rest(m, spans, pieces, GAP)
-    inner, _ = at_rest(m, outer, pieces, -GAP)
-    ends = [
-        {"side": i, "which": which, "outer": out.hex(), "inner": within.hex()}
-        for i in range(3)
-        for one, other in zip(outer[i], inner[i], strict=True)
-        for which, out, within in zip(("lo", "hi"), one, other, strict=True)
-    ]
-    written = [[i, lo.hex(), hi.hex(), branch, sign] for i, lo, hi, branch, sign in pieces]
-    sections = {
-        "invariant": {},
-        "end-points": {"images": images, "ends": ends, "pieces": written},
-        "cycles": {"cycles": cycles_of(m, spans, 2), "complete": False},
-    }
-    f = f.copy()
-    f.header["claims"] = [{"claim": claim, "section": section} for claim, section in sections.items()]
-    return f

@@ -16,12 +16,11 @@ from limitsets.proofs.prover import cover as covers, goals
 from limitsets.proofs.prover.attraction import attraction, trapping
 from limitsets.proofs.prover.certifying import certify
 from limitsets.proofs.prover.cover import Cover, cover
-from limitsets.proofs.prover.end_points import UnionImages, proved_ends, proved_pieces_of
-from limitsets.proofs.prover.orbits import follow, proved_cycle, proved_cycles
+from limitsets.proofs.prover.end_points import proved_ends
+from limitsets.proofs.prover.orbits import proved_cycle, proved_cycles
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.proofs.prover.proof import Claim
 from limitsets.proofs.prover.query import weakest_of
-from limitsets.proofs.prover.thinning import perron_frobenius_bound
 from limitsets.systems.cells import Domain, grid
 from limitsets.systems.graph.images.enclosed import enclosures
 from limitsets.systems.sets import cycles_of
@@ -32,7 +31,7 @@ from tests.sets.part import Part
 from tests.test_paper import LIMIT_SETS
 
 # ----------------------------------------------------------------
-# Proved end points of limit sets: against 40-digit orbits, sampled images, orbits, and maps that contract.
+# Proved end points of limit sets: against 40-digit orbits, long orbits, and maps that contract.
 
 
 # Sides and places of the critical points that the limit set approaches.
@@ -102,58 +101,6 @@ def test_a_long_orbit_stays_inside_and_comes_near_the_ends(name):
         assert held == mine.size
 
 
-def unions(name, seed):
-    """Some intervals of the attracting cells."""
-    rng = np.random.default_rng(seed)
-    found = cells_of(name)
-    for _ in range(6):
-        yield {
-            side: sorted(tuple(np.sort(rng.uniform(lo, hi, 2)).tolist()) for lo, hi in parts)
-            for side, parts in found.cells.extents().items()
-        }
-
-
-def images_of(name):
-    found = cells_of(name)
-    tiles = {}
-    for side, (edges,) in enumerate(found.cover.grid.edges):
-        mine = np.flatnonzero(found.component[found.cover.grid.of_side(side)] >= 0)
-        tiles[side] = proved_pieces_of(found.cover.box, side, edges[mine], edges[mine + 1])
-    return UnionImages(found.cover.box, tiles)
-
-
-@pytest.mark.parametrize("name", ["paper-initial", "paper-designed-small-angle"])
-def test_images_of_intervals_against_sampled_ones(name):
-    scene, images, step = ls.load(name), images_of(name), 1e-3
-    assert sum(map(len, images.tiles.values())) < 20  # cut where the branch changes, not elsewhere
-    for union in unions(name, 5):
-        outer, inner = images.outward(union), images.inward(union)
-        sampled = {side: [] for side in range(3)}
-        for side, parts in union.items():
-            for lo, hi in parts:
-                got = ls.maps.images(scene.map, np.linspace(lo, hi, int((hi - lo) / step) + 2), side)
-                for to in range(3):
-                    sampled[to].append(got.x[got.side == to])
-        for to in range(3):
-            x = np.sort(np.concatenate(sampled[to]))
-            held = np.zeros(x.size, dtype=bool)
-            for lo, hi in outer.get(to, []):
-                held |= (x > lo) & (x < hi)
-            assert held.all()
-            for lo, hi in inner.get(to, []):
-                assert np.diff(x[(x > lo) & (x < hi)], prepend=lo, append=hi).max() < 2.0 * step
-
-
-def test_noise_widens_the_brackets_and_keeps_their_order():
-    exact, noisy = ends_of("paper-designed"), ends_of("paper-designed", "0.1 %")
-    assert noisy.reason == ""
-    for one, other in zip(exact.ends, noisy.ends, strict=True):
-        away = 1.0 if one.which == "hi" else -1.0
-        assert away * (other.outer - one.outer) > 0.0
-        assert away * (one.inner - other.inner) > 0.0
-        assert abs(other.outer - other.inner) < 0.2
-
-
 def test_nothing_is_claimed_to_be_inside_where_the_map_contracts():
     scene = ls.load("paper-designed").with_values(CONTRACTING)
     found = proved_ends(attraction(cover(parameter_box(scene), 2048)))
@@ -161,14 +108,6 @@ def test_nothing_is_claimed_to_be_inside_where_the_map_contracts():
     assert found.width == np.inf
     assert all(end.inner is None for end in found.ends)
     assert all(hi - lo < 1e-9 for parts in found.extents.values() for (lo, _), (_, hi) in parts)
-
-
-def test_without_attracting_cells_there_are_no_ends():
-    found = cells_of("paper-designed")
-    none = dataclasses.replace(found, component=np.full_like(found.component, -1))
-    assert proved_ends(none).ends == ()
-    assert proved_ends(none).reason == "there are no attracting cells"
-    assert trapping(none) == "there are no attracting cells"
 
 
 # ---------------------------------------------------------------- trapping
@@ -216,7 +155,7 @@ def test_a_tolerance_of_end_points_and_noise_of_cycles_are_refused():
 
 
 # ----------------------------------------------------------------
-# Proved periodic orbits: against orbits at 40 digits, multipliers on paper, and orbits that are none.
+# Proved periodic orbits: against orbits at 40 digits, and multipliers on paper; forged ones: test_recheck_sets.py.
 
 
 @cache
@@ -285,48 +224,20 @@ def test_orbits_that_attract():
     assert np.abs(path.x[-3:] - np.roll(found.cycles[1].lo, -int(path.side[-3]))).max() < 1e-9
 
 
-# ---------------------------------------------------------------- what is none
-
-
-def seven():
-    scene = ls.load("paper-designed")
-    return cycles_of(scene.map, cells_of("paper-designed").cells.extents(), scene.domain, 7)[0]
-
-
-def test_an_orbit_run_twice_has_a_smaller_period():
-    one = seven()
-    twice = dataclasses.replace(
-        one, x=np.tile(one.x, 2), side=np.tile(one.side, 2), branches=np.tile(one.branches, 2)
-    )
-    assert proved_cycle(cells_of("paper-designed").cover.box, twice) == "its period may be smaller"
-
-
-def test_a_point_beside_the_orbit_is_none():
-    one = seven()
-    beside = dataclasses.replace(one, x=one.x + 1e-3)
-    assert "opposite signs" in proved_cycle(cells_of("paper-designed").cover.box, beside)
-
-
-def test_an_itinerary_the_map_does_not_take_is_none():
-    # two flips and eleven jogs: from the fixed point of that itinerary the part jogs once more
+def test_what_is_no_orbit_is_not_proved():
+    """Run twice; beside it; and two flips, eleven jogs, a flip, from whose fixed point the part jogs once more."""
     scene, box = ls.load("paper-designed"), cells_of("paper-designed").cover.box
+    one = cycles_of(scene.map, cells_of("paper-designed").cells.extents(), scene.domain, 7)[0]
     word = np.array([1, 1, *[0] * 11, 1])
-
-    def gap(x):
-        return float(ls.maps.along(scene.map, [x], 0, word)[0][0]) - x
-
-    x = np.full(word.size, brentq(gap, 6.0, 26.0, xtol=1e-13))
-    forced = dataclasses.replace(seven(), x=x, side=np.zeros(word.size, np.int64), branches=word)
-    assert proved_cycle(box, forced) == "a decision along it is not proved"
-
-
-def test_follow_stops_where_there_is_no_image():
-    box = cells_of("paper-designed").cover.box
-    below = float(box.lo.a[0]) - 1.0
-    orbit = follow(box, below, below, 0, [0, 0])
-    assert orbit.lo.size == 1
-    assert orbit.decided.size == 0
-    assert math.isnan(orbit.slope[0])
+    fixed = brentq(lambda x: float(ls.maps.along(scene.map, [x], 0, word)[0][0]) - x, 6.0, 26.0, xtol=1e-13)
+    nowhere = {"x": np.full(14, fixed), "side": np.zeros(14, np.int64), "branches": word}
+    twice = {name: np.tile(getattr(one, name), 2) for name in ("x", "side", "branches")}
+    for change, words in (
+        (twice, "its period may be smaller"),
+        ({"x": one.x + 1e-3}, "opposite signs"),
+        (nowhere, "a decision along it is not proved"),
+    ):
+        assert words in proved_cycle(box, dataclasses.replace(one, **change))
 
 
 # ----------------------------------------------------------------
@@ -501,12 +412,3 @@ def test_pieces_of_a_tolerance_claim_the_fewest_starts():
     assert joined.starts == {"from": {"0": 2.25}}
     assert "near_joint" not in joined.section
     assert "lost" not in joined.section  # of every start it is proved, there, that none is
-
-
-def test_starts_next_to_a_fixed_point_that_attracts_do_not_thin_out():
-    found = attraction_of(ls.load(FOUR_GON), 256)
-    (there,) = found.cover.grid.index([274.729], 3)
-    cells = np.arange(found.component.size) == there  # its jogs stay in it, with slope 0.519
-    result = perron_frobenius_bound(found.cover, cells)
-    assert result.thick[there]
-    assert result.reason

@@ -11,7 +11,6 @@ import struct
 import sys
 import time
 import zipfile
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -120,243 +119,266 @@ def test_the_other_models_are_proved(tmp_path, model):
 # ------------------------------------------------------------------------------------------- what is made false
 
 
-def pick(rng, mask):
-    cells = np.flatnonzero(mask)
-    return int(cells[rng.randrange(len(cells))])
-
-
 class Spoiler:
-    """Ways to make the statement or its proof false; each takes a copy of a right certificate, and a generator."""
+    """A copy of a right certificate, and what is drawn of it at random: a side, a cell, an end, a sign."""
 
     def __init__(self, f, model, rng):
-        self.f, self.rng, self.A = f, rng, {name[2:]: array for name, array in f.arrays.items()}
+        self.f, self.model, self.rng = f, model, rng
+        self.A = {name[2:]: array for name, array in f.arrays.items()}
         self.m = forge.Plain(forge.scene(model))
         self.sections = {claim["claim"]: claim["section"] for claim in f.header["claims"]}
+        self.goal, nears = self.sections["goal"], self.sections["attracts-all"]["near_joint"]
         self.starts = np.cumsum([0] + [len(self.A[f"edges.{i}"]) - 1 for i in range(3)])
-        self.inside = self.A["component"] >= 0
-        self.scene = f.header["boxes"][0]["scene"]
+        self.inside, self.branch = self.A["component"] >= 0, self.A["branch"]
         self.parameters = f.header["boxes"][0]["parameters"]
+        self.side, self.cell, self.end = (rng.randrange(count) for count in (3, len(self.inside), 2))
+        self.edges, self.near, self.sign = (
+            self.A[f"edges.{self.side}"],
+            nears[str(self.side)],
+            rng.choice([-1, 1]),
+        )
+
+    def pick(self, mask):
+        cells = np.flatnonzero(mask)
+        return int(cells[self.rng.randrange(len(cells))])
+
+    def put(self, name, place, value):
+        (self.A[name] if isinstance(name, str) else name)[place] = value
+
+    def add(self, name, place, value):
+        self.A[name][place] += value
+
+    def draw(self, *values):
+        return self.rng.choice(values)
+
+    def small(self, least, most):
+        return 10 ** self.rng.uniform(least, most)
+
+    def off(self, number, least, most):
+        return number * (1 + self.sign * self.small(least, most))
+
+    def steeper(self, least):
+        return float(1 + (float.fromhex(least) - 1) * self.rng.uniform(1.45, 3)).hex()
+
+    def change(self, claim, word, change):
+        self.sections[claim][word] = change(self.sections[claim][word])
 
     def where(self, cell):
         side = int(np.searchsorted(self.starts, cell, "right") - 1)
-        edges, k = self.A[f"edges.{side}"], cell - self.starts[side]
-        return side, edges[k], edges[k + 1]
+        return side, self.A[f"edges.{side}"][cell - self.starts[side] :][:2]
 
     def targets(self, cell):
         ranges = (self.A["jog"][cell], self.A["flip"][cell])
         return np.concatenate([np.arange(a, b + 1) for a, b in ranges if a >= 0])
 
-    def rank_too_low(self):
-        cell = pick(self.rng, ~self.inside)
-        self.A["rank"][cell] = self.A["rank"][self.targets(cell)].max()
-
-    def rank_in_component(self):
-        self.A["rank"][pick(self.rng, self.inside)] = 1
-
-    def other_branch(self):
-        cell = pick(self.rng, self.A["branch"] != 2)
-        old, new = ("jog", "flip") if self.A["branch"][cell] == 0 else ("flip", "jog")
-        side, x0, x1 = self.where(cell)
-        to = (side + (new == "flip")) % 3
-        image = getattr(self.m, new)
-        edges = self.A[f"edges.{to}"]
-        ends = np.searchsorted(edges, image(side, np.array([x0, x1]), self.m.kappa)) - 1
-        self.A[new][cell] = self.starts[to] + np.sort(np.clip(ends, 0, len(edges) - 2))
-        self.A[old][cell] = -1
-        self.A["branch"][cell] = 1 - self.A["branch"][cell]
-
-    def branch_forgotten(self):
-        own = self.A["branch"] == 2
-        for cell in np.flatnonzero(own):
-            side, x0, x1 = self.where(cell)
-            F = self.m.decision(side, np.array([x0, x1]), self.m.kappa)
-            own[cell] = F.min() < -1e-9 and F.max() > 1e-9
-        cell, keep = pick(self.rng, own), self.rng.randrange(2)
-        self.A["branch"][cell] = keep
-        self.A[("flip", "jog")[keep]][cell] = -1
-
-    def branch_without_targets(self):
-        self.A["branch"][pick(self.rng, self.A["branch"] != 2)] = 2
-
-    def branch_unknown(self):
-        self.A["branch"][self.rng.randrange(len(self.inside))] = self.rng.choice([-1, 3, 127])
-
-    def bracket_narrow(self):
-        cell, end = self.rng.randrange(len(self.inside)), self.rng.randrange(2)
-        side, *ends = self.where(cell)
-        phi = self.m.phi(side, np.array(ends), self.m.kappa)[end]
-        self.A["phi"][cell, end] = phi * (1 + (1, -1)[end] * 10 ** self.rng.uniform(-9, -4))
-
-    def bracket_negative(self):
-        self.A["phi"][self.rng.randrange(len(self.inside)), 0] *= -1
-
-    def bracket_beyond_a_turn(self):
-        self.A["phi"][self.rng.randrange(len(self.inside)), 1] = 7.0
-
-    def edge_moved(self):
-        edges = self.A[f"edges.{self.rng.randrange(3)}"]
-        k = self.rng.randrange(1, len(edges) - 1)
-        edges[k] += self.rng.choice([-0.3, 0.3]) * (edges[k + 1] - edges[k])
-
-    def edge_left_of_a(self):
-        side = self.rng.randrange(3)
-        self.A[f"edges.{side}"][0] = self.m.a[side] * (1 - 1e-6)
-
-    def edge_short_of_arm(self):
-        self.A[f"edges.{self.rng.randrange(3)}"][-1] *= 1 - 1e-9
-
-    def edges_swapped(self):
-        edges = self.A[f"edges.{self.rng.randrange(3)}"]
-        k = self.rng.randrange(len(edges) - 1)
-        edges[[k, k + 1]] = edges[[k + 1, k]]
-
-    def target_narrowed(self):
-        while True:
-            cell = self.rng.randrange(len(self.inside))
-            what = self.rng.choice(["jog", "flip"])
-            first, last = self.A[what][cell]
-            if last <= first or self.A["branch"][cell] == 2:
-                continue
-            side, x0, x1 = self.where(cell)
-            image = getattr(self.m, what)(side, np.array([x0, x1]), self.m.kappa)
-            end = self.rng.randrange(2)
-            if end == 0 and image.min() < self.where(first)[2] - 1e-7:
-                self.A[what][cell, 0] += 1
-                return
-            if end == 1 and image.max() > self.where(last)[1] + 1e-7:
-                self.A[what][cell, 1] -= 1
-                return
-
-    def target_on_another_side(self):
-        self.A["jog"][pick(self.rng, self.A["jog"][:, 0] >= self.starts[1])] -= self.starts[1]
-
-    def target_out_of_range(self):
-        cell, odd = pick(self.rng, self.A["flip"][:, 0] >= 0), [2**31 - 1, -(2**31), len(self.inside), -2]
-        self.A["flip"][cell, self.rng.randrange(2)] = self.rng.choice(odd)
-
-    def component_cell_dropped(self):
-        hit = np.zeros(len(self.inside), dtype=bool)
-        for cell in np.flatnonzero(self.inside):
-            targets = self.targets(cell)
-            hit[targets[targets != cell]] = True
-        cell = pick(self.rng, hit & self.inside)
-        self.A["component"][cell], self.A["rank"][cell] = -1, 1
-
-    def component_cell_added(self):
-        while True:
-            cell = pick(self.rng, ~self.inside)
-            if not self.inside[self.targets(cell)].all():
-                self.A["component"][cell], self.A["rank"][cell] = 0, 0
-                return
-
-    def component_renamed(self):
-        self.A["component"][pick(self.rng, self.inside)] = 1
-
-    def parameter_shifted(self):
-        name = self.rng.choice(sorted(self.parameters))
-        pair = self.parameters[name]
-        pair = pair[self.rng.randrange(3)] if isinstance(pair[0], list) else pair
-        shift = self.rng.choice([-1, 1]) * 10 ** self.rng.uniform(-8, 0)
-        pair[:] = [(float.fromhex(text) + shift).hex() for text in pair]
-
-    def wide_parameters(self):
+    def other(self, *path_and_value, claims=None):
+        """Another header, with parameters so wide that they do not give it away, and the first claims alone."""
         for name, pair in self.parameters.items():
             wide = [(-1e3).hex(), (1e3).hex()]
             self.parameters[name] = [wide] * 3 if isinstance(pair[0], list) else wide
+        forge.put(*path_and_value)(self.f)
+        del self.f.header["claims"][claims or 5 :]
 
-    def other_speed(self):
-        self.wide_parameters()
-        share = self.rng.choice([-1, 1]) * 10 ** self.rng.uniform(-7, -2)
-        self.scene["throw"]["kappa"] = f"{self.m.kappa * (1 + share)!r} in"
+    def other_scene(self, *path_and_value, **more):
+        self.other("boxes", 0, "scene", *path_and_value, **more)
 
-    def other_centre(self):
-        self.wide_parameters()
-        center, by = self.scene["part"]["mass"]["center"], 10 ** self.rng.uniform(-6, -2)
-        center["along"] = f"{float(center['along'][:-3]) + self.rng.choice([-1, 1]) * by!r} in"
+    def swap(self, array, one, two):
+        array[one], array[two] = array[two], array[one]
 
-    def other_height(self):
-        self.scene["arm"]["surface_height"] = self.rng.choice(["0 in", "0.2 in", "-0.1 in", "-3 in"])
-        self.wide_parameters()
-        del self.f.header["claims"][1:]
-
-    def longer_arm(self):
-        self.wide_parameters()
-        self.scene["arm"]["length"] = f"{self.m.arm + 10 ** self.rng.uniform(-9, 1)!r} in"
-
-    def other_unit(self):
-        self.wide_parameters()
-        throw = self.scene["throw"]
-        throw["kappa"] = throw["kappa"].replace("in", self.rng.choice(["cm", "ft", "m"]))
-
-    def other_flight(self):
-        flight = "small-angle" if self.m.exact else "exact"
-        self.scene["model"]["flight"] = self.f.header["scene"]["flight"] = flight
-
-    def noise_added(self):
-        self.wide_parameters()
-        self.f.header["noise"] = {"throw.speed": f"{10 ** self.rng.uniform(-5, 0):.9f} %"}
-
-    def fewer_throws(self):
-        self.sections["attracts-all"]["max_rank"] = self.rng.randrange(int(self.A["rank"].max()))
-
-    def steeper_near_joint(self):
-        limit = 1 + 2 * abs(self.m.h) / self.m.kappa
-        q = self.rng.choice([limit * (1 + 10 ** self.rng.uniform(-9, 0)), 1.0, 0.5, 1e300])
-        self.sections["attracts-all"]["near_joint"][str(self.rng.randrange(3))]["q"] = q.hex()
-
-    def steeper(self):
-        least = float.fromhex(self.sections["expanding"]["least_slope"])
-        self.sections["expanding"]["least_slope"] = float(1 + (least - 1) * self.rng.uniform(1.45, 3)).hex()
-
-    def goal_nearer(self):
-        limit = 19.7 if self.m.exact else 12.8
-        self.sections["goal"]["x"] = f"{self.rng.uniform(1, limit):.6f} in"
-
-    def goal_on_another_side(self):
-        self.sections["goal"]["side"] = self.rng.randrange(2)
-
-    def another_goal(self):
-        self.sections["goal"]["kind"] = "reaches"
-
-    def sides_swapped(self):
-        i = self.rng.randrange(3)
-        names = [f"0.edges.{i}", f"0.edges.{(i + 1) % 3}"]
-        arrays = self.f.arrays
-        arrays[names[0]], arrays[names[1]] = arrays[names[1]], arrays[names[0]]
-
-    def arrays_swapped(self):
-        self.f.arrays["0.jog"], self.f.arrays["0.flip"] = self.f.arrays["0.flip"], self.f.arrays["0.jog"]
-
-    def value_not_finite(self):
-        name = self.rng.choice(["0.phi", "0.edges.1"])
-        self.f.arrays[name].flat[self.rng.randrange(50)] = self.rng.choice([math.nan, math.inf, -math.inf])
-
-    def of_another_type(self):
-        name = self.rng.choice(["0.phi", "0.jog", "0.branch", "0.rank"])
-        self.f.arrays[name] = self.f.arrays[name].astype(self.rng.choice(["<f4", "<i8", ">i4", "<i2"]))
-
-    def of_another_shape(self):
-        name = self.rng.choice(["0.phi", "0.jog", "0.branch", "0.rank", "0.edges.1"])
-        self.f.arrays[name] = self.f.arrays[name][:-1]
+    def cast(self, names, change):
+        name = self.rng.choice(names)
+        self.f.arrays[name] = change(self.f.arrays[name])
 
 
-def ways_of(spoiler):
-    helpers = ("where", "targets", "wide_parameters", "near")
-    return {name for name in vars(spoiler) if not name.startswith("_") and name not in helpers}
+def other_branch(s):
+    cell = s.pick(s.branch != 2)
+    old, new = ("jog", "flip") if s.branch[cell] == 0 else ("flip", "jog")
+    side, ends = s.where(cell)
+    to = (side + (new == "flip")) % 3
+    edges = s.A[f"edges.{to}"]
+    image = np.searchsorted(edges, getattr(s.m, new)(side, ends, s.m.kappa)) - 1
+    s.A[new][cell] = s.starts[to] + np.sort(np.clip(image, 0, len(edges) - 2))
+    s.A[old][cell], s.branch[cell] = -1, 1 - s.branch[cell]
 
 
-WAYS = sorted(ways_of(Spoiler))
-EACH = -(-500 // len(WAYS))
+def branch_forgotten(s):
+    own = s.branch == 2
+    for cell in np.flatnonzero(own):
+        side, ends = s.where(cell)
+        F = s.m.decision(side, ends, s.m.kappa)
+        own[cell] = F.min() < -1e-9 and F.max() > 1e-9
+    cell = s.pick(own)
+    s.branch[cell], s.A[("flip", "jog")[s.end]][cell] = s.end, -1
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_no_spoiled_certificate_is_proved(good, tmp_path, way):
-    for seed in range(EACH):
-        rng = random.Random(f"{way} {seed}")
-        model = rng.choice(["designed", "small"])
+def bracket_narrow(s):
+    side, ends = s.where(s.cell)
+    phi = s.m.phi(side, ends, s.m.kappa)[s.end]
+    s.A["phi"][s.cell, s.end] = phi * (1 + (1, -1)[s.end] * s.small(-9, -4))
+
+
+def edge_moved(s):
+    k = s.rng.randrange(1, len(s.edges) - 1)
+    s.edges[k] += 0.3 * s.sign * (s.edges[k + 1] - s.edges[k])
+
+
+def target_narrowed(s):
+    while True:
+        cell, what = s.rng.randrange(len(s.inside)), s.rng.choice(["jog", "flip"])
+        first, last = s.A[what][cell]
+        if last <= first or s.branch[cell] == 2:
+            continue
+        image = getattr(s.m, what)(*s.where(cell), s.m.kappa)
+        if (s.end == 0 and image.min() < s.where(first)[1][1] - 1e-7) or (
+            s.end == 1 and image.max() > s.where(last)[1][0] + 1e-7
+        ):
+            s.A[what][cell, s.end] += (1, -1)[s.end]
+            return
+
+
+def component_cell_dropped(s):
+    hit = np.zeros(len(s.inside), dtype=bool)
+    for cell in np.flatnonzero(s.inside):
+        targets = s.targets(cell)
+        hit[targets[targets != cell]] = True
+    cell = s.pick(hit & s.inside)
+    s.A["component"][cell], s.A["rank"][cell] = -1, 1
+
+
+def component_cell_added(s):
+    off = [cell for cell in np.flatnonzero(~s.inside) if not s.inside[s.targets(cell)].all()]
+    cell = s.rng.choice(off)
+    s.A["component"][cell], s.A["rank"][cell] = 0, 0
+
+
+def parameter_shifted(s):
+    pair = s.parameters[s.rng.choice(sorted(s.parameters))]
+    pair = pair[s.side] if isinstance(pair[0], list) else pair
+    shift = s.sign * s.small(-8, 0)
+    pair[:] = [(float.fromhex(text) + shift).hex() for text in pair]
+
+
+def other_height(s):
+    """Above the joint by a little as well: there the fixed points move with it."""
+    by = s.small(-6, -1)
+    near = [0, -0.2, 1, 0.1 + by, 0.1 - by] if s.model == "above" else [0, 0.2, -0.1, -3]
+    s.other_scene("arm", "surface_height", f"{s.rng.choice(near):.9f} in", claims=1)
+
+
+def other_flight(s):
+    flight = "small-angle" if s.m.exact else "exact"
+    s.other_scene("model", "flight", flight)
+    s.f.header["scene"]["flight"] = flight
+
+
+def noise_added(s):
+    """Above the joint the bracket holds the fixed point for one speed: noise moves it, by its share of kappa phi/2."""
+    s.other("noise", {"throw.speed": f"{s.small(-5, 0):.9f} %"}, claims=1 if s.model == "above" else None)
+
+
+def steeper_near_joint(s):
+    """Below the joint the closed form bounds q; above it the slope at R*, of which the forged one has 98 % above 1."""
+    q = (1 + 2 * abs(s.m.h) / s.m.kappa) * (1 + s.small(-9, 0))
+    if s.model == "above":
+        q = 1 + (float.fromhex(s.near["q"]) - 1) * (1.03 + s.small(-3, 2))
+    s.near["q"] = s.rng.choice([q, 1.0, 0.5, 1e300]).hex()
+
+
+NEARER = {"designed": 19.7, "small": 12.8, "above": 15.0}  # within what orbits reach
+# Ways to make the statement or its proof false.
+WAYS = {
+    "rank too low": lambda s: s.put("rank", (c := s.pick(~s.inside)), s.A["rank"][s.targets(c)].max()),
+    "rank in component": lambda s: s.put("rank", s.pick(s.inside), 1),
+    "other branch": other_branch,
+    "branch forgotten": branch_forgotten,
+    "branch without targets": lambda s: s.put("branch", s.pick(s.branch != 2), 2),
+    "branch unknown": lambda s: s.put("branch", s.cell, s.rng.choice([-1, 3, 127])),
+    "bracket narrow": bracket_narrow,
+    "bracket negative": lambda s: s.put("phi", (s.cell, 0), -s.A["phi"][s.cell, 0]),
+    "bracket beyond a turn": lambda s: s.put("phi", (s.cell, 1), 7.0),
+    "edge moved": edge_moved,
+    "edge left of a": lambda s: s.put(s.edges, 0, s.m.a[s.side] * (1 - 1e-6)),
+    "edge short of arm": lambda s: s.put(s.edges, -1, s.edges[-1] * (1 - 1e-9)),
+    "edges swapped": lambda s: s.swap(s.edges, (k := s.rng.randrange(len(s.edges) - 1)), k + 1),
+    "target narrowed": target_narrowed,
+    "target on another side": lambda s: s.add("jog", s.pick(s.A["jog"][:, 0] >= s.starts[1]), -s.starts[1]),
+    "target out of range": lambda s: s.put(
+        "flip", (s.pick(s.A["flip"][:, 0] >= 0), s.end), s.draw(2**31 - 1, -(2**31), len(s.inside), -2)
+    ),
+    "component cell dropped": component_cell_dropped,
+    "component cell added": component_cell_added,
+    "component renamed": lambda s: s.put("component", s.pick(s.inside), 1),
+    "parameter shifted": parameter_shifted,
+    "other speed": lambda s: s.other_scene("throw", "kappa", f"{s.off(s.m.kappa, -7, -2)!r} in"),
+    "other centre": lambda s: s.other_scene(
+        "part", "mass", "center", "along", f"{s.m.a[2] + s.sign * s.small(-6, -2)!r} in"
+    ),
+    "other height": other_height,
+    "longer arm": lambda s: s.other_scene("arm", "length", f"{s.m.arm + s.small(-9, 1)!r} in"),
+    "other unit": lambda s: s.other_scene("throw", "kappa", f"{s.m.kappa!r} {s.draw('cm', 'ft', 'm')}"),
+    "other flight": other_flight,
+    "noise added": noise_added,
+    "fewer throws": lambda s: s.change("attracts-all", "max_rank", s.rng.randrange),
+    "steeper near joint": steeper_near_joint,
+    "steeper": lambda s: s.change("expanding", "least_slope", s.steeper),
+    "goal nearer": lambda s: s.goal.update(x=f"{s.rng.uniform(1, NEARER[s.model]):.6f} in"),
+    "goal on another side": lambda s: s.goal.update(side=s.rng.randrange(2)),
+    "another goal": lambda s: s.goal.update(kind="reaches"),
+    "sides swapped": lambda s: s.swap(s.f.arrays, f"0.edges.{s.side}", f"0.edges.{(s.side + 1) % 3}"),
+    "arrays swapped": lambda s: s.swap(s.f.arrays, "0.jog", "0.flip"),
+    "value not finite": lambda s: s.put(
+        s.A[s.draw("phi", "edges.1")].reshape(-1), s.rng.randrange(50), s.draw(math.nan, math.inf, -math.inf)
+    ),
+    "of another type": lambda s: s.cast(
+        ["0.phi", "0.jog", "0.branch", "0.rank"],
+        lambda array: array.astype(s.draw("<f4", "<i8", ">i4", "<i2")),
+    ),
+    "of another shape": lambda s: s.cast(
+        ["0.phi", "0.jog", "0.branch", "0.rank", "0.edges.1"], lambda array: array[:-1]
+    ),
+}
+
+
+def bracket_moved(s):
+    shift = s.sign * s.small(-8.5, 0.5)
+    s.near["fixed_point"] = [(float.fromhex(end) + shift).hex() for end in s.near["fixed_point"]]
+
+
+def bracket_beside_it(s):
+    """Wide, and touching nothing but its neighbourhood."""
+    lo, hi = (float.fromhex(end) for end in s.near["fixed_point"])
+    s.near["fixed_point"] = s.rng.choice([[hi.hex(), (hi + 5).hex()], [(lo - 1).hex(), lo.hex()]])
+
+
+def no_fixed_point_at_all(s):
+    for near in s.sections["attracts-all"]["near_joint"].values():
+        del near["fixed_point"]
+
+
+def cells_from_the_joint_on(s):
+    """The first cell reaches below R*, where jogs go inward."""
+    a, lo = s.m.a[s.side], float.fromhex(s.near["fixed_point"][0])
+    s.edges[0] = a + (lo - a) * s.rng.uniform(0.05, 0.9999)
+
+
+# What is said of the fixed points of the jog with the surface above the joint (h > 0).
+ABOVE = {
+    "bracket moved": bracket_moved,
+    "bracket beside it": bracket_beside_it,
+    "bracket empty": lambda s: s.near["fixed_point"].reverse(),
+    "no fixed point on a side": lambda s: s.near.pop("fixed_point"),
+    "no fixed point at all": no_fixed_point_at_all,
+    "cells from the joint on": cells_from_the_joint_on,
+}
+
+
+@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(6, 18), marks=pytest.mark.repeats)], ids=str)
+@pytest.mark.parametrize("way", [*WAYS, *ABOVE])
+def test_no_spoiled_certificate_is_proved(good, tmp_path, way, seeds):
+    for seed in seeds:
+        model = "above" if way in ABOVE else ("designed", "small", "above")[seed % 3]
         f = good[model].copy()
-        spoiler = Spoiler(f, model, rng)
-        getattr(spoiler, way)()
+        (WAYS | ABOVE)[way](Spoiler(f, model, random.Random(f"{way} {seed}")))
         report = verdict(f.seal(), tmp_path)
         assert report.verdict in ("failed", "bad file"), (way, seed, model)
         assert report.reason
@@ -378,78 +400,6 @@ def test_claims_it_does_not_know_are_not_rechecked(good, tmp_path):
     report = verdict(f, tmp_path)
     assert report.verdict == "failed"
     assert report.claims[-1] == ("ergodic", "not rechecked", "this checker does not know the claim")
-
-
-# ------------------------------------------------------------------------------- the surface above the joint (h > 0)
-
-
-class AboveSpoiler(Spoiler):
-    """Of a certificate with h > 0, what is said of the fixed points of the jog; the rest as before."""
-
-    def near(self):
-        return self.sections["attracts-all"]["near_joint"][str(self.rng.randrange(3))]
-
-    def steeper_near_joint(self):
-        """The slope of the map at R* bounds q, and the forged one has 98 % of what it is above 1."""
-        near = self.near()
-        q = 1 + (float.fromhex(near["q"]) - 1) * (1.03 + 10 ** self.rng.uniform(-3, 2))
-        near["q"] = self.rng.choice([q, 1.0, 0.5, 1e300]).hex()
-
-    def bracket_moved(self):
-        near = self.near()
-        shift = self.rng.choice([-1, 1]) * 10 ** self.rng.uniform(-8.5, 0.5)
-        near["fixed_point"] = [(float.fromhex(end) + shift).hex() for end in near["fixed_point"]]
-
-    def bracket_beside_it(self):
-        """Wide, and touching nothing but its neighbourhood."""
-        near = self.near()
-        lo, hi = (float.fromhex(end) for end in near["fixed_point"])
-        near["fixed_point"] = self.rng.choice([[hi.hex(), (hi + 5).hex()], [(lo - 1).hex(), lo.hex()]])
-
-    def bracket_empty(self):
-        self.near()["fixed_point"].reverse()
-
-    def no_fixed_point_on_a_side(self):
-        del self.near()["fixed_point"]
-
-    def no_fixed_point_at_all(self):
-        for near in self.sections["attracts-all"]["near_joint"].values():
-            del near["fixed_point"]
-
-    def cells_from_the_joint_on(self):
-        """The first cell reaches below R*, where jogs go inward."""
-        side = self.rng.randrange(3)
-        a, edges = self.m.a[side], self.A[f"edges.{side}"]
-        lo = float.fromhex(self.sections["attracts-all"]["near_joint"][str(side)]["fixed_point"][0])
-        edges[0] = a + (lo - a) * self.rng.uniform(0.05, 0.9999)
-
-    def other_height(self):
-        by = 10 ** self.rng.uniform(-6, -1)
-        h = self.rng.choice([0.0, -0.2, 1.0, 0.1 + by, 0.1 - by])
-        self.scene["arm"]["surface_height"] = f"{h:.9f} in"
-        self.wide_parameters()
-        del self.f.header["claims"][1:]
-
-    def goal_nearer(self):
-        self.sections["goal"]["x"] = f"{self.rng.uniform(1, 15):.6f} in"
-
-    def noise_added(self):
-        """The bracket holds the fixed point for one speed: noise moves it, by its share of kappa phi/2."""
-        super().noise_added()
-        del self.f.header["claims"][1:]
-
-
-OWN = ways_of(AboveSpoiler)
-
-
-@pytest.mark.parametrize("way", sorted({*WAYS, *OWN}))
-def test_no_spoiled_certificate_with_the_surface_above_the_joint_is_proved(good, tmp_path, way):
-    for seed in range(8 if way in OWN else 2):
-        f = good["above"].copy()
-        getattr(AboveSpoiler(f, "above", random.Random(f"{way} {seed}")), way)()
-        report = verdict(f.seal(), tmp_path)
-        assert report.verdict in ("failed", "bad file"), (way, seed)
-        assert report.reason
 
 
 def test_the_two_basins_are_stated_in_words(good, tmp_path):
@@ -575,27 +525,21 @@ def test_damaged_files_give_one_clear_line_within_a_second(good, tmp_path):
 
 
 def test_truncated_and_randomly_damaged_files_are_refused(good, tmp_path):
-    data = good["small"].bytes()
-    rng = random.Random(3)
-    for k in range(200):
-        spoiled = bytearray(data)
-        if k % 4 == 0:
-            del spoiled[rng.randrange(len(data)) :]
-        elif k % 4 == 1:  # in the arrays, where the hashes are
-            spoiled[rng.randrange(len(data) // 4, len(data) // 2)] ^= 1 << rng.randrange(8)
-        elif k % 4 == 2:  # in the directories
-            at = len(data) - 1 - rng.randrange(900)
+    """Cut off; a bit of the arrays, which have hashes; a bit of the directories; some bytes left out."""
+    data, rng = good["small"].bytes(), random.Random(3)
+    for k in range(80):
+        spoiled, size = bytearray(data), len(data)
+        at = rng.randrange(*((size,), (size // 4, size // 2), (size - 900, size), (size,))[k % 4])
+        if k % 4 in (1, 2):
             spoiled[at] ^= 1 << rng.randrange(8)
         else:
-            at = rng.randrange(len(data))
-            del spoiled[at : at + rng.randrange(1, 100)]
+            del spoiled[at : at + rng.randrange(1, 100) if k % 4 else size]
         begun = time.process_time()
         report = verdict(bytes(spoiled), tmp_path)
         assert time.process_time() - begun < 30.0  # no hang; the second asked for is a matter of the machine
         # Times, versions and attributes of a directory, and paddings, mean nothing: the statement is then the same.
         same = k % 4 == 2 and report.verdict == "proved"
-        assert same or report.verdict == "bad file"
-        assert same or report.reason
+        assert same or (report.verdict == "bad file" and report.reason)
 
 
 def test_a_file_that_is_not_there(tmp_path):
@@ -609,55 +553,40 @@ def test_text_of_a_stranger_is_cleaned():
 
 # ------------------------------------------------------------------------------------------------ scenes and numbers
 
-REFERENCE = {
-    ("3.2444722", "1.7898493"): ((2.05089, 3.36103, 3.24447), (0.21620, 2.04836, 1.78985)),
-    ("4.4179581", "0.5040259"): ((1.74394, 1.65101, 4.41796), (1.92973, 1.72239, 0.50403)),
-    ("3.9867006", "1.8835981"): ((1.37302, 3.05205, 3.98670), (0.53272, 1.36702, 1.88360)),
-    ("4.2255778", "0.7082490"): ((1.79776, 1.92575, 4.22558), (1.65438, 1.77927, 0.70825)),
-}
 
-
-@pytest.mark.parametrize("center", REFERENCE)
-def test_feet_and_heights_of_the_paper_scenes(center):
+def plate(**density):
+    """92.90304 g at (8, 3) in beside a square foot of 1 kg/m^2; side 1 is the edge that ends in vertex 0."""
     raw = forge.scene("designed")
-    raw["part"]["mass"]["center"] |= {"along": f"{center[0]} in", "above": f"{center[1]} in"}
-    sides = checker.scene.read_scene(raw, None).sides
-    for s, a, d in zip(sides, *REFERENCE[center], strict=True):
-        assert float(s.a.mid()) == pytest.approx(a, abs=6e-6)
-        assert float(s.d.mid()) == pytest.approx(d, abs=6e-6)
-        assert float(s.a.rad()) < 1e-25
+    mass = density | {"points": [{"x": "203200 um", "y": "3 in", "mass": density.pop("mass", "92.90304 g")}]}
+    corners = [["0 in", "0 in"], ["12 in", "0 in"], ["1 ft", "1 ft"], ["0 in", "30.48 cm"]]
+    return checker.scene.read_scene(raw | {"part": {"vertices": corners, "mass": mass}}, None)
 
 
-@pytest.mark.parametrize(
-    ("density", "thickness"),
-    [("1 kg/m^2", None), ("0.1 g/cm^2", None), ("1 g/cm^3", "1000 um"), ("1000 kg/m^3", "0.1 cm")],
-)
+AS_HEAVY = [("1 kg/m^2", None), ("0.1 g/cm^2", None), ("1 g/cm^3", "1000 um"), ("1000 kg/m^3", "0.1 cm")]
+NO_PLATE = [("1 g/cm^3", None), ("1 kg/m^3", None), ("0.1 g/cm^2", "1 mm")]
+NO_PLATE += [("1 g/cm^3", text) for text in ("1 g", "0 mm", "-1 mm")]
+
+
+def thick(density, thickness):
+    return {"plate_density": density} | ({"plate_thickness": thickness} if thickness else {})
+
+
+@pytest.mark.parametrize(("density", "thickness"), AS_HEAVY)
 @pytest.mark.parametrize("mass", ["92.90304 g", "92903.04 mg", "0.00009290304 t"])
 def test_a_square_plate_with_a_lead_weight_as_heavy(density, thickness, mass):
-    """92.90304 g on a square foot of 1 kg/m^2; side 1 is the edge that ends in vertex 0."""
-    raw = forge.scene("designed")
-    plate = {"plate_density": density} | ({"plate_thickness": thickness} if thickness else {})
-    points = [{"x": "203200 um", "y": "3 in", "mass": mass}]
-    raw["part"] = {
-        "vertices": [["0 in", "0 in"], ["12 in", "0 in"], ["1 ft", "1 ft"], ["0 in", "30.48 cm"]],
-        "mass": {**plate, "points": points},
-    }
-    scene = checker.scene.read_scene(raw, None)
-    # Equal masses at (6, 6) and (8, 3): the centre is (7, 4.5).
+    """Equal masses at (6, 6) and (8, 3): the centre is (7, 4.5)."""
+    scene = plate(**thick(density, thickness), mass=mass)
     for s, a, d in zip(scene.sides, (7, 7.5, 5, 4.5), (4.5, 7, 7.5, 5), strict=True):
         assert s.a.contains(a)
         assert s.d.contains(d)
         assert s.length.contains(12)
     assert scene.sides[0].rho2.contains(arb(24) / 2 + arb(13) / 4)
-    for wrong_density, wrong in (
-        ("1 g/cm^3", {}),
-        ("1 kg/m^3", {}),
-        ("0.1 g/cm^2", {"plate_thickness": "1 mm"}),
-        *(("1 g/cm^3", {"plate_thickness": text}) for text in ("1 g", "0 mm", "-1 mm")),
-    ):
-        raw["part"]["mass"] = {"plate_density": wrong_density, **wrong, "points": points}
-        with pytest.raises(checker.file.BadFileError):
-            checker.scene.read_scene(raw, None)
+
+
+@pytest.mark.parametrize(("density", "thickness"), NO_PLATE)
+def test_a_plate_that_is_none(density, thickness):
+    with pytest.raises(checker.file.BadFileError):
+        plate(**thick(density, thickness))
 
 
 @pytest.mark.parametrize("speed", ["90 deg/s", "15 rpm", ["15 rpm", "90 deg/s"]])
@@ -702,57 +631,34 @@ def test_checker_and_package_know_the_same_units(dimension):
             assert float(read.lo) * (math.pi if read.pi else 1.0) == pytest.approx(mine, rel=1e-15)
 
 
-@pytest.mark.parametrize(
-    "text", ["700000 \u00b5m", "700000 \u03bcm", "700000 u\u0301m", "700000 Um", "700000um", "700000 umm"]
-)
-def test_lengths_are_spelled_spelled_plainly(text):
-    raw = forge.scene("designed")
-    raw["arm"]["length"] = "700000 um"
-    assert checker.scene.read_scene(raw, None).unit == "um"
-    raw["arm"]["length"] = text
-    with pytest.raises(checker.file.BadFileError):
-        checker.scene.read_scene(raw, None)
-
-
-def test_a_quantity_is_exact():
-    q = checker.file.quantity(["1 ft", "1.5e0 ft"], "length", "x")
-    assert (q.lo, q.hi) == (Fraction(3048, 10000), Fraction(4572, 10000))
-
-
 def test_the_march_finds_the_smallest_root_where_f_is_not_concave():
     """kappa below ell: f > 0 is proved up to just below the first root, and never beyond it."""
-    raw = forge.scene("designed")
-    rng = np.random.default_rng(11)
-    refused = 0
-    for _ in range(150):
+    raw, rng, refused = forge.scene("designed"), np.random.default_rng(11), 0
+    for _ in range(70):
         raw["throw"]["kappa"] = f"{rng.uniform(1.0, 4.0):.6f} in"
         scene = checker.scene.read_scene(raw, None)
         s = scene.sides[rng.integers(3)]
         a, d, kappa = float(s.a), float(s.d), float(scene.k_hi)
-        x = a + rng.exponential(1.5) + 0.05
-        p = np.linspace(1e-3, 6.2, 200_001)
+        x, p = a + rng.exponential(1.5) + 0.05, np.linspace(1e-3, 6.2, 200_001)
         f = x * p - a * np.sin(p) + d * (1 - np.cos(p)) - kappa / 2 * p**2
         if (f > 0).all():
             continue
+
+        def proved(q, s=s, x=x, scene=scene):
+            angle = checker.model.at_angle(s, arb(q))
+            return checker.model.positive_until(s, arb(x), scene.k_hi, angle)
+
         root = p[np.argmax(f <= 0)]
-        below = checker.model.positive_until(
-            s, arb(x), scene.k_hi, checker.model.at_angle(s, arb(root * (1 - 1e-3)))
-        )
-        near_graze = f[p < root].min() < 1e-6 and not s.concave
-        assert below or near_graze
-        for q in (root * 1.001, p[f > 0][-1]):
-            if q > root:
-                refused += 1
-                assert not checker.model.positive_until(
-                    s, arb(x), scene.k_hi, checker.model.at_angle(s, arb(q))
-                )
-    assert refused > 50
+        assert proved(root * (1 - 1e-3)) or (f[p < root].min() < 1e-6 and not s.concave)  # it nearly grazes
+        beyond = [q for q in (root * 1.001, p[f > 0][-1]) if q > root]
+        refused += len(beyond)
+        assert not any(map(proved, beyond))
+    assert refused > 40
 
 
 def test_range_max_is_the_maximum():
     rng = np.random.default_rng(2)
-    values = rng.integers(-5, 1000, 700).astype(np.int32)
-    first = rng.integers(0, 700, 3000)
+    values, first = rng.integers(-5, 1000, 700).astype(np.int32), rng.integers(0, 700, 3000)
     last = np.minimum(699, first + (rng.exponential(60, 3000)).astype(int))
     want = [values[a : b + 1].max() for a, b in zip(first, last, strict=True)]
     assert (checker.labels.range_max(values, first, last) == want).all()

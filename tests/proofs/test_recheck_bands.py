@@ -7,6 +7,7 @@ What is true comes from long orbits of single scenes (docs/model.md has the shar
 import copy
 import math
 from fractions import Fraction
+from functools import cache
 from itertools import product
 from types import SimpleNamespace
 
@@ -45,38 +46,32 @@ def nine(factor):
 
 
 # the limit set of paper-designed-small-angle off side 2 ends at 12.884 in, that of paper-initial at 21.554 in
+SMALL, INITIAL = "paper-designed-small-angle", "paper-initial"
 TRUE = {
     "one": ("paper-designed", {"throw.speed": "0.72 %"}),
-    "three": (
-        "paper-designed",
-        {"throw.speed": "0.3 %", "part.sides[0]": "0.3 %", "arm.surface_height": "0.01 in"},
-    ),
     "landing": ("paper-designed", {"throw.speed": "0.4 %"}, {"landing.x": "0.02 in"}),
     "small-angle": (
-        "paper-designed-small-angle",
-        {"throw.speed": "0.1 %", "part.mass.radius_of_gyration": "0.01 in"},
-        None,
-        "12.92 in",
+        SMALL, {"throw.speed": "0.1 %", "part.mass.radius_of_gyration": "0.01 in"}, None, "12.92 in",
     ),
     "nine": ("paper-designed", nine(0.465), {"landing.x": "0.00465 in"}),
-    "initial": ("paper-initial", nine(0.2), {"landing.x": "0.002 in"}, "21.8 in"),
+    "initial": (INITIAL, nine(0.2), {"landing.x": "0.002 in"}, "21.8 in"),
     # the box is halved: one half needs more throws than the other, which comes last
-    "halves": (
-        "paper-initial",
-        {"throw.speed": "0.3 %", "part.mass.center.along": "0.003 in"},
-        None,
-        "21.7 in",
-    ),
-}
+    "halves": (INITIAL, {"throw.speed": "0.3 %", "part.mass.center.along": "0.003 in"}, None, "21.7 in"),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("given", TRUE.values(), ids=TRUE)
-def test_what_throws_with_the_same_parameters_prove_is_confirmed(tmp_path, given):
-    proof = proof_of(*given)
+@cache
+def proved(key):
+    return proof_of(*TRUE[key])
+
+
+@pytest.mark.parametrize("key", TRUE)
+def test_what_throws_with_the_same_parameters_prove_is_confirmed(tmp_path, key):
+    proof = proved(key)
     assert proof.proved
     assert len(proof.attractions) == 1
     throws = proof.claims[0].section["throws"]
-    report = ls.recheck(proof.save(tmp_path / "x.proof.zip"))
+    report = ls.recheck(proof.save(tmp_path / "x.proof.zip", recheck=False))
     words = f"after {throws} throw{'s' * (throws > 1)} with the same parameters in the attracting cells"
     assert words in report.statement[0]
 
@@ -86,11 +81,8 @@ def test_what_throws_with_the_same_parameters_prove_is_confirmed(tmp_path, given
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("same")
-    return {
-        key: forge.opened(proof_of(*TRUE[key]).save(folder / f"{key}.proof.zip"))
-        for key in ("one", "landing", "nine")
-    }
+    file = tmp_path_factory.mktemp("same") / "x.proof.zip"
+    return {key: forge.opened(proved(key).save(file, recheck=False)) for key in ("one", "landing", "nine")}
 
 
 SECTION = ("claims", 0, "section")
@@ -120,33 +112,29 @@ def of_another_place(f, x):
 
 
 def test_a_place_that_orbits_exceed_is_not_believed(good, tmp_path):
+    """One far beyond is."""
     top = highest(0.0072)
     assert 19.9 < top < 20.0
-    for x in (19.9, math.floor(top * 1e4) / 1e4):
-        f = of_another_place(good["one"].copy(), f"{x!r} in")
-        found = judged(f, tmp_path)
-        assert found[0] == "failed"
-        assert "throws with the same parameters may end beyond" in found[1]
-
-
-def test_a_place_far_beyond_is_still_believed(good, tmp_path):
-    f = of_another_place(good["one"].copy(), "20.1 in")
-    assert judged(f, tmp_path) == ("proved", "")
+    found = judged(of_another_place(good["one"].copy(), f"{math.floor(top * 1e4) / 1e4!r} in"), tmp_path)
+    assert found[0] == "failed"
+    assert "throws with the same parameters may end beyond" in found[1]
+    assert judged(of_another_place(good["one"].copy(), "20.1 in"), tmp_path) == ("proved", "")
 
 
 def test_without_such_throws_or_with_too_few_the_cells_do_not_do(good, tmp_path):
-    for change in (forge.put(*SECTION, "throws", 0), forge.leave_out(*SECTION, "throws")):
+    assert section(good["one"])["throws"] == 2
+    beyond = "an attracting cell of another side reaches beyond"
+    for change, want, words in (
+        (forge.put(*SECTION, "throws", 0), "failed", beyond),
+        (forge.leave_out(*SECTION, "throws"), "failed", beyond),
+        (forge.put(*SECTION, "throws", 1), "failed", ""),
+        (forge.put(*SECTION, "throws", 3), "proved", ""),
+    ):
         f = good["one"].copy()
         change(f)
         found = judged(f, tmp_path)
-        assert found[0] == "failed"
-        assert "an attracting cell of another side reaches beyond" in found[1]
-    f = good["one"].copy()
-    assert section(f)["throws"] == 2
-    section(f)["throws"] = 1
-    assert judged(f, tmp_path)[0] == "failed"
-    section(f)["throws"] = 3
-    assert judged(f, tmp_path) == ("proved", "")
+        assert found[0] == want
+        assert words in found[1]
 
 
 def test_more_bands_than_are_followed_prove_nothing(good, tmp_path, monkeypatch):
@@ -163,18 +151,17 @@ def test_angles_are_kept_by_the_side_of_the_throw():
     assert first[0] > first[1] + 0.1
 
 
-@pytest.mark.parametrize(
-    ("slopes", "rises", "good"),
-    [
-        ((1, 1, 1), True, True),
-        ((1, 1, -1), False, True),
-        ((-1, 1, 1), True, False),
-        ((1, -1, 1), True, False),
-        ((1, 1, -1), True, False),
-        ((1, 1, 1), False, False),
-        ((1, 1, 0), True, False),
-    ],
-)
+# of a start, a place and what decides, as the angle grows; whether flips come after, and whether that is taken
+RISES = [
+    ((1, 1, 1), True, True),
+    ((1, 1, -1), False, True),
+    ((-1, 1, 1), True, False),
+    ((1, -1, 1), True, False),
+]
+RISES += [((1, 1, -1), True, False), ((1, 1, 1), False, False), ((1, 1, 0), True, False)]
+
+
+@pytest.mark.parametrize(("slopes", "rises", "good"), RISES)
 def test_throws_have_to_rise_and_what_decides_to_be_monotone(slopes, rises, good):
     bands, balls = checker.bands, checker.balls
     thrown = checker.moving_ends.ByAngle(*(balls.Rising(arb(0), [arb(each)]) for each in slopes), arb(0))
@@ -249,7 +236,7 @@ def test_noise_of_the_throw_leaves_nothing_the_same(tmp_path):
     """A speed that differs at every throw by 0.38 % keeps the goal; by throws alike it may not be shown."""
     noise = {"throw.speed": "0.38 %"}
     proof = ls.certify("paper-designed", ["goal"], noise=noise)
-    f = forge.opened(proof.save(tmp_path / "noisy.proof.zip"))
+    f = forge.opened(proof.save(tmp_path / "noisy.proof.zip", recheck=False))
     assert judged(f, tmp_path) == ("proved", "")
     section(f)["throws"] = 2
     assert judged(f, tmp_path) == ("proved", "")  # the cells do, such throws are not asked
@@ -269,38 +256,26 @@ def test_brackets_that_are_narrower_than_the_angles_fail(good, tmp_path):
     """The throws that end highest start below r_2: brackets there, moved or cut, are not those of the cells."""
     edges = good["one"].arrays["0.edges.2"]
     before = sum(len(good["one"].arrays[f"0.edges.{k}"]) - 1 for k in (0, 1))
-    for x, end in product((19.99, 20.2, 23.3), (0, 1)):
+    for x, end in ((19.99, 0), (20.2, 1), (23.3, 0), (23.3, 1)):
         f = good["one"].copy()
         cell = before + int(np.searchsorted(edges, x)) - 1
         assert f.arrays["0.component"][cell] >= 0
-        phi = f.arrays["0.phi"]
-        phi[cell, end] = phi[cell].mean()
+        f.arrays["0.phi"][cell, end] = f.arrays["0.phi"][cell].mean()
         assert judged(f, tmp_path)[0] == "failed"
-    f = good["one"].copy()
-    inside = f.arrays["0.component"] >= 0
-    f.arrays["0.phi"][inside] = f.arrays["0.phi"][inside].mean(axis=1, keepdims=True)
-    assert judged(f, tmp_path)[0] in ("failed", "bad file")
 
 
 def test_a_tolerance_or_noise_wider_than_was_proved_fails(good, tmp_path):
     """Of the speed the goal fails from 0.733 %, of the landing place at 0.4 % of speed well below 0.1 in."""
-    f = good["one"].copy()
-    f.header["tolerance"] = {"throw.speed": "0.75 %"}
-    assert judged(f, tmp_path)[0] == "failed"
-    for dev in (0.0075, 0.00735):
-        assert highest(dev) > 20.0
-        f = good["one"].copy()
-        f.header["tolerance"] = {"throw.speed": f"{100 * dev!r} %"}
-        value = Fraction("25.3778518")
-        ends = [value / (1 + Fraction(str(dev))) ** 2, value / (1 - Fraction(str(dev))) ** 2]
-        box = f.header["boxes"][0]
-        wide = float(ends[0]) - 1e-9, float(ends[1]) + 1e-9
-        box["scene"]["throw"]["kappa"] = [f"{end:.12f} in" for end in wide]
-        box["parameters"]["kappa"] = [(float(ends[0]) - 1e-6).hex(), (float(ends[1]) + 1e-6).hex()]
-        assert judged(f, tmp_path)[0] == "failed"
-    f = good["landing"].copy()
-    f.header["noise"] = {"landing.x": "0.1 in"}
-    assert judged(f, tmp_path)[0] == "failed"
+    assert highest(0.00735) > 20.0
+    wider, scattered = good["one"].copy(), good["landing"].copy()
+    wider.header["tolerance"] = {"throw.speed": "0.735 %"}
+    scattered.header["noise"] = {"landing.x": "0.1 in"}
+    covered = wider.copy()  # by kappa as well
+    lo, hi = (25.3778518 / (1 + dev) ** 2 for dev in (0.00735, -0.00735))
+    box = covered.header["boxes"][0]
+    box["scene"]["throw"]["kappa"] = [f"{lo - 1e-9:.12f} in", f"{hi + 1e-9:.12f} in"]
+    box["parameters"]["kappa"] = [(lo - 1e-6).hex(), (hi + 1e-6).hex()]
+    assert [judged(f, tmp_path)[0] for f in (wider, covered, scattered)] == ["failed"] * 3
 
 
 # ------------------------------------------------------------------------------------------- starts from the foot
@@ -317,37 +292,13 @@ def test_starts_from_the_foot_are_named_and_their_shares(good, tmp_path):
 
 def test_a_start_that_is_lost_is_not_claimed_nor_one_that_comes_lost(good, tmp_path):
     """Of starts between the two distances nothing is claimed: a hundredth of an inch farther both ways is false."""
-    for side, by in product("012", (-0.02, 0.02)):
+    for side, (key, by) in product("012", ((("starts", "from_foot"), -0.02), (("lost",), 0.02))):
         f = good["nine"].copy()
-        key = ("starts", "from_foot") if by < 0 else ("lost",)
-        ends = section(f)
+        ends = f.header["claims"][0]["section"]
         for word in key:
             ends = ends[word]
         ends[side] = (float.fromhex(ends[side]) + by).hex()
         assert judged(f, tmp_path)[0] == "failed"
-
-
-@pytest.mark.parametrize("side", range(3))
-def test_the_ends_of_starts_are_those_of_worst_landings_at_the_corners(good, side):
-    """Plain throws of the eight scenes with sides, height and speed at their ends, landings short by all the noise."""
-    own = section(good["nine"])
-    away, lost = (float.fromhex(own[key][str(side)]) for key in ("lost",) * 2)
-    away = float.fromhex(own["starts"]["from_foot"][str(side)])
-    scene, factor = ls.load("paper-designed"), 0.465
-    for speed, height, size in product((-1, 1), repeat=3):
-        values = {"throw.kappa": scene.kappa / (1 + 0.01 * factor * speed) ** 2}
-        values |= {"arm.surface_height": -0.2 + 0.01 * factor * height}
-        values |= {f"part.sides[{k}]": scene.sides.length[k] * (1 + 0.01 * factor * size) for k in range(3)}
-        one = scene.with_values(values)
-        foot = float(one.sides.a[side])
-        for start, out in ((away, True), (lost, False)):
-            x = foot + start
-            for _ in range(4000):
-                thrown = images(one.map, [x], side)
-                x = float(thrown.x[0]) - 0.01 * factor
-                if not foot < x < foot + 1.0:
-                    break
-            assert (x > foot + 1.0) is out
 
 
 def near_foot(model, kappa, noise):
@@ -376,7 +327,7 @@ WORST = {
 
 
 @pytest.mark.parametrize("given", WORST.values(), ids=WORST)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", MODELS[::2])  # near the foot a part jogs, however it is decided
 def test_which_starts_come_out_and_which_are_lost_is_told_by_the_worst_kappa(model, given):
     """Where a jog goes just as far as the landing scatters: the larger kappa, the farther from the foot that is."""
     kappa, noise, worst = given
@@ -409,14 +360,9 @@ def test_near_the_foot_only_jogs_count(model):
 OTHER_STARTS = [
     lambda s: s["starts"]["from_foot"].pop("1"),
     lambda s: s["starts"]["from_foot"].update({"0": "nan"}),
-    lambda s: s["starts"]["from_foot"].update({"0": (-0.1).hex()}),
-    lambda s: s["starts"]["from_foot"].update({"0": (0.0).hex()}),
-    lambda s: s["starts"]["from_foot"].update({"0": (40.0).hex()}),
-    lambda s: s["lost"].update({"0": (40.0).hex()}),
-    lambda s: s["lost"].update({"0": (-0.1).hex()}),
-    lambda s: s["lost"].update({"0": (1e200).hex()}),
-    lambda s: s["lost"].update({str(k): (-1.7e308).hex() for k in range(3)}),
-    lambda s: s["starts"]["from_foot"].update({"0": (1e200).hex()}),
+    *(lambda s, x=x: s["starts"]["from_foot"].update({"0": x.hex()}) for x in (-0.1, 0.0, 40.0, 1e200)),
+    *(lambda s, x=x: s["lost"].update({"0": x.hex()}) for x in (-0.1, 40.0, 1e200)),
+    lambda s: s["lost"].update(dict.fromkeys("012", (-1.7e308).hex())),
     lambda s: s.update(near_joint={str(k): {"q": (1.01).hex()} for k in range(3)}),
     lambda s: s.update(starts={"from": s["starts"]["from_foot"]}),
 ]
@@ -491,24 +437,6 @@ def box_of(model, landing=0.0, widths=WIDTHS):
     noise = {"landing.x": f"{landing!r} in"} if landing else None
     read = checker.scene.read_scene(copy.deepcopy(wide), noise)
     return scene, checker.bands.parameters_of(read)
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_throws_by_angle_hold_those_at_50_digits(model):
-    _, box = box_of(model)
-    random = np.random.default_rng(1)
-    for side, p in product(range(3), random.uniform(0.05, 2.5, 6).tolist()):
-        thrown = box.throw(side, arb(p), arb(p, 1e-4))
-        for _ in range(4):
-            values = {k: v + mpf(WIDTHS[k]) * random.choice([-1, 1]) for k, v in VALUES.items()}
-            own, at = feet(values), mpf(p) + mpf(1e-4 * random.uniform(-1, 1))
-            shift = own[side][0] + own[(side + 1) % 3][2] - own[(side + 1) % 3][0]
-            start, jog, flip, decides = by_hand(model, own[side], shift, values, at)
-            held(thrown.begins.x, start)
-            held(thrown.jogs_to.x, jog)
-            held((thrown.jogs_to - thrown.shift).x, flip)
-            # in the exact model roots are compared: the sign is the same
-            assert not (thrown.decides.x < 0 if decides > 0 else thrown.decides.x > 0)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -607,8 +535,7 @@ def test_a_part_of_a_band_is_empty_only_if_it_is_for_all_scenes():
     assert is_empty(None, None, 9.1, 9.0)
 
 
-@pytest.mark.parametrize("landing", [0.0, 0.02])
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("model", "landing"), [*zip(MODELS, (0.0, 0.02) * 3, strict=True)])
 def test_chains_hold_the_orbits_of_the_scenes_of_a_box(model, landing):
     """Plain throws of the package, the landings off by all the noise; no wider than the slopes of the ends make it."""
     widths = dict.fromkeys(DESIGNED, Fraction(1, 2000))
