@@ -4,7 +4,6 @@ import json
 import math
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 
@@ -227,13 +226,12 @@ def test_a_cluster_that_is_not_there_is_named():
         run(None, cluster="tcp//nowhere")
 
 
-def test_a_store_that_is_done_is_read_and_not_computed_and_xarray_opens_it(tmp_path, whole, computed):
-    run(tmp_path / "s.zarr")
-    again = run(tmp_path / "s.zarr", executor=ThreadPoolExecutor(1))
+def test_a_store_that_is_done_is_read_and_not_computed_and_xarray_opens_it(stored, whole, computed):
+    again = run(stored)
     assert (again.new, again.kept) == (0, 21)
-    assert bytes_of(tmp_path / "s.zarr") == whole
+    assert bytes_of(stored) == whole
     assert again.dataset.identical(computed.dataset)
-    with xr.open_zarr(tmp_path / "s.zarr", consolidated=False) as found:
+    with xr.open_zarr(stored, consolidated=False) as found:
         assert found.kappa.sel({"throw.speed": 150.0, "arm.surface_height": -1.0}) > 0
         assert ls.load(found.attrs["scene"]) == DESIGNED
         assert found.attrs["plan_hash"] == computed.dataset.attrs["plan_hash"]
@@ -252,13 +250,12 @@ CHANGES = [
 ]
 
 
-def test_a_store_of_another_plan_is_refused_with_what_differs(tmp_path, whole):
-    run(tmp_path / "s.zarr")
+def test_a_store_of_another_plan_is_refused_with_what_differs(stored, whole):
     for change, words in CHANGES:
         given = {"subject": "paper-designed", "x": X, "y": Y, "task": TASK, "chunk": (3, 3)} | change
         with pytest.raises(LimitsetsError, match=words):
-            atlas(store=tmp_path / "s.zarr", **given)
-    assert bytes_of(tmp_path / "s.zarr") == whole
+            atlas(store=stored, **given)
+    assert bytes_of(stored) == whole
 
 
 OF_PLAN = "limitsets.parameters.atlas.plan."
@@ -282,13 +279,12 @@ OF_PLAN = "limitsets.parameters.atlas.plan."
         ("source_of", lambda name: {name: "-"}, r"code of tests\.sweep\.tasks_of_tests is not", "sources"),
     ],
 )
-def test_other_versions_and_edited_code_are_refused(name, other, of_store, of_worker, tmp_path, monkeypatch):
+def test_other_versions_and_edited_code_are_refused(name, other, of_store, of_worker, stored, monkeypatch):
     """What the plan says of the code is patched as if it were on another machine: of a store, and of a worker."""
-    run(tmp_path / "s.zarr")
     plan = plan_of("paper-designed", X, task=TASK)
     monkeypatch.setattr(OF_PLAN + name, other)
     with pytest.raises(LimitsetsError, match=of_store):
-        run(tmp_path / "s.zarr")
+        run(stored)
     with pytest.raises(LimitsetsError, match=of_worker):
         answer(plan, 0)
 
