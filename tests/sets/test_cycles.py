@@ -74,7 +74,7 @@ def by_recurrence(scene, longest):
     for p in range(1, longest + 1):
         same = (path.side[p:] == path.side[:-p]) & (path.side[:-p] == 0)
         close = (np.abs(path.x[p:] - path.x[:-p]) < 0.1) & same
-        for k in np.flatnonzero(close)[::50]:
+        for k in np.flatnonzero(close)[::150]:
             word, x = path.code[k : k + p], path.x[k]
 
             def follow(start, word=word):
@@ -258,12 +258,8 @@ def lifted(p, n, up_to):
     x = (np.arange(n) + 0.5) / n
     count, y = {}, x.copy()
     for period in range(1, up_to + 1):
-        y = (
-            y
-            + p.omega
-            - p.k / math.tau * np.sin(math.tau * y)
-            - p.m / (2 * math.tau) * np.sin(2 * math.tau * y)
-        )
+        turned = p.k * np.sin(math.tau * y) + 0.5 * p.m * np.sin(2 * math.tau * y)
+        y = y + p.omega - turned / math.tau
         for q in range(math.floor((y - x).min()), math.ceil((y - x).max()) + 1):
             sign = np.sign(y - x - q)
             points = int((sign != np.roll(sign, -1)).sum())
@@ -276,9 +272,7 @@ def lifted(p, n, up_to):
     return found
 
 
-@pytest.mark.parametrize(
-    ("omega", "coupling"), [(0.61, 0.9), (0.35, 0.95), (0.5, 0.9), (0.4, 0.99), (0.02, 0.3)]
-)
+@pytest.mark.parametrize(("omega", "coupling"), [(0.61, 0.9), (0.5, 0.9), (0.4, 0.99)])
 def test_an_own_circle_map_has_the_cycles_of_its_lift(omega, coupling):
     params = ls.map(waves, omega=omega, k=coupling, m=0.0)
     found = cycles_of(params, ALL, UNIT, 6)
@@ -414,7 +408,9 @@ def test_basins_say_that_starts_are_undecided_by_the_enclosed_image_of_a_jump():
     leads = (first < cells) & (last >= cells)
     for _ in range(cells):
         meets = [leads[np.arange(a, b + 1) % cells].any() for a, b in zip(first, last, strict=True)]
-        leads = leads | np.array(meets)
+        before, leads = leads, leads | np.array(meets)
+        if (leads == before).all():
+            break
     found = ls.basins(graph, ls.attractors(graph))
     assert found.undecided_between > 0.1
     advice = r"from (.*) % of the starts .*, from (.*) % a cell whose enclosed image is a whole"
