@@ -178,9 +178,9 @@ def test_the_table_of_the_page_is_that_of_the_study(study):
 
 @pytest.mark.sweep
 def test_the_figure_and_the_bootstrap(study, tmp_path):
-    numbers = study.one(0, tmp_path, 4)
+    numbers = study.one(0, tmp_path, 2)
     assert (tmp_path / "residuals.png").stat().st_size > 20_000
-    assert numbers["bootstrap"]["films"] == 4
+    assert numbers["bootstrap"]["films"] == 2
     for each in numbers["quantities"].values():
         assert each["lo"] <= each["hi"]
     assert numbers["enough"] == EXPECTED["numbers"]["one"]["enough"]
