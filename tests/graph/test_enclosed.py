@@ -177,7 +177,7 @@ def test_images_hold_for_every_parameter_of_a_box(low, high, domain, cells):
     graph = ls.transitions(low, ls.grid(domain, cells=cells), method="boxes", upper=high)
     rng = np.random.default_rng(6)
     lo, hi = np.array(domain, dtype=float).T
-    for _ in range(20):
+    for _ in range(8):
         params = type(low)(*(rng.uniform(a, b) for a, b in zip(low, high, strict=True)))
         points = rng.uniform(lo, hi, (300, len(domain)))
         assert holds(graph, params, points if len(domain) > 1 else points[:, 0])
@@ -289,7 +289,7 @@ def test_place_finds_every_closed_cell_that_an_interval_meets(graded):
     target = Target.of(cells, {"inward": ls.maps.INWARD, "outward": ls.maps.OUTWARD})
     rng = np.random.default_rng(7)
     borders = np.concatenate([edges, np.nextafter(edges, -9), np.nextafter(edges, 9), [-1e9, 1e9, 0.0, 3.5]])
-    for _ in range(20_000):
+    for _ in range(4000):
         ends = [rng.choice(borders) if rng.random() < 0.7 else rng.uniform(-0.2, 3.3) for _ in range(2)]
         lo, hi = sorted(map(float, ends))
         k, m, leaves = place_one(target, lo, hi, int(rng.integers(0, 37)))
@@ -317,10 +317,6 @@ def competing(x, y, r, s, c):
     return x * math.exp(r * (1 - x - c * y)), y * math.exp(s * (1 - y - c * x))
 
 
-def slow_competing(x, y, r, c):
-    return x + r * x * (1 - x - c * y), y + r * y * (1 - y - c * x)
-
-
 def line(x, a, b):
     return a * x + b
 
@@ -331,7 +327,6 @@ KEPT = [
     (ls.map(saturating, r=2.0), [(0, 3)], [(1.0,)]),
     (ls.map(competing, r=1.5, s=1.6, c=0.5), [(0, 3), (0, 3)], [(2 / 3, 2 / 3)]),
     (ls.map(competing, r=1.5, s=1.6, c=1.5), [(0, 3), (0, 3)], [(0.0, 1.0), (1.0, 0.0)]),
-    (ls.map(slow_competing, r=0.5, c=0.5), [(0, 1.2), (0, 1.2)], [(2 / 3, 2 / 3)]),
 ]
 
 

@@ -218,7 +218,7 @@ def graphs(draw):
 
 
 @given(graphs())
-@settings(max_examples=150)
+@settings(max_examples=60)
 def test_edges_are_those_of_the_boxes_and_components_those_of_scipy_in_topological_order(graph):
     pointer, targets = expand(graph.ranges)
     assert count_edges(graph.ranges) == targets.size
@@ -245,7 +245,7 @@ def test_edges_are_those_of_the_boxes_and_components_those_of_scipy_in_topologic
 
 
 @given(graphs())
-@settings(max_examples=100)
+@settings(max_examples=40)
 def test_reachability_and_destinations_agree_with_networkx(graph):
     plain = graph.to_networkx()
     parts = strong_components(graph.ranges)
@@ -330,7 +330,7 @@ def range_graphs(draw):
 
 
 @given(range_graphs())
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_components_are_those_of_the_walk(r):
     plain = walk.strong_components(r)
     label, order, loops, count = segment_tree.strong(r)
@@ -349,7 +349,7 @@ def test_components_are_those_of_the_walk(r):
 
 
 @given(range_graphs(), st.integers(0, 2**32))
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_sweeps_are_those_of_the_walk(r, seed):
     plain = walk.strong_components(r)
     n = plain.label.size

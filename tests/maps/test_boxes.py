@@ -17,7 +17,7 @@ from limitsets.systems.maps.textbook.shared import DOMAINS as PUBLIC
 from tests.interval.exact import arb
 from tests.maps_of_tests import DOMAINS as OWN, Baker, Contraction, Linear2, Product, ThreeState, TwoState
 
-POINTS = 6000
+POINTS = 2000
 DOMAINS = PUBLIC | OWN
 HALF = Fraction(1, 2)
 
@@ -174,11 +174,11 @@ def test_boxes_of_small_cells_are_tight(cls, size):
     """Cells on which the map is monotone, so that the corners give the exact range."""
     rng = np.random.default_rng(3)
     params = DEFAULTS.get(cls, cls())
-    lo = tuple(rng.uniform(a + 0.01 * (b - a), b - 0.01 * (b - a), 400) for a, b in DOMAINS[cls])
+    lo = tuple(rng.uniform(a + 0.01 * (b - a), b - 0.01 * (b - a), 100) for a, b in DOMAINS[cls])
     hi = tuple(x + size for x in lo)
     got = BoxImages(params, params, 0, lo, hi)
     assert (got.count == 1).all()
-    for k in range(400):
+    for k in range(100):
         corners = itertools.product(*((Fraction(a[k]), Fraction(b[k])) for a, b in zip(lo, hi, strict=True)))
         found = [dict(EXACT[cls][1](*map(Fraction, params), *corner)) for corner in corners]
         branch = None if None in found[0] else int(got.to[1, k])
@@ -257,7 +257,7 @@ def _loop(params, lo, hi, count):
 
 
 @pytest.mark.sweep
-@pytest.mark.parametrize("cls", [maps.Henon, maps.Leslie, maps.Cubic], ids=lambda cls: cls.__name__)
+@pytest.mark.parametrize("cls", [maps.Leslie, maps.Cubic], ids=lambda cls: cls.__name__)
 def test_boxes_are_compiled_without_fused_operations(cls):
     params = cls()
     lo = tuple(np.array([0.1, 0.2]) for _ in range(maps.kind_of(params).dimension))

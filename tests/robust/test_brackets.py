@@ -38,9 +38,9 @@ def test_a_normal_law_has_its_probabilities_and_its_density():
     assert off.max() <= law.ripple < 3.0 * off.max()
     assert np.trapezoid(off, fine, axis=0).sum() <= law.tilt < 3.0 * np.trapezoid(off, fine, axis=0).sum()
     ends = np.array([float(end) for end in law.ends])
+    at_ends = exact.pdf(3.0 - 1e-12)
     assert [(j, float(change)) for j, change in law.jumps] == [
-        (0, pytest.approx(exact.pdf(-3.0 + 1e-12))),
-        (96, pytest.approx(-exact.pdf(3.0 - 1e-12))),
+        (j, pytest.approx(sign * at_ends)) for j, sign in ((0, 1), (96, -1))
     ]
     for column in law.columns:
         inside = np.linspace(ends[column.first], ends[column.last], 101)
@@ -71,19 +71,17 @@ def test_a_uniform_law_jumps_at_its_ends_and_has_narrow_columns():
 NOISES = [
     (BOTH, 100),
     (Scattering(landing=Uniform(0.05)), 1000),
-    (Scattering(speed=Uniform(0.01)), 1000),
     (Scattering(speed=Uniform(0.1)), 1000),
     (Scattering(speed=Uniform(0.1), landing=Uniform(0.05)), 100),
     (Scattering(), 1),
     (Scattering(speed=Gaussian(0.005)), 1000),
     (Scattering(landing=Gaussian(0.02)), 1000),
-    (Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02)), 100),
     (Scattering(speed=Gaussian(0.005), landing=Uniform(0.02)), 100),
 ]
 
 
 CASES = [("paper-designed", *each) for each in NOISES]
-CASES += [("paper-initial", *NOISES[k]) for k in (0, 1, 2, 3, 5, 6, 7)]  # the others take longest
+CASES += [("paper-initial", *NOISES[k]) for k in (0, 2)]
 
 
 @pytest.mark.sweep
@@ -92,7 +90,7 @@ def test_one_throw_is_bounded_at_every_place(name, scatter, count):
     scene = ls.load(name)
     chain = chain_of(scene, scatter, [(2, 8.0, 20.0)], {"right": [(2, 25.0, math.inf)]}, 250).steps
     mesh, random = chain.mesh, np.random.default_rng(3)
-    x, side = random.uniform(6.0, 22.0, 1000), random.integers(0, 3, 1000)
+    x, side = random.uniform(6.0, 22.0, 400), random.integers(0, 3, 400)
     rows = [slice(first, last) for first, last in pairwise(mesh.first.tolist())]
     place, phase = np.clip(mesh.place, -60.0, 60.0), np.repeat(np.arange(3), np.diff(mesh.first))
     for values in (
@@ -234,16 +232,9 @@ def test_a_throw_without_noise_is_certain():
 
 
 @pytest.mark.sweep
-@pytest.mark.parametrize(
-    ("name", "scatter", "cells"),
-    [
-        ("paper-designed", BOTH, 500),
-        ("paper-designed", Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02)), 300),
-        ("paper-initial", Scattering(landing=Uniform(0.1)), 300),
-    ],
-)
-def test_brackets_meet_the_shares_of_many_throws(name, scatter, cells):
-    scene, parts, throws = ls.load(name), 20_000, 8
+@pytest.mark.parametrize("scatter", [BOTH, Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))])
+def test_brackets_meet_the_shares_of_many_throws(scatter):
+    scene, parts, throws, cells = ls.load("paper-designed"), 20_000, 8, 300
     goal = (20.5, 2)
     found = absorption_brackets(scene, scatter, right=goal, cells=cells, throws=throws, mean=False)
     thrown_ = throw_many(scene, scatter, goal, starts_from(scene), throws=parts, parts=parts, seed=11)

@@ -87,7 +87,7 @@ def breaks_at(name, sign, sizes):
     nominal = scene.value(name)
     for size in sizes:
         moved = scene.with_values({name: nominal + sign * size})
-        if one_throw.highest_off(moved.map, 400_000) > X:
+        if one_throw.highest_off(moved.map, 150_000) > X:
             return size
     return math.inf
 
@@ -114,10 +114,7 @@ def test_of_pieces_proved_for_different_starts_the_fewest_are_claimed(monkeypatc
     assert claimed[0].starts["from"] == {side: max(each[side] for each in froms) for side in froms[0]}
 
 
-LONG = (pytest.param(name, marks=pytest.mark.sweep) for name in OF_MASS[:2])
-
-
-@pytest.mark.parametrize("name", ["arm.surface_height", *LONG])
+@pytest.mark.parametrize("name", ["arm.surface_height", pytest.param(OF_MASS[0], marks=pytest.mark.sweep)])
 def test_lengths_are_bracketed(name):
     (found,) = ls.margin("paper-designed", name, width=0.02)
     assert found.unit == "in"
@@ -133,9 +130,9 @@ def test_lengths_are_bracketed(name):
 def test_a_tolerance_in_turns_or_milligrams_says_the_unit_of_the_margin():
     scene = ls.load("paper-designed").as_dict()
     scene["throw"], scene["gravity"] = {"speed": "26.336 rpm"}, {"acceleration": "193.045 in/s^2"}
-    (by_share,) = ls.margin(ls.load(scene), "throw.speed", reading="fixed", width=0.05)
+    (by_share,) = ls.margin(ls.load(scene), "throw.speed", reading="fixed", width=0.1)
     scene["tolerance"] = {"throw.speed": "0.1 rpm"}
-    (found,) = ls.margin(ls.load(scene), "throw.speed", reading="fixed", width=0.05)
+    (found,) = ls.margin(ls.load(scene), "throw.speed", reading="fixed", width=0.1)
     assert (found.unit, found.closed) == ("rpm", True)
     # two brackets of one number
     assert found.proved < 0.26336 * by_share.refuted
@@ -200,7 +197,7 @@ def test_several_goals_hold_together():
         tops = []
         for sign in (-1, 1):
             kappa = slow.kappa / (1 + sign * share / 100) ** 2
-            path = ls.orbit(slow.with_values({"throw.kappa": kappa}).map, 15.0, 2, 400_000)
+            path = ls.orbit(slow.with_values({"throw.kappa": kappa}).map, 15.0, 2, 150_000)
             x = np.asarray(path.x)[1000:][np.asarray(path.side)[1000:] == 2]
             tops.append(x.max())
         assert (min(tops) >= 22.5) == reached
@@ -214,7 +211,7 @@ def below_20_off_side_2(lo, hi, side):
 @pytest.mark.parametrize("reading", ["fixed", "per-throw"])
 def test_a_function_of_the_callers_is_a_goal(tmp_path, reading):
     goal = Predicate(below_20_off_side_2, "below 20 in off side 2", cuts=(20.0,))
-    (found,) = ls.margin("paper-designed", "throw.speed", goal=goal, reading=reading, width=0.03)
+    (found,) = ls.margin("paper-designed", "throw.speed", goal=goal, reading=reading, width=0.1)
     assert found.proved < 100 * sharp_speed(reading == "per-throw") < found.refuted
     assert found.closed
     with pytest.raises(LimitsetsError, match="goals that the checker knows"):
@@ -284,12 +281,12 @@ def test_every_quantity_of_a_scene_is_measured():
 @pytest.mark.sweep
 def test_a_goal_that_fails_between_scenes_in_which_it_holds():
     """The part's centre moved right in paper-initial: x > 21.8 off side 2 near 0.07 in, not at 0.097 in."""
-    (found,) = ls.margin("paper-initial", "part.mass.center.along", goal=OrientedBeyond(21.8, 2))
+    (found,) = ls.margin("paper-initial", "part.mass.center.along", goal=OrientedBeyond(21.8, 2), width=0.03)
     assert found.closed
 
     def highest(size):
         moved = ls.load("paper-initial").with_values({"part.mass.center.along": 3.9867006 + size})
-        return one_throw.highest_off(moved.map, 400_000)
+        return one_throw.highest_off(moved.map, 200_000)
 
     assert highest(0.0972) < 21.8
     assert max(highest(sign * found.proved) for sign in (-1, 1)) < 21.8

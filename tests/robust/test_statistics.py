@@ -39,7 +39,7 @@ GOAL = (20.5, 2)
 @pytest.fixture(scope="module")
 def gaussian():
     noise = Scattering(speed=Gaussian(0.005), landing=Gaussian(0.02))
-    return noise_statistics("paper-designed", noise, goal=GOAL, cells=512)
+    return noise_statistics("paper-designed", noise, goal=GOAL, cells=384)
 
 
 def solved(scene, noise, cells):
@@ -160,7 +160,7 @@ def test_slopes_are_those_of_secants(gaussian):
     for name in ("speed", "landing"):
         apart = math.log(1.1 / 0.9)
         scaled = [gaussian.scatter.scaled(factor, name) for factor in (1.1, 0.9)]
-        high, low = (solved("paper-designed", noise, 768).numbers for noise in scaled)
+        high, low = (solved("paper-designed", noise, 512).numbers for noise in scaled)
         for number in ("time on side 0", "mean throws"):
             slope = gaussian.sensitivity[name][number]
             secant = (high[number] - low[number]) / apart

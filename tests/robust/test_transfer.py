@@ -1,10 +1,11 @@
 """The transfer operator with noise, and absorption."""
 
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.sparse import csr_array
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError, GridError
@@ -22,32 +23,13 @@ from limitsets.parameters.noise.absorbing import absorption, classes, feeding, r
 from limitsets.parameters.noise.cell_images import BoxcarOperator, Boxcars, laid
 from limitsets.parameters.noise.ulam import transfer
 from limitsets.systems.sets import invariant_measures
-from tests.maps_of_tests import Baker
+from tests.maps_of_tests import Baker, Tent
 
 # ----------------------------------------------------------------
 # The transfer operator where it is known on paper, or from a kernel integrated by other means.
 
 
 LINE = [(0.0, 1.0)]
-
-
-class Tent(NamedTuple):
-    """A tent map, with forced branches."""
-
-    slope: float
-
-
-def _tent(params, x, side):
-    return (params.slope * x, side, 0) if x < 0.5 else (params.slope * (1.0 - x), side, 1)
-
-
-def _tent_on(params, x, side, branch):
-    if branch == 0:
-        return params.slope * x, side, params.slope
-    return params.slope * (1.0 - x), side, -params.slope
-
-
-ls.register(Tent, image=_tent, image_on=_tent_on, branches=("left", "right"))
 
 
 def kernel_of(map_, law, n):
@@ -229,27 +211,14 @@ def test_noise_of_x_in_two_dimensions_is_refused():
         transfer(Baker(), ls.grid(LINE, cells=4))
 
 
-class Shifted(NamedTuple):
-    """A root with forced images: no number below 0."""
-
-    factor: float
-
-
-def _shifted(params, x, side):
-    return (params.factor * np.sqrt(x) if x >= 0.0 else np.nan), side, 0
-
-
-def _shifted_on(params, x, side, branch):
-    root = np.sqrt(x) if x >= 0.0 else np.nan
-    return params.factor * root, side, 0.5 * params.factor / root
-
-
-ls.register(Shifted, image=_shifted, image_on=_shifted_on)
+def rooted(x, factor):
+    """No number below 0."""
+    return factor * np.sqrt(x)
 
 
 def test_what_has_no_image_is_undefined_and_not_outside():
     """Below 0 there is no number; from 1/4 on 2 sqrt(x) lies beyond 1, the end of the domain."""
-    chain = transfer(Shifted(2.0), ls.grid([(-1.0, 1.0)], cells=8))
+    chain = transfer(ls.map(rooted, factor=2.0), ls.grid([(-1.0, 1.0)], cells=8))
     assert chain.exits == ("outside", "undefined")
     np.testing.assert_allclose(chain.sinks[:, 1], [1, 1, 1, 1, 0, 0, 0, 0], rtol=0, atol=1e-9)
     np.testing.assert_allclose(chain.sinks[:, 0], [0, 0, 0, 0, 0, 1, 1, 1], rtol=0, atol=1e-9)
@@ -259,49 +228,35 @@ def test_what_has_no_image_is_undefined_and_not_outside():
 # Absorption, escape and arrivals, against closed forms.
 
 
-class Still(NamedTuple):
+def still(x):
     """x stays; noise makes it walk."""
-
-    shift: float
-
-
-def _still(params, x, side):
-    return x + params.shift, side, 0
+    return x
 
 
-def _still_on(params, x, side, branch):
-    return x + params.shift, side, 1.0
+def from_zero(x, left):
+    return left * x
 
 
-ls.register(Still, image=_still, image_on=_still_on)
+def from_two(x, right, over):
+    return 2.0 + over - right * (2.0 - x)
 
 
-class TwoCells(NamedTuple):
+def beyond_one(x):
+    return x - 1.0
+
+
+STAYS = ls.map(still)
+
+
+def two_cells(left, right, over):
     """[0, 1) is stretched by `left` from 0, [1, 2) by `right` downwards from 2 + `over`; beyond 2 it leaves."""
-
-    left: float
-    right: float
-    over: float
-
-
-def _two(params, x, side):
-    after = params.left * x if x < 1.0 else 2.0 + params.over - params.right * (2.0 - x)
-    return after, side, 0 if x < 1.0 else 1
-
-
-def _two_on(params, x, side, branch):
-    if branch == 0:
-        return params.left * x, side, params.left
-    return 2.0 + params.over - params.right * (2.0 - x), side, params.right
-
-
-ls.register(TwoCells, image=_two, image_on=_two_on, branches=("left", "right"))
+    return ls.map(pieces=(from_zero, from_two), margin=beyond_one, left=left, right=right, over=over)
 
 
 def walk(n, up):
     """Chain of n + 1 unit cells; a step up with probability `up`, down otherwise."""
     cover = ls.grid([(0.0, n + 1.0)], cells=n + 1)
-    return transfer(Still(0.0), cover, landing=Samples([-1.0, 1.0], [1.0 - up, up]))
+    return transfer(STAYS, cover, landing=Samples([-1.0, 1.0], [1.0 - up, up]))
 
 
 def ends(n):
@@ -344,7 +299,7 @@ def test_walk_off_both_ends():
     np.testing.assert_allclose(found.probability["outside"], 1.0, rtol=0, atol=1e-11)
     assert found.classes == ()
     # The quasi-stationary distribution is a half sine, the rate of escape 1 - cos(pi / (n + 2)); of period 2.
-    part = classes(transfer(Still(0.0), chain.grid, landing=Samples([-1.0, 0.0, 1.0])))
+    part = classes(transfer(STAYS, chain.grid, landing=Samples([-1.0, 0.0, 1.0])))
     assert part == ()  # leaves faster than 2 % a step
     slow = walk(60, 0.5)
     (part,) = classes(slow)
@@ -366,12 +321,12 @@ def test_the_search_for_a_distribution_ends_after_so_many_steps(monkeypatch):
 
 def test_two_cells_closed():
     """P = [[1 - a, a], [b, 1 - b]] rests at (b, a) / (a + b)."""
-    chain = transfer(TwoCells(1.6, 1.25, 0.0), ls.grid([(0.0, 2.0)], cells=2))
+    chain = transfer(two_cells(1.6, 1.25, 0.0), ls.grid([(0.0, 2.0)], cells=2))
     a, b = 1 - 1 / 1.6, 1 - 1 / 1.25
     np.testing.assert_allclose(chain.matrix.toarray(), [[1 - a, a], [b, 1 - b]], rtol=0, atol=1e-14)
     (found,) = classes(chain)
     np.testing.assert_allclose(found.weight, [b / (a + b), a / (a + b)], rtol=0, atol=1e-12)
-    assert found.branches["right"] == pytest.approx(a / (a + b), abs=1e-12)
+    assert found.branches["from_two"] == pytest.approx(a / (a + b), abs=1e-12)
     there = absorption(chain, np.array([False, True]))
     np.testing.assert_allclose(there.mean, [1 / a, 0.0], rtol=1e-12)
 
@@ -379,7 +334,7 @@ def test_two_cells_closed():
 def test_two_cells_that_are_left():
     """Q = [[1 - a, a], [b, 1 - b - c]]: leading eigenvalue and left vector of a matrix of two rows."""
     left, right, over = 1.6, 1.25, 0.01
-    chain = transfer(TwoCells(left, right, over), ls.grid([(0.0, 2.0)], cells=2))
+    chain = transfer(two_cells(left, right, over), ls.grid([(0.0, 2.0)], cells=2))
     a, c = 1 - 1 / left, over / right
     b = (1.0 - (2.0 + over - right)) / right
     kept = 1 - b - c
@@ -400,10 +355,6 @@ def test_two_closed_classes_are_kept_apart():
     stuck = np.isin(np.arange(n + 1), (3, 4, 5, 6, 7))
     matrix = free.matrix.toarray()
     matrix[~stuck] = np.eye(n + 1)[~stuck]
-    from dataclasses import replace
-
-    from scipy.sparse import csr_array
-
     chain = replace(free, throw=csr_array(matrix), landing=None, sinks=np.zeros((n + 1, 2)))
     parts = classes(chain)
     closed = [part.cells.mask.nonzero()[0].tolist() for part in parts if part.closed]
@@ -417,11 +368,9 @@ def test_two_closed_classes_are_kept_apart():
 
 def test_distribution_of_arrivals():
     """Up or stay with p: the n-th success of a row of trials, a negative binomial law."""
-    from scipy import stats
-
     n, p = 5, 0.3
     cover = ls.grid([(0.0, n + 1.0)], cells=n + 1)
-    chain = transfer(Still(0.0), cover, landing=Samples([0.0, 1.0], [1 - p, p]))
+    chain = transfer(STAYS, cover, landing=Samples([0.0, 1.0], [1 - p, p]))
     goal = np.arange(n + 1) == n
     found = feeding(chain, absorption(chain, goal), np.eye(n + 1)[0])
     law = stats.nbinom(n, p, loc=n)

@@ -328,7 +328,7 @@ def places(node: Any) -> list[tuple[Any, Any]]:
     return [place for key, value in items for place in [(node, key), *places(value)]]
 
 
-@settings(max_examples=150)
+@settings(max_examples=70)
 @given(st.data())
 def test_spoilt_structures(data: st.DataObject) -> None:
     table = copy.deepcopy(DESIGNED)
@@ -351,7 +351,7 @@ def test_spoilt_structures(data: st.DataObject) -> None:
 TEXT = dump(load("paper-designed"))
 
 
-@settings(max_examples=150)
+@settings(max_examples=70)
 @given(st.integers(0, len(TEXT)), st.integers(0, 12), st.text(max_size=12))
 def test_spoilt_text(place: int, length: int, other: str) -> None:
     try:

@@ -115,13 +115,6 @@ def test_the_table_from_sets_of_any_size(name, start):
     assert all(end.origin.kind == "critical" for end in found.ends)
 
 
-def test_from_the_cells_of_a_graph():
-    scene = ls.load("paper-designed")
-    graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=4096))
-    assert_same(ls.limit_set(graph).extents, LIMIT_SETS["paper-designed"], 1e-12)
-    assert_same(ls.limit_set(graph, ls.attractors(graph)[0]).extents, LIMIT_SETS["paper-designed"], 1e-12)
-
-
 # ---------------------------------------------------------------- the same end points at 40 digits
 
 
@@ -322,16 +315,6 @@ def test_attracting_cycle_holds_all_the_weight():
     middles = 0.5 * (edges[1:] + edges[:-1])
     for point in points:
         assert found.weight[np.abs(middles - point) < 2 / 4096].sum() == pytest.approx(0.5, abs=1e-9)
-
-
-def test_shares_of_the_sides_agree_with_an_orbit():
-    scene = ls.load("paper-designed")
-    graph = ls.transitions(scene.map, ls.grid(scene.domain, cells=4096))
-    (found,) = invariant_measures(graph)
-    path = ls.orbit(scene.map, 15.0, 2, 1_000_000)
-    for side in range(3):
-        share = found.weight[graph.grid.of_side(side)].sum()
-        assert share == pytest.approx(np.mean(path.side == side), abs=1e-3)
 
 
 def test_nothing_stays():

@@ -74,7 +74,7 @@ def by_recurrence(scene, longest):
     for p in range(1, longest + 1):
         same = (path.side[p:] == path.side[:-p]) & (path.side[:-p] == 0)
         close = (np.abs(path.x[p:] - path.x[:-p]) < 0.1) & same
-        for k in np.flatnonzero(close)[::50]:
+        for k in np.flatnonzero(close)[::150]:
             word, x = path.code[k : k + p], path.x[k]
 
             def follow(start, word=word):
@@ -184,17 +184,16 @@ def test_wrong_questions():
 # Cycles close under `image`, and each comes once: against counts on paper and by another way.
 
 
-def waves(x, omega, k, m):
-    """A circle map of two harmonics, with `floor` in place of branches."""
+def waves(x, omega, k, m, n=1.0):
+    """A circle map of two harmonics that goes round n times, with `floor` in place of branches."""
     first, second = math.sin(math.tau * x), math.sin(2.0 * math.tau * x)
-    y = x + omega - k / math.tau * first - m / (2.0 * math.tau) * second
+    y = n * x + omega - k / math.tau * first - m / (2.0 * math.tau) * second
     return y - math.floor(y)
 
 
-def times(x, m):
-    """m x, with `floor`."""
-    y = m * x
-    return y - math.floor(y)
+def times(n):
+    """n x mod 1."""
+    return ls.map(waves, omega=0.0, k=0.0, m=0.0, n=n)
 
 
 def kicked(x, y, k):
@@ -258,12 +257,8 @@ def lifted(p, n, up_to):
     x = (np.arange(n) + 0.5) / n
     count, y = {}, x.copy()
     for period in range(1, up_to + 1):
-        y = (
-            y
-            + p.omega
-            - p.k / math.tau * np.sin(math.tau * y)
-            - p.m / (2 * math.tau) * np.sin(2 * math.tau * y)
-        )
+        turned = p.k * np.sin(math.tau * y) + 0.5 * p.m * np.sin(2 * math.tau * y)
+        y = y + p.omega - turned / math.tau
         for q in range(math.floor((y - x).min()), math.ceil((y - x).max()) + 1):
             sign = np.sign(y - x - q)
             points = int((sign != np.roll(sign, -1)).sum())
@@ -276,9 +271,7 @@ def lifted(p, n, up_to):
     return found
 
 
-@pytest.mark.parametrize(
-    ("omega", "coupling"), [(0.61, 0.9), (0.35, 0.95), (0.5, 0.9), (0.4, 0.99), (0.02, 0.3)]
-)
+@pytest.mark.parametrize(("omega", "coupling"), [(0.61, 0.9), (0.5, 0.9), (0.4, 0.99)])
 def test_an_own_circle_map_has_the_cycles_of_its_lift(omega, coupling):
     params = ls.map(waves, omega=omega, k=coupling, m=0.0)
     found = cycles_of(params, ALL, UNIT, 6)
@@ -370,7 +363,7 @@ def graph_of(params, cells=256):
 
 @pytest.mark.parametrize("m", [2.0, 3.0, 5.0])
 def test_m_x_mod_1_returns_at_every_multiple(m):
-    params = ls.map(times, m=m)
+    params = times(m)
     found = ls.cycles(graph_of(params), 9 if m == 2.0 else 4)
     assert found.complete
     require_closed(params, found)
@@ -414,7 +407,9 @@ def test_basins_say_that_starts_are_undecided_by_the_enclosed_image_of_a_jump():
     leads = (first < cells) & (last >= cells)
     for _ in range(cells):
         meets = [leads[np.arange(a, b + 1) % cells].any() for a, b in zip(first, last, strict=True)]
-        leads = leads | np.array(meets)
+        before, leads = leads, leads | np.array(meets)
+        if (leads == before).all():
+            break
     found = ls.basins(graph, ls.attractors(graph))
     assert found.undecided_between > 0.1
     advice = r"from (.*) % of the starts .*, from (.*) % a cell whose enclosed image is a whole"
@@ -451,7 +446,7 @@ def test_the_atlas_decides_circle_maps_with_a_floor():
 @pytest.mark.sweep
 def test_the_atlas_finds_the_bands_of_a_falling_map_with_a_floor():
     """x -> -5 x / 2 mod 1 expands, and its images of any interval fill [0, 1]."""
-    found = ls.atlas(ls.map(times, m=-2.5), "m=-2.5:-2.25:2", domain=[(0.0, 1.0)]).dataset
+    found = ls.atlas(times(-2.5), "n=-2.5:-2.25:2", domain=[(0.0, 1.0)]).dataset
     assert found.undecided.values.tolist() == [0, 0]
     assert found.bands.values[:, 0, 0].tolist() == [1, 1]
     assert found.lowest.values[:, 0, 0] == pytest.approx(0.0, abs=1e-9)

@@ -14,107 +14,54 @@ from tests.maps_of_tests import Baker, Contraction, Linear2, Product, ThreeState
 # ---------------------------------------------------------------- maps with holes: roots, logarithms, quotients
 
 
-class Root(NamedTuple):
-    below: float
+def root(x, below):
+    return math.sqrt(x) - below if x >= 0.0 else math.nan
 
 
-def root(params, x, side):
-    return math.sqrt(x) - params.below if x >= 0.0 else math.nan, side, 0
-
-
-class Logarithm(NamedTuple):
-    above: float
-
-
-def logarithm(params, x, side):
-    return math.log(x) + params.above if x > 0.0 else math.nan, side, 0
-
-
-class Log2(NamedTuple):
-    factor: float
-
-
-def log_of_size(params, x, side):
+def log_of_size(x, factor):
     """A pole and no hole: every orbit but one of a countable set goes on for ever, until it passes the border."""
-    return (params.factor * math.log(abs(x)) if x != 0.0 else -math.inf), side, 0
+    return factor * math.log(abs(x)) if x != 0.0 else -math.inf
 
 
-class Gap(NamedTuple):
-    half: float
-
-
-def gap(params, x, side):
+def gap(x, half):
     """The logarithm of x^2 - half^2: a hole in the middle, with a steep border on both sides."""
-    inside = x * x - params.half * params.half
-    return 0.3 * math.log(inside) + 1.0 if inside > 0.0 else math.nan, side, 0
+    inside = x * x - half * half
+    return 0.3 * math.log(inside) + 1.0 if inside > 0.0 else math.nan
 
 
-class Newton(NamedTuple):
-    square: float
-
-
-def newton(params, x, side):
+def newton(x, square):
     """Newton's method for a root: a pole at 0, two attractors."""
-    return (0.5 * (x + params.square / x) if x != 0.0 else math.nan), side, 0
+    return 0.5 * (x + square / x) if x != 0.0 else math.nan
 
 
-class Reciprocal(NamedTuple):
-    less: float
+def tangent(x, factor):
+    return factor * math.tan(x)
 
 
-def reciprocal(params, x, side):
-    return (1.0 / x - params.less if x != 0.0 else math.nan), side, 0
-
-
-class Tangent(NamedTuple):
-    factor: float
-
-
-def tangent(params, x, side):
-    return params.factor * math.tan(x), side, 0
-
-
-class Arch(NamedTuple):
-    height: float
-
-
-def arch(params, x, side):
-    """A half circle: vertical at both ends of where it is defined."""
-    under = 1.0 - x * x
-    return params.height * math.sqrt(under) - 0.5 if under >= 0.0 else math.nan, side, 0
-
-
-class Means(NamedTuple):
-    share: float
-
-
-def means(params, x, side):
+def means(x, y, share):
     """Arithmetic and geometric means: undefined where the signs differ, else towards a point of the diagonal."""
-    under = x[0] * x[1]
+    under = x * y
     other = math.sqrt(under) if under >= 0.0 else math.nan
-    return (params.share * (x[0] + x[1]), 0.9 * other + 0.05), side, 0
+    return share * (x + y), 0.9 * other + 0.05
 
 
-class Quotient(NamedTuple):
-    factor: float
-
-
-def quotient(params, x, side):
-    return (params.factor * x[0] / x[1] if x[1] != 0.0 else math.nan, 0.5 * x[1] + 0.3 * x[0]), side, 0
-
-
-class Cubes(NamedTuple):
-    scale: float
-
-
-def cubes(params, z, side):
+def cubes(x, y):
     """Newton's method for z^3 = 1 in the plane: a pole at 0, three basins mixed everywhere between them."""
-    x, y = z
     size = (x * x + y * y) ** 2
     if size == 0.0:
-        return (math.nan, math.nan), side, 0
-    u = (2.0 * x + params.scale * (x * x - y * y) / size) / 3.0
-    return (u, (2.0 * y - params.scale * 2.0 * x * y / size) / 3.0), side, 0
+        return math.nan, math.nan
+    return (2.0 * x + (x * x - y * y) / size) / 3.0, (2.0 * y - 2.0 * x * y / size) / 3.0
+
+
+def disc(x, y, radius):
+    """A round hole, around which all turns and comes in."""
+    under = x * x + y * y - radius * radius
+    size = math.sqrt(under) if under >= 0.0 else math.nan
+    return 0.7 * x - 0.6 * y + 0.1 * size, 0.6 * x + 0.7 * y
+
+
+def nothing(x):
+    return math.nan * x
 
 
 class Steep(NamedTuple):
@@ -135,64 +82,33 @@ def steep_on(params, x, side, branch):
     return (first, params.factor * x[1]), side, ((slope, 0.0), (0.0, params.factor))
 
 
-class Disc(NamedTuple):
-    radius: float
-
-
-def disc(params, x, side):
-    """A round hole, around which all turns and comes in."""
-    under = x[0] * x[0] + x[1] * x[1] - params.radius * params.radius
-    size = math.sqrt(under) if under >= 0.0 else math.nan
-    return (0.7 * x[0] - 0.6 * x[1] + 0.1 * size, 0.6 * x[0] + 0.7 * x[1]), side, 0
-
-
-class Nothing(NamedTuple):
-    unused: float
-
-
-def nothing(params, x, side):
-    return math.nan, side, 0
-
-
-LINES = (Root, Logarithm, Log2, Gap, Newton, Reciprocal, Tangent, Arch, Nothing)
-IMAGES = (root, logarithm, log_of_size, gap, newton, reciprocal, tangent, arch, nothing)
-for line, image in zip(LINES, IMAGES, strict=True):
-    ls.register(line, image=image)
-for plane, image in ((Means, means), (Quotient, quotient), (Cubes, cubes), (Steep, steep), (Disc, disc)):
-    ls.register(plane, image=image, dimension=2)
+ls.register(Steep, image=steep, dimension=2)
 ls.register(SteepOn, image=steep, image_on=steep_on, dimension=2)
 
 SQUARE = [(-2.0, 2.0), (-2.0, 2.0)]
 HOLES = [
-    (Root(0.2), [(-1.0, 2.0)], 1000),
-    (Root(-0.25), [(-1.0, 2.0)], 333),
-    (Logarithm(1.5), [(-1.0, 4.0)], 1000),
-    (Log2(1.3), [(-3.0, 3.0)], 999),
-    (Gap(0.01), [(-2.0, 2.0)], 500),
-    (Newton(2.0), [(-3.0, 3.0)], 1001),
-    (Newton(-1.0), [(-30.0, 30.0)], 1000),
-    (Reciprocal(0.6), [(-2.0, 2.0)], 777),
-    (Tangent(0.7), [(-5.0, 5.0)], 1000),
-    (Arch(1.2), [(-1.5, 1.5)], 700),
-    (Means(0.5), SQUARE, 64),
-    (Quotient(0.4), SQUARE, 81),
-    (Cubes(1.0), SQUARE, 128),
+    (ls.map(root, below=0.2), [(-1.0, 2.0)], 1000),
+    (ls.map(root, below=-0.25), [(-1.0, 2.0)], 333),
+    (ls.map(log_of_size, factor=1.3), [(-3.0, 3.0)], 999),
+    (ls.map(gap, half=0.01), [(-2.0, 2.0)], 500),
+    (ls.map(newton, square=2.0), [(-3.0, 3.0)], 1001),
+    (ls.map(newton, square=-1.0), [(-30.0, 30.0)], 1000),
+    (ls.map(tangent, factor=0.7), [(-5.0, 5.0)], 1000),
+    (ls.map(means, share=0.5), SQUARE, 64),
+    (ls.map(cubes), SQUARE, 128),
     (Steep(0.5), [(-3.0, 3.0), (-2.0, 2.0)], 65),
     (SteepOn(0.5), [(-3.0, 3.0), (-2.0, 2.0)], 64),
-    (Disc(0.37), SQUARE, 101),
-    (Nothing(0.0), [(0.0, 1.0)], 50),
+    (ls.map(disc, radius=0.37), SQUARE, 101),
+    (ls.map(nothing), [(0.0, 1.0)], 50),
 ]
 TEXTBOOK = [
     (Baker(), [(0.0, 1.0), (0.0, 1.0)], 64),
     (Contraction(0.5), [(-1.0, 1.0)], 333),
-    (ls.maps.Cubic(1.5), [(-1.7, 1.7)], 1000),
     (ls.maps.Cubic(2.6), [(-1.7, 1.7)], 1001),
     (ls.maps.Doubling(2.0), [(0.0, 1.0)], 333),
     (ls.maps.Henon(1.4, 0.3), SQUARE, 128),
-    (ls.maps.Henon(1.0, 0.3), SQUARE, 256),
     (ls.maps.Leslie(), ls.maps.domain_of(ls.maps.Leslie()), 128),
     (Linear2(0.5, 0.0, 0.0, 2.0), SQUARE, 64),
-    (ls.maps.Logistic(3.2), [(-0.2, 1.2)], 1000),
     (ls.maps.Logistic(3.83), [(-0.2, 1.2)], 777),
     (ls.maps.Logistic(4.1), [(0.0, 1.0)], 999),
     (Product(), [(0.0, 1.2), (0.0, 1.2)], 64),
@@ -254,7 +170,7 @@ def test_an_orbit_would_contradict_a_wrong_label():
 
 
 def test_a_map_without_numbers_has_no_attractor():
-    graph = ls.transitions(Nothing(0.0), ls.grid([(0.0, 1.0)], cells=50))
+    graph = ls.transitions(ls.map(nothing), ls.grid([(0.0, 1.0)], cells=50))
     found = ls.attractors(graph)
     shares = ls.basins(graph, found)
     assert found == ()
@@ -273,7 +189,7 @@ def test_undefined_is_the_last_exit_of_every_map():
     assert list(ls.maps.kind_of(ls.maps.Henon(1.4, 0.3)).exits) == ["outside", "undefined"]
 
 
-@pytest.mark.parametrize(("params", "start"), [(Root(0.5), 0.3), (Steep(0.5), (0.4, 1.0))])
+@pytest.mark.parametrize(("params", "start"), [(ls.map(root, below=0.5), 0.3), (Steep(0.5), (0.4, 1.0))])
 def test_an_orbit_stops_where_the_map_is_undefined(params, start):
     path = ls.orbit(params, start, 0, 10)
     assert (path.stopped, path.code[-1]) == ("undefined", UNDEFINED)
@@ -311,7 +227,7 @@ def test_a_proved_image_without_an_end_is_undecided(infinite):
 # ---------------------------------------------------------------- what leaves
 
 
-@pytest.mark.parametrize("cells", [128, 512, 1024])
+@pytest.mark.parametrize("cells", [128, 512])
 def test_starts_that_stay_are_not_said_to_leave(cells):
     """0.432 +- 0.002 of uniform starts stay bounded; their cells are undecided, and the answer says what to do."""
     graph = ls.transitions(ls.maps.Henon(1.4, 0.3), ls.grid(SQUARE, cells=cells))

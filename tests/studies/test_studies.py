@@ -102,7 +102,7 @@ def test_the_table_in_the_readme_is_what_the_study_prints(four_scenes):
 @pytest.fixture(scope="module")
 def physics_engine(tmp_path_factory):
     pytest.importorskip("pymunk")
-    return of_study("02_physics_engine", tmp_path_factory, seed=3, throws=150)
+    return of_study("02_physics_engine", tmp_path_factory, seed=3, throws=60)
 
 
 @pytest.mark.sweep
@@ -112,7 +112,7 @@ def test_the_engine_agrees_with_the_map(physics_engine):
     assert (out / "engine.png").stat().st_size > 20_000
     for name in study.SCENES:
         found, wanted = numbers[name], expected[name]
-        assert found["throws"] == 150
+        assert found["throws"] == 60
         assert found["sides_that_differ"] == []
         # the joint's drift, (omega^2 ell / 2) step^2: ell is at most 4.4 in, and these parts turn at less than 9 w
         assert found["error"]["worst"] < 0.5 * 9.0**2 * 4.4 * study.STEP**2
@@ -200,7 +200,7 @@ def test_too_few_throws_are_said_to_be_too_few(effects_in_engine, tmp_path):
 @pytest.fixture(scope="module")
 def chaos(tmp_path_factory):
     few = {"names": ("paper-designed",), "cells": 4000, "finer": (500, 2000), "between": ()}
-    return of_study("15_chaos", tmp_path_factory, noises={0.01: 2000, 0.003: 4000}, **few)
+    return of_study("15_chaos", tmp_path_factory, noises={0.01: 2000}, **few)
 
 
 def test_chaos_and_order_as_expected(chaos):

@@ -4,8 +4,6 @@ import json
 import math
 import subprocess
 import sys
-import textwrap
-from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 
@@ -228,75 +226,66 @@ def test_a_cluster_that_is_not_there_is_named():
         run(None, cluster="tcp//nowhere")
 
 
-def test_a_store_that_is_done_is_read_and_not_computed_and_xarray_opens_it(tmp_path, whole, computed):
-    run(tmp_path / "s.zarr")
-    again = run(tmp_path / "s.zarr", executor=ThreadPoolExecutor(0 + 1))
+def test_a_store_that_is_done_is_read_and_not_computed_and_xarray_opens_it(stored, whole, computed):
+    again = run(stored)
     assert (again.new, again.kept) == (0, 21)
-    assert bytes_of(tmp_path / "s.zarr") == whole
+    assert bytes_of(stored) == whole
     assert again.dataset.identical(computed.dataset)
-    with xr.open_zarr(tmp_path / "s.zarr", consolidated=False) as found:
+    with xr.open_zarr(stored, consolidated=False) as found:
         assert found.kappa.sel({"throw.speed": 150.0, "arm.surface_height": -1.0}) > 0
         assert ls.load(found.attrs["scene"]) == DESIGNED
         assert found.attrs["plan_hash"] == computed.dataset.attrs["plan_hash"]
         assert set(found.attrs["versions"]) == {"limitsets", "numpy", "numba"}
 
 
-CHANGES = {
-    "scene": ({"subject": "paper-initial"}, r"scene\.name is 'paper-designed' there, 'paper-initial' here"),
-    "value": (
-        {"subject": DESIGNED.with_values({"arm.length": 30})},
-        r"length is '28 in' there, '30.0 in' here",
-    ),
-    "axis": ({"y": "arm.surface_height=-1:0.1:10"}, r"axes\[0\]\.count is 9 there, 10 here"),
-    "task": ({"task": BLOCKS}, "task is 'tests.sweep.tasks_of_tests:numbers' there"),
-    "options": ({"options": {"pause": 0.0}}, r"options\.pause is None there, 0.0 here"),
-    "seed": ({"seed": 1}, "seed is 0 there, 1 here"),
-    "chunk": ({"chunk": (4, 4)}, r"chunk\[0\] is 3 there, 4 here"),
-    "variables": ({"variables": ["kappa"]}, r"variables is None there, \['kappa'\] here"),
-}
-
-
-def test_a_store_of_another_plan_is_refused_with_what_differs(tmp_path, whole):
-    run(tmp_path / "s.zarr")
-    for change, words in CHANGES.values():
-        given = {"subject": "paper-designed", "x": X, "y": Y, "task": TASK, "chunk": (3, 3)} | change
-        with pytest.raises(LimitsetsError, match=words):
-            atlas(store=tmp_path / "s.zarr", **given)
-    assert bytes_of(tmp_path / "s.zarr") == whole
-
-
-# Code and versions: a function of the plan and what it says on another machine, and what is said of it there.
-OTHER_CODE = [
-    ("version", lambda package: f"{package} of tomorrow", "is '.*' there, 'limitsets of tomorrow' here"),
-    (
-        "source_of",
-        lambda module: {module: "edited"},
-        r"the code of tests\.sweep\.tasks_of_tests is not the code",
-    ),
-    ("code_digest", lambda: "0" * 64, "the code of limitsets is not the code that began it"),
+CHANGES = [
+    ({"subject": "paper-initial"}, r"scene\.name is 'paper-designed' there, 'paper-initial' here"),
+    ({"subject": DESIGNED.with_values({"arm.length": 30})}, r"length is '28 in' there, '30.0 in' here"),
+    ({"y": "arm.surface_height=-1:0.1:10"}, r"axes\[0\]\.count is 9 there, 10 here"),
+    ({"task": BLOCKS}, "task is 'tests.sweep.tasks_of_tests:numbers' there"),
+    ({"options": {"pause": 0.0}}, r"options\.pause is None there, 0.0 here"),
+    ({"seed": 1}, "seed is 0 there, 1 here"),
+    ({"chunk": (4, 4)}, r"chunk\[0\] is 3 there, 4 here"),
+    ({"variables": ["kappa"]}, r"variables is None there, \['kappa'\] here"),
 ]
 
 
-def test_a_store_of_another_version_or_of_edited_code_is_refused(tmp_path, monkeypatch):
-    run(tmp_path / "s.zarr")
-    for name, other, words in OTHER_CODE:
-        with monkeypatch.context() as patch:
-            patch.setattr(f"limitsets.parameters.atlas.plan.{name}", other)
-            with pytest.raises(LimitsetsError, match=words):
-                run(tmp_path / "s.zarr")
+def test_a_store_of_another_plan_is_refused_with_what_differs(stored, whole):
+    for change, words in CHANGES:
+        given = {"subject": "paper-designed", "x": X, "y": Y, "task": TASK, "chunk": (3, 3)} | change
+        with pytest.raises(LimitsetsError, match=words):
+            atlas(store=stored, **given)
+    assert bytes_of(stored) == whole
+
+
+OF_PLAN = "limitsets.parameters.atlas.plan."
 
 
 @pytest.mark.parametrize(
-    ("name", "other", "words"),
+    ("name", "other", "of_store", "of_worker"),
     [
-        ("version", lambda package: "0.0", r"versions\.limitsets of a worker is '0\.0'"),
-        ("code_digest", lambda: "0" * 64, r"sources\.limitsets of a worker"),
+        (
+            "version",
+            lambda package: "0.0",
+            "is '.*' there, '0.0' here",
+            r"versions\.limitsets of a worker is '0\.0'",
+        ),
+        (
+            "code_digest",
+            lambda: "0" * 64,
+            "the code of limitsets is not the code that",
+            r"sources\.limitsets of a w",
+        ),
+        ("source_of", lambda name: {name: "-"}, r"code of tests\.sweep\.tasks_of_tests is not", "sources"),
     ],
 )
-def test_a_worker_with_other_code_refuses_to_work(name, other, words, monkeypatch):
+def test_other_versions_and_edited_code_are_refused(name, other, of_store, of_worker, stored, monkeypatch):
+    """What the plan says of the code is patched as if it were on another machine: of a store, and of a worker."""
     plan = plan_of("paper-designed", X, task=TASK)
-    monkeypatch.setattr(f"limitsets.parameters.atlas.plan.{name}", other)
-    with pytest.raises(LimitsetsError, match=words):
+    monkeypatch.setattr(OF_PLAN + name, other)
+    with pytest.raises(LimitsetsError, match=of_store):
+        run(stored)
+    with pytest.raises(LimitsetsError, match=of_worker):
         answer(plan, 0)
 
 
@@ -352,35 +341,27 @@ def test_gravity_does_not_vary_in_blocks_where_the_throw_is_given_by_kappa():
 
 
 @pytest.mark.sweep
-def test_what_stands_in_a_script_is_not_sent_to_processes():
-    code = f"""
-    import sys; sys.path.insert(0, {str(ROOT)!r})
-    from concurrent.futures import ThreadPoolExecutor
-    import limitsets as ls
-    def here(scene):
-        return {{"kappa": scene.kappa}}
-    try:
-        ls.atlas("paper-designed", {X!r}, task=here, workers=2)
-    except ls.errors.LimitsetsError as error:
-        print(error)
-    with ThreadPoolExecutor(1) as pool:
-        print(ls.atlas("paper-designed", {X!r}, task=here, executor=pool).dataset.sizes["throw.speed"])
-    """
-    lines = python(code).splitlines()
-    assert "move it to a file, or pass executor=concurrent.futures.ThreadPoolExecutor(1)" in lines[0]
-    assert lines[1] == "21"
-
-
-@pytest.mark.sweep
-def test_a_script_without_a_guard_may_start_processes(tmp_path):
+def test_a_script_without_a_guard_starts_processes_and_sends_them_nothing_of_its_own(tmp_path):
     script = tmp_path / "script.py"
-    script.write_text(
-        f"import sys; sys.path.insert(0, {str(ROOT)!r})\nimport limitsets as ls\n"
-        f"found = ls.atlas('paper-designed', {X!r}, task={TASK!r}, chunk=[4], workers=2)\n"
-        "print(found.new, sys.modules['__main__'].__file__ == __file__)\n"
-    )
+    script.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT)!r})
+from concurrent.futures import ThreadPoolExecutor
+import limitsets as ls
+def here(scene):
+    return {{"kappa": scene.kappa}}
+try:
+    ls.atlas("paper-designed", {X!r}, task=here, workers=2)
+except ls.errors.LimitsetsError as error:
+    print(error)
+with ThreadPoolExecutor(1) as pool:
+    print(ls.atlas("paper-designed", {X!r}, task=here, executor=pool).dataset.sizes["throw.speed"])
+found = ls.atlas("paper-designed", {X!r}, task={TASK!r}, chunk=[4], workers=2)
+print(found.new, sys.modules["__main__"].__file__ == __file__)
+""")
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
-    assert (done.stdout, done.stderr) == ("6 True\n", "")
+    refusal, points, ran = done.stdout.splitlines()
+    assert "move it to a file, or pass executor=concurrent.futures.ThreadPoolExecutor(1)" in refusal
+    assert (points, ran, done.stderr) == ("21", "6 True", "")
 
 
 # ---------------------------------------------------------------- tables, chunks, libraries
@@ -394,14 +375,6 @@ def test_a_table_has_a_row_for_each_point(computed):
     one = data.sel({"throw.speed": 150.0, "arm.surface_height": -1.0})
     assert len(table) == 9 * 21
     assert [row["kappa"], row["feet[1]"]] == [float(one.kappa), float(one.feet[1])]
-
-
-def test_a_table_has_columns_for_no_more_attractors_than_a_point_has():
-    one = ls.atlas("paper-designed", "throw.speed=150:160:3").to_dataframe()
-    assert [name for name in one.columns if name.startswith("share")] == ["share[0]"]
-    # beside 0 two fixed points attract
-    two = ls.atlas(ls.maps.Cubic(1.5), "r=1.3:1.6:3", domain=[(-1.2, 1.2)]).to_dataframe()
-    assert [name for name in two.columns if name.startswith("share")] == ["share[0]", "share[1]"]
 
 
 def test_json_has_everything_and_no_nan(computed):
@@ -425,12 +398,12 @@ def test_chunks_are_about_square_and_of_one_size():
         assert chunk_shape(shape, task) == chunk
 
 
-def python(code, *flags):
-    """Run code in a new interpreter, in this checkout."""
-    command = [sys.executable, "-W", "error", *flags, "-c", textwrap.dedent(code)]
+def loaded_by(code):
+    """The modules that a new interpreter in this checkout has loaded after some code."""
+    command = [sys.executable, "-W", "error", "-c", f"import sys\n{code}\nprint('loaded', *sys.modules)"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return set(done.stdout.rpartition("loaded ")[2].split())
 
 
 HEAVY = {"xarray", "zarr", "pandas", "pyarrow", "dask", "distributed"}
@@ -446,20 +419,21 @@ NEEDLESS = {
 
 def test_what_a_worker_computes_by_loads_what_it_needs_alone():
     """Each worker begins with these imports, those of the room among them."""
-    loaded = python("import sys\nimport limitsets.sweep.of_topology\nprint(*sys.modules)").split()
-    assert {"limitsets.parameters.atlas", "limitsets.parameters.atlas.of_topology"} <= set(loaded)
-    assert not (HEAVY | NEEDLESS) & set(loaded)
+    loaded = loaded_by("import limitsets.sweep.of_topology")
+    assert {"limitsets.parameters.atlas", "limitsets.parameters.atlas.of_topology"} <= loaded
+    assert not (HEAVY | NEEDLESS) & loaded
 
 
 @pytest.mark.sweep
 def test_an_analysis_loads_none_of_them(tmp_path):
     words = ["analyse", "paper-designed", "--cells", "64", "--out", str(tmp_path / "a"), "--json"]
-    code = f"import sys, limitsets.cli\nlimitsets.cli.main({words})\nprint('loaded', *sys.modules)"
-    assert not HEAVY & set(python(code).rpartition("loaded ")[2].split())
+    assert not HEAVY & loaded_by(f"import limitsets.cli\nlimitsets.cli.main({words})")
 
 
-def test_its_table_has_words_and_no_codes():
+def test_its_tables_have_words_and_no_codes_and_columns_for_the_attractors_there_are():
+    """One on this feeder; of two tells `test_classes`."""
     found = ls.atlas("paper-designed", "throw.speed=140:170:4")
     values = {row[0]: row[1] for row in found.tables()[0].rows}
     assert values["class"] == "classes: 2"  # every start leaves; one attractor
     assert "not checked" in values["checked"]
+    assert [name for name in found.to_dataframe().columns if name.startswith("share")] == ["share[0]"]

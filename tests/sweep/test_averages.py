@@ -67,22 +67,18 @@ def logistic_entropy(r, bands):
     return entropy_of(lambda x: through(x)[1] < 0.0, through(0.5)[0], lambda x: through(x)[0]) / bands
 
 
+# 3.84 and 3.8536 lie in the window of period three: between the bands there is a Cantor set of entropy 0.4812
+BANDS = {3.58: 4, 3.62: 2, 3.7: 1, 3.84: 3, 3.8536: 3, 3.9: 1}
+
+
 def test_entropy_is_that_of_the_attractor_alone():
-    # both lie in the window of period three: between the bands there is a Cantor set of entropy 0.4812
     wanted = ["entropy", "period", "bands"]
-    found = ls.atlas(maps.Logistic(3.8), "r=3.84:3.8536:2", domain=UNIT, variables=wanted)
-    entropy = found.dataset["entropy"].values[:, 0]
-    assert found.dataset["period"].values[:, 0].tolist() == [3, 0]
-    assert entropy[0] == 0.0
-    assert entropy[1] == pytest.approx(logistic_entropy(3.8536, 3), abs=1e-6)
-    assert entropy[1] == pytest.approx(0.1604, abs=5e-5)
-
-
-@pytest.mark.parametrize(("r", "bands"), [(3.7, 1), (3.9, 1), (3.62, 2), (3.58, 4)])
-def test_entropy_of_bands(r, bands):
-    found = ls.atlas(maps.Logistic(3.8), f"r={r}:4:2", domain=UNIT, variables=["entropy", "bands"])
-    assert found.dataset["bands"].values[0, 0, 0] == bands
-    assert found.dataset["entropy"].values[0, 0] == pytest.approx(logistic_entropy(r, bands), abs=1e-6)
+    found = ls.atlas(maps.Logistic(3.8), ls.sweep.Axis("r", [*BANDS]), domain=UNIT, variables=wanted).dataset
+    assert found["bands"].values[:, 0, 0].tolist() == [*BANDS.values()]
+    assert found["period"].values[:, 0].tolist() == [0, 0, 0, 3, 0, 0]
+    entropy = [0.0 if r == 3.84 else logistic_entropy(r, bands) for r, bands in BANDS.items()]
+    assert found["entropy"].values[:, 0] == pytest.approx(entropy, abs=1e-6)
+    assert entropy[4] == pytest.approx(0.1604, abs=5e-5)
 
 
 def flips_of(scene, lo, hi, throws, starts):
@@ -157,38 +153,27 @@ def test_the_speed_of_the_designed_feeder_has_its_sharp_margins(reading, sharp):
     assert found == pytest.approx(sharp, rel=0.005)
 
 
-@pytest.mark.sweep  # each bracket is proved anew
+# Each bracket is proved anew.  From -0.1 in the goal holds up to 0.058 in, above the joint: starts near it creep to it
+# there, more of them at each height, and one proof of all heights does not reach; where it is shown to fail does.
+@pytest.mark.sweep
 @pytest.mark.parametrize(
-    ("height", "quantity"),
+    ("height", "quantity", "tolerance"),
     [
-        *((height, "throw.speed") for height in (-0.25, -0.2, -0.1)),
-        # from -0.1 in the goal holds up to 0.058 in: above the joint, where one proof of all heights does not reach
-        *((height, "arm.surface_height") for height in (-0.25, -0.2)),
+        (-0.25, "throw.speed", {}),
+        (-0.2, "arm.surface_height", {}),
+        (-0.1, "arm.surface_height", {}),
+        (-0.2, "joint", {"throw.speed": "1 %", "arm.surface_height": "0.01 in", "part.sides[0]": "0.5 %"}),
     ],
 )
-def test_margins_lie_within_two_percent_of_the_middle_of_proved_brackets(height, quantity):
-    scene = designed().with_values({"arm.surface_height": height})
-    (proved,) = ls.margin(scene, quantity)
+def test_margins_lie_within_two_percent_of_the_middle_of_proved_brackets(height, quantity, tolerance):
+    scene = designed(**tolerance).with_values({"arm.surface_height": height})
+    (proved,) = ls.margin(scene, quantity, width=0.02)
     (found,) = margins(scene, {"arm.surface_height": height}, quantity)
-    assert found == pytest.approx(0.5 * (proved.proved + proved.refuted), rel=0.02)
-
-
-@pytest.mark.sweep
-def test_a_margin_that_reaches_above_the_joint_ends_where_the_goal_is_shown_to_fail():
-    """Starts near the joint creep to it there, more of them at each height: no proof is for the same starts at all."""
-    scene = designed().with_values({"arm.surface_height": -0.1})
-    (proved,) = ls.margin(scene, "arm.surface_height")
-    (found,) = margins(scene, {"arm.surface_height": -0.1}, "arm.surface_height")
-    assert 0.1 < proved.proved < found
-    assert found == pytest.approx(proved.refuted, rel=0.02)
-
-
-@pytest.mark.sweep
-def test_a_joint_margin_lies_within_two_percent_of_its_proved_bracket():
-    scene = designed(**{"throw.speed": "1 %", "arm.surface_height": "0.01 in", "part.sides[0]": "0.5 %"})
-    (proved,) = ls.margin(scene, "joint")
-    (found,) = margins(scene, {"arm.surface_height": -0.2}, "joint")
-    assert found == pytest.approx(0.5 * (proved.proved + proved.refuted), rel=0.02)
+    above = height == -0.1
+    assert found == pytest.approx(
+        proved.refuted if above else 0.5 * (proved.proved + proved.refuted), rel=0.02
+    )
+    assert not above or 0.1 < proved.proved < found
 
 
 def test_no_margin_where_the_goal_fails_and_none_is_told_where_nothing_stays():
@@ -201,7 +186,7 @@ def test_no_margin_where_the_goal_fails_and_none_is_told_where_nothing_stays():
 
 def test_a_margin_does_not_depend_on_the_points_beside_it():
     scene = designed()
-    heights = np.linspace(-0.3, -0.05, 7)
+    heights = np.linspace(-0.3, -0.05, 3)
     together = margins(scene, {"arm.surface_height": heights}, "throw.speed")
     alone = [margins(scene, {"arm.surface_height": height}, "throw.speed")[0] for height in heights]
     assert np.array_equal(together, alone)

@@ -174,11 +174,14 @@ def test_starts_of_a_map_do_not_collapse_but_leave_by_its_exit(monkeypatch):
 
 def test_the_legend_of_a_map_names_the_ends_of_the_domain():
     # x -> 1.5 x - x^3: the cubic's starts beyond +-sqrt(2.5) leave, over either end; at 3.2 all but a null set do
-    data = ls.atlas(maps.Cubic(1.5), "r=1.5:3.2:2", domain=[(-2.1, 2.1)]).dataset
-    first, last = sorted(legend(data), key=lambda entry: entry.name)
+    found = ls.atlas(maps.Cubic(1.5), "r=1.5:3.2:2", domain=[(-2.1, 2.1)])
+    first, last = sorted(legend(found.dataset), key=lambda entry: entry.name)
     ways = "some starts leave over the upper end and some starts leave over the lower end"
     assert first.words.endswith(ways)
     assert last.words == "no attractors; all starts leave, some over either end"
+    # beside 0 two fixed points attract at 1.5: its table has columns for no more
+    shares = [name for name in found.to_dataframe().columns if name.startswith("share")]
+    assert shares == ["share[0]", "share[1]"]
 
 
 # ----------------------------------------------------------------

@@ -13,7 +13,6 @@ from limitsets.feeder.thrower import fly, throw_map, trace
 from limitsets.systems.cells import Domain
 from limitsets.systems.maps import drivers
 from limitsets.systems.maps.critical import margins
-from tests.test_paper import LIMIT_SETS
 
 flint = pytest.importorskip("flint", reason="the balls of python-flint are the reference")
 from tests.thrower import exhaustive  # noqa: E402  # needs flint
@@ -79,11 +78,12 @@ def regimes(a: float, d: float) -> dict[str, float]:
     }
 
 
-@pytest.mark.parametrize("flip", ["signed", "energy"])
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("regime", regimes(2.0, 1.0))
-def test_every_regime_from_the_vertex_outwards(shape: str, regime: str, flip: str) -> None:
+def test_every_regime_from_the_vertex_outwards(shape: str, regime: str) -> None:
+    """By the signed flip where the part is broad, by the energy where it is tall: the flight is the same."""
     a, d = SHAPES[shape]
+    flip = "signed" if a > d else "energy"
     part = Part(a, d, regimes(a, d)[regime], flip=flip)
     beyond = math.pi * part.kappa  # f(2 pi) > 0 from here on
     starts = [a * (1.0 + reach) for reach in (1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0)]
@@ -184,7 +184,7 @@ def test_a_grazing_root_is_neither_skipped_nor_made_up(part: Part) -> None:
 def test_the_smallest_of_many_roots() -> None:
     rng = np.random.default_rng(11)
     counts = []
-    for _ in range(150):
+    for _ in range(60):
         a, d = 10.0 ** rng.uniform(-1.0, 1.0, 2)
         part = Part(float(a), float(d), float(rng.uniform(0.1, 1.0) * math.hypot(a, d)))
         x = float(a * (1.0 + 10.0 ** rng.uniform(-3.0, 0.0)))
@@ -328,9 +328,10 @@ def test_flat_parts_with_the_centre_over_a_vertex(thin: float, foot: float) -> N
 LENGTHS = ("kappa", "surface_height", "arm_length", "radius_of_gyration", "a", "d", "length")
 
 
-@pytest.mark.parametrize("power", [-1000 // 4, -40, -15, -1, 5, 15, 40, 1000 // 4])
-@pytest.mark.parametrize("name", [*(n for n in ls.scenes() if ls.load(n).cavity is None), "several roots"])
+@pytest.mark.parametrize("power", [-250, -15, 5, 250])
+@pytest.mark.parametrize("name", ["paper-initial-small-angle", "several roots"])
 def test_a_power_of_two_scales_to_the_bit(name: str, power: int) -> None:
+    """Graphs and limit sets of the exact scenes: tests/sets/test_attractors.py."""
     scene = ls.load("paper-designed" if name == "several roots" else name)
     if name == "several roots":
         scene = scene.with_values({"throw.kappa": 2.0})
@@ -346,20 +347,3 @@ def test_a_power_of_two_scales_to_the_bit(name: str, power: int) -> None:
     np.testing.assert_array_equal(one.x * scale, other.x)
     np.testing.assert_array_equal(one.side, other.side)
     assert one.stopped == other.stopped
-
-
-# ---------------------------------------------------------------- many throws
-
-
-def test_ten_million_throws_stay_on_the_limit_set() -> None:
-    """End points at 40 digits, from the model's page; an orbit may miss them by what rounding does in a throw."""
-    params, x, side = ls.load("paper-designed").map, 15.0, 2
-    for _ in range(20):
-        path = ls.orbit(params, x, side, 500_000)
-        assert path.stopped is None
-        assert path.code.size == 500_000
-        for s, ((lo, hi),) in LIMIT_SETS["paper-designed"].items():
-            here = path.x[path.side == s]
-            assert lo - 1e-11 < here.min()
-            assert here.max() < hi + 1e-11
-        x, side = float(path.x[-1]), int(path.side[-1])

@@ -85,7 +85,7 @@ def test_intervals_cover_as_often_as_they_say():
     captured, right, wrong = [0.6, 0.25, 0.15], [0.1, 0.85, 0.05], [0.3, 0.1, 0.6]
     chain = Chain(np.array(captured), np.array([[1.0, 0.0, 0.0], right, wrong]), RIGHT)
     truth = chain.occupied(12)[-1, RIGHT]
-    inside, repeats = 0, 300
+    inside, repeats = 0, 150
     for _ in range(repeats):
         rows = [np.zeros(3, int), random.multinomial(100, right), random.multinomial(100, wrong)]
         counts = counts_of(random.multinomial(200, captured), rows)
@@ -149,18 +149,18 @@ pytest.importorskip("pymunk")
 
 def test_trials_have_random_numbers_of_their_own_whoever_runs_them():
     passes = passes_of(with_tray(), None, 8e-3)
-    alone = count(passes, 120, 60, 4)
+    alone = count(passes, 60, 30, 4)
     with ThreadPoolExecutor(3) as threads:
-        spread = count(passes, 120, 60, 4, executor=threads)
+        spread = count(passes, 60, 30, 4, executor=threads)
     assert alone.to_json() == spread.to_json()
     assert alone.poses == spread.poses
-    # the first 60 parts are the same parts; each is drawn from its number alone
+    # the first 30 parts are the same parts; each is drawn from its number alone
     first = np.zeros(7, int)
-    for k in reversed(range(60)):
+    for k in reversed(range(30)):
         first[passes.plate.settle(*passes.arrival(random_of(4, 0, k))).state] += 1
-    assert count(passes, 60, 1, 4).captured.tolist() == first.tolist()
-    assert alone.captured.sum() == 120
-    assert (alone.kicked.sum(axis=1)[alone.met] == 60).all()
+    assert count(passes, 30, 1, 4).captured.tolist() == first.tolist()
+    assert alone.captured.sum() == 60
+    assert (alone.kicked.sum(axis=1)[alone.met] == 30).all()
     assert alone.unfinished == 0
 
 
@@ -185,7 +185,7 @@ def test_a_part_comes_by_as_the_laws_say():
 @pytest.fixture(scope="module")
 def shaken():
     """A tray that is shaken so hard that few passes are enough, with histories."""
-    return ls.tray(with_tray(agitation="2 in"), passes=12, drops=1500, kicks=600, histories=150, step=8e-3)
+    return ls.tray(with_tray(agitation="2 in"), passes=12, drops=600, kicks=250, histories=80, step=8e-3)
 
 
 @pytest.mark.sweep
@@ -193,7 +193,7 @@ def shaken():
 def test_the_chain_agrees_with_histories_of_new_parts(shaken, after):
     new = shaken.histories[0]
     found = int((new.after_pass[:, after - 1] == new.right).sum())
-    low, high = binomial_interval(found, 150, 0.999)
+    low, high = binomial_interval(found, 80, 0.999)
     lo, hi = shaken.filled.interval[after]
     assert low <= hi
     assert lo <= high

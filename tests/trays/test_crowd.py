@@ -45,11 +45,11 @@ def alone(asked, seed, number, count):
 def test_parts_that_pass_through_each_other_fill_a_depression_as_single_ones_do(asked):
     pouring = Pouring(asked, 1, 1, 6, 5)
     same = 0
-    for number in range(40):
+    for number in range(20):
         seen = pouring.row(number)["passing"]["states"]
         assert seen[0] == [0, 0, 0]
         same += [(right, wrong) for right, _, wrong in seen[1:]] == alone(asked, 5, number, 6)
-    assert same >= 37  # the plates lie at different x, and rounding decides some bounces
+    assert same >= 18  # the plates lie at different x, and rounding decides some bounces
 
 
 @pytest.mark.parametrize("each", [1.0, 3.0, 0.25, 2.5])
@@ -200,22 +200,22 @@ def test_what_cannot_be_is_refused():
 
 @pytest.mark.sweep
 def test_parts_that_pass_through_each_other_agree_with_the_chain():
-    many = {"parts": 40, "depressions": 20, "batches": 4}
-    found = ls.tray(with_tray(), drops=1500, kicks=600, passes=12, step=8e-3, **many)
+    many = {"parts": 40, "depressions": 20, "batches": 2}
+    found = ls.tray(with_tray(), drops=600, kicks=250, passes=12, step=8e-3, **many)
     _, passing = found.crowds
     for after in (1, 3, 12):
         for counts, chain in (
             (passing.right, found.crowd_chain.interval),
             (passing.wrong, found.crowd_chain.wrong_interval),
         ):
-            exact = binomtest(int(counts[:, after].sum()), 80).proportion_ci(0.999, method="exact")
+            exact = binomtest(int(counts[:, after].sum()), 40).proportion_ci(0.999, method="exact")
             assert exact.low <= chain[after, 1]
             assert chain[after, 0] <= exact.high
 
 
 @pytest.mark.sweep
 def test_hundreds_of_parts_end(asked):
-    row = Pouring(asked, 300, 100, 2, 0).row(0)
+    row = Pouring(asked, 150, 50, 2, 0).row(0)
     for each in row.values():
-        assert sum(each["states"][-1]) > 80
-        assert each["moved"] >= 600
+        assert sum(each["states"][-1]) > 40
+        assert each["moved"] >= 300

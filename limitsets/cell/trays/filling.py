@@ -442,7 +442,7 @@ def tray(
     ...     "world": {"friction": 0.3, "restitution": 0.3},
     ...     "effects": {"contact": True},
     ... }
-    >>> found = ls.tray({**ls.load("paper-designed").as_dict(), **tables}, passes=20, drops=200)
+    >>> found = ls.tray({**ls.load("paper-designed").as_dict(), **tables}, passes=20, drops=60)
     >>> found.filled.right.size, bool(0.0 < found.filled.right[-1] < 1.0)
     (21, True)
     """

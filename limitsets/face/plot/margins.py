@@ -64,7 +64,7 @@ def tornado(margins: Sequence[Margin]) -> Figure:
     Examples
     --------
     >>> import limitsets as ls
-    >>> figure = ls.plot.tornado(ls.margin("paper-designed", "throw.speed", "arm.surface_height", width=0.1))
+    >>> figure = ls.plot.tornado(ls.margin("paper-designed", "throw.speed", "arm.surface_height", width=0.5))
     >>> [label.get_text() for label in figure.axes[0].get_yticklabels()]
     ['throw.speed', 'arm.surface_height']
     """

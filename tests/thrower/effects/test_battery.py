@@ -95,11 +95,13 @@ def test_absent_effects_are_the_bare_map() -> None:
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.effect)
 def test_in_its_limit_it_changes_nothing(row: Row) -> None:
     seen = 0
-    for case in cases(40, 21, **row.limit):
+    for case in cases(30, 21, **row.limit):
         if row.applies(case):
             seen += 1
             without = () if row.effect == "landing" else ("landing",)
             assert same_end(case.mapped((*without, row.effect)), case.mapped(without))
+            if row.effect == "bounce":
+                assert same_end(case.mapped(("landing", "roll", "bounce")), case.mapped(("landing", "roll")))
     assert seen > 5
 
 
@@ -164,7 +166,7 @@ ALL = ("landing", "roll", "slip", "pivot", "bounce")
 def test_the_energy_of_a_throw_is_accounted_for() -> None:
     kinds = {IMPACT: 0, TURN: 0, FLIGHT: 0}
     rubbing = 0
-    for case in cases(60, 22):
+    for case in cases(40, 22):
         book = np.zeros((4000, 11))
         lines = ledger(case.full(ALL), case.x, case.side, book)
         simulation = case.simulation(ALL)
@@ -199,8 +201,8 @@ def test_the_energy_of_a_throw_is_accounted_for() -> None:
                 assert energy[1] <= energy[0] * (1 + 1e-13)
         rubbing += simulation.rubbed > 1e-6 * started
         assert started == pytest.approx(ended + lost + simulation.rubbed, rel=1e-12)
-    assert min(kinds.values()) > 30
-    assert rubbing > 20
+    assert min(kinds.values()) > 20
+    assert rubbing > 13
 
 
 # ----------------------------------------------------------------
