@@ -198,7 +198,7 @@ def coarse():
 @pytest.mark.parametrize(("name", "bound", "e"), [("designed", 0.003, 0.3), ("coarse", 0.04, 0.02)])
 def test_throws_from_random_places_lie_within_bounds(name, bound, e, request):
     chain, scene = request.getfixturevalue(name), ls.load("paper-designed")
-    random, count = np.random.default_rng(5), 1000
+    random, count = np.random.default_rng(5), 2000
     least, most = dense(chain)
     own = [(k, cell) for k, cell in enumerate(chain.cells) if cell and cell[2] - cell[1] > 1e-3]
     own = [(k, cell) for k, cell in own if cell[1] > scene.sides.a[cell[0]] + 0.1]
@@ -267,7 +267,7 @@ def test_a_ladder_of_jogs_lies_between_the_bounds_at_every_throw():
     a, q = float(scene.sides.a[2]), 1.0 + 2.0 * abs(scene.map.surface_height) / scene.map.kappa
     exact = ladder((a, q), (15.0, 16.0), 0.05, 18.0, 7)
     noise, starts = Scattering(landing=Uniform(0.05)), [(2, 15.0, 16.0)]
-    chain = ls.interval_chain(scene, noise, right=(18.0, 2), starts=starts, cells=400)
+    chain = ls.interval_chain(scene, noise, right=(18.0, 2), starts=starts, cells=600)
     for n in (3, 5, 7):
         least, most = bracket(chain, "right", n + 1)
         assert least - 1e-9 <= exact[n] <= most + 1e-9

@@ -15,7 +15,6 @@ from limitsets.proofs.prover.converging import entries
 from limitsets.proofs.prover.cycles_of_map import MOST_WORDS
 from limitsets.proofs.prover.orbits_of_map import prove_orbit
 from limitsets.systems.sets import Cycle, cycles
-from tests.graph.test_periodic_axes import cat
 from tests.maps_of_tests import Tent, odd, ricker, spiral
 from tests.proofs.test_certify import verdicts
 
@@ -78,17 +77,13 @@ def test_a_spiral_in_the_plane(factor):
     assert "one dimension only" in proof.claims[1].reason
 
 
-def parabola(x, c):
-    return 0.5 * (x - 0.5) ** 2 + x + c
-
-
 @pytest.mark.parametrize(
     ("low", "high"), [(1e-3, 1e-3), (1e-9, 1e-9), (-1e-3, 1e-3), (0.0, 0.0), (-1e-12, 1e-12)]
 )
 def test_an_orbit_that_is_not_there_for_all_parameters_is_not_proved(low, high):
-    # fixed points at 0.5 +- sqrt(-2 c): none for c > 0, and one that is double at 0
-    grid = ls.grid([(0.0, 1.0)], cells=64)
-    proof = ls.certify(ls.map(parabola, c=low), grid, ["invariant"], upper=ls.map(parabola, c=high))
+    # 1.75 x - x^3 + c has fixed points beside 1/2 for c > -1/4, and one there that is double for c = -1/4
+    lower, upper = (ls.map(odd, a=1.75, c=-0.25 - off) for off in (high, low))
+    proof = ls.certify(lower, ls.grid([(-2.1, 2.1)], cells=64), ["invariant"], upper=upper)
     here = Cycle(np.array([0.5]), np.zeros(1, np.int64), np.zeros(1, np.int64), 1.0, 0.0, True)
     assert isinstance(prove_orbit((proof.map, proof.upper), here, lambda *_: True), str)
 
@@ -159,6 +154,9 @@ def test_a_search_for_very_many_cycles_ends_and_says_so():
 @pytest.mark.sweep
 def test_a_search_for_very_many_cycles_of_the_plane_ends_and_says_so():
     # the cat map: 1122 cycles of periods up to 9, by |det(A^n - 1)|
+    def cat(x, y):
+        return 2.0 * x + y, x + y
+
     grid = ls.grid([(0, 1), (0, 1)], cells=64, periodic=True)
     proof = ls.certify(ls.map(cat), grid, ["cycles"])
     assert "longer cycles: there are 1122 of periods up to 9" in proof.claims[0].section["missing"]
@@ -190,7 +188,7 @@ def test_a_proof_is_printed_with_the_region_that_it_is_about():
     assert float(basin[2]) == pytest.approx(1.0 - 0.15 / 1.8, abs=1e-3)
     assert "Tent" in text
     assert "proved" in text
-    turning, square = ls.map(spiral, c=0.3, s=0.4, bend=0.0), ls.grid([(-1.0, 1.0)] * 2, cells=16)
+    turning, square = ls.map(spiral, c=0.3, s=0.4, bend=0.0), ls.grid([(-1.1, 0.9), (-1.2, 0.8)], cells=16)
     plane = str(ls.certify(turning, square, ["invariant"]))
     assert "boxes around its pieces" in plane  # which are more than its cells
     assert "x[1]" in plane

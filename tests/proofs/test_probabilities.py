@@ -376,7 +376,7 @@ def test_what_lands_far_beyond_the_arm_has_left_it(tmp_path, monkeypatch):
 @pytest.mark.sweep
 def test_brackets_are_saved_and_rechecked(tmp_path):
     scatter = Scattering(speed=Uniform(0.005), landing=Uniform(0.2))
-    words = {"right": (20.0, 2), "wrong": 20.0, "cells": 100, "throws": 4}
+    words = {"right": (20.0, 2), "wrong": 20.0, "cells": 150, "throws": 4}
     found = absorption_brackets("paper-initial", scatter, **words)
     low, high = found.mean
     # cells at the joint lead to themselves: only their neighbour's throws bound the mean
