@@ -137,8 +137,8 @@ def interval(count):
 def noisy(within=None, **more):
     """A certificate of paper-initial, of which nothing is said by default."""
     nothing = np.tile([0.0, 1.0], (THROWS + 1, 1))
-    fine = [np.linspace(1, 5.5, 12), np.linspace(5.5, 20.1, 380), np.linspace(20.5, 28, 9)]
-    steps = [np.concatenate(fine)] * 3  # parts that are past 20 have ended
+    # parts that are past 20 have ended
+    steps = [np.append(np.linspace(1, 20.2, 498), np.linspace(20.5, 28, 9))] * 3
     return certificate(
         "initial",
         LAWS,
