@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from flint import arb
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from limitsets.checker.observable import LEAST_WEIGHT
+from limitsets.checker.observable import LEAST_WEIGHT, OnCell, bounds_of_share
 from tests.maps_of_tests import beyond_half, falling, place, stretched, tent
 from tests.proofs.forge import average_changed, end_moved, opened, section_of_average
 from tests.proofs.test_noisy_maps import require_denied
@@ -107,6 +108,24 @@ def test_a_histogram_is_one_file_with_a_share_for_each_bin(tmp_path):
         assert hi - lo < 5e-3
     text = ls.recheck(proof.save(tmp_path / "bins.zip", recheck=False)).statement[-1]
     assert text.count("the share of steps in") == 5
+
+
+def test_places_that_cut_a_cell():
+    places = [(0, 0.2, 0.4), (0, 0.6, 0.7)]
+
+    def indicator(side, ends):
+        ball = arb(ends[0]).union(arb(ends[1]))
+        cell = OnCell(side, 0, tuple(ends), ball, middle=ball.mid(), slope=lambda: arb(1), bend=arb(0))
+        return bounds_of_share(places, cell)
+
+    for ends, least, most in (
+        ([0.3, 0.5], 0, 1),
+        ([0.4, 0.6], 0, 0),
+        ([0.25, 0.4], 1, 1),
+        ([0.39, 0.61], 0, 1),
+    ):
+        assert indicator(0, ends) == (least, most, least, most, most - least)
+    assert indicator(1, [0.3, 0.35])[3] == 0
 
 
 def sampled(step, of, seeds, throws=4000):

@@ -140,6 +140,7 @@ FORGED = {
     "a domain with another fixed point": (domain(ends(-1.5, 1.5)), "not told apart from the listed"),
     "an orbit of a longer period": (claimed(period=3), "longer period"),
     "a domain without an orbit": (domain(ends(0.5, 1.5)), "lies in the domain is not proved"),
+    "a domain that ends before an orbit": (domain(ends(-1.0, 0.5)), "lies in the domain is not proved"),
     # files that are none
     "half a period": (claimed(period=2.5), None),
     "no period": (claimed(period=0), None),
