@@ -176,7 +176,14 @@ def median_of(pair):
     return int(np.flatnonzero(pair[:, 1] >= 0.5)[0]), int(np.flatnonzero(pair[:, 0] >= 0.5)[0])
 
 
+@pytest.fixture
+def fewer_steps(monkeypatch):
+    """For the bounds of a mean: enough for what is true, and soon at their end for what is false."""
+    monkeypatch.setattr(sys.modules[f"{checker.__name__}.horizon"], "MOST_MEAN", 1000)
+
+
 @pytest.mark.sweep
+@pytest.mark.usefixtures("fewer_steps")
 def test_brackets_of_the_checker_hold_what_is_thrown(good, thrown, tmp_path):
     right, wrong, times = thrown
     claimed = {name: good.arrays[f"within.{k}"] for k, name in enumerate(section_of(good)["names"])}
@@ -298,6 +305,7 @@ FALSE = {
 
 
 @pytest.mark.sweep
+@pytest.mark.usefixtures("fewer_steps")
 @pytest.mark.parametrize("name", FALSE)
 def test_what_has_become_false_is_not_proved(good, tmp_path, name):
     forged = good.copy()
