@@ -358,3 +358,72 @@ def _middles(grid: Grid, side: int) -> SamplePoints:
 
 with_middles = mock.patch.dict(METHODS, {"middles": sampled(_middles)})
 """An image method of the tests' own: the image of its middle stands for a cell, so that images of others are missed."""
+
+
+# ---------------------------------------------------------------- plain functions, for `limitsets.map`
+
+
+def place(x):
+    return x
+
+
+def beyond_half(x):
+    return x - 0.5
+
+
+def affine(x, a, b):
+    return a * x + b
+
+
+def stretched(x, b):
+    return b * x
+
+
+def falling(x, b):
+    return b * (1.0 - x)
+
+
+def logistic(x, r):
+    return r * x * (1.0 - x)
+
+
+def ricker(x, r):
+    return x * math.exp(r * (1.0 - x))
+
+
+def odd(x, a, c=0.0):
+    return a * x - x**3 + c
+
+
+def turned(x, omega, k):
+    y = x + omega - k / math.tau * np.sin(math.tau * x)
+    return y - np.floor(y)
+
+
+def henon(x, y, a, b):
+    return 1.0 - a * x**2 + y, b * x
+
+
+def spiral(x, y, c, s, bend):
+    return c * x - s * y + bend * x**2, s * x + c * y
+
+
+def rivals(x, y):
+    return 3.0 * x / (1.0 + x + 2.0 * y), 3.0 * y / (1.0 + y + 2.0 * x)
+
+
+def left_line(x, s, u, v):
+    return s * x + u
+
+
+def right_line(x, s, u, v):
+    return s * x + v
+
+
+def tent(b):
+    return ls.map(pieces=(stretched, falling), margin=beyond_half, b=b)
+
+
+def two_lines(s, u, v):
+    """s x + u up to 0, and s x + v beyond."""
+    return ls.map(pieces=(left_line, right_line), margin=place, s=s, u=u, v=v)

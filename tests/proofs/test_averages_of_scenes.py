@@ -2,6 +2,7 @@
 
 import functools
 import math
+import re
 
 import flint
 import mpmath
@@ -25,11 +26,11 @@ from tests.proofs.forge import (
     Plain,
     average_changed,
     end_moved,
-    opened,
     scene,
     section_of_average,
 )
 from tests.proofs.test_certify import random_scene
+from tests.proofs.test_noisy_maps import require_denied
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +39,14 @@ def designed():
 
 
 @pytest.fixture(scope="module")
-def designed_file(designed, tmp_path_factory):
-    return designed.save(tmp_path_factory.mktemp("average") / "designed.proof.zip")
+def coarse():
+    """Of fewer cells, which a recheck is through with sooner."""
+    return ls.average("paper-designed", cells=2500)
+
+
+@pytest.fixture(scope="module")
+def designed_file(coarse, tmp_path_factory):
+    return coarse.save(tmp_path_factory.mktemp("average") / "designed.proof.zip", recheck=False)
 
 
 def between(proof, name):
@@ -69,21 +76,21 @@ def test_numbers_of_the_designed_feeder(name, designed):
     assert hi - lo < width
 
 
-def test_the_checker_states_what_is_claimed(designed, designed_file):
+def test_the_checker_states_what_is_claimed(coarse, designed_file):
     report = ls.recheck(designed_file)
     assert report.verdict == "proved"
-    lo, hi = between(designed, "lyapunov")
+    lo, hi = between(coarse, "lyapunov")
     text = "\n".join(report.statement)
     assert f"{lo!r} to {hi!r}: ln |dx'/dx|, whose average is the Lyapunov exponent" in text
     assert "of almost every start in the attracting cells these averages over n steps converge" in text
-    lo, hi = between(designed, "mean_jogs_per_visit_of_side_2")
+    lo, hi = between(coarse, "mean_jogs_per_visit_of_side_2")
     # a quotient is rounded by either side on its own
     assert any(
         math.isclose(float(line.split()[0]), lo, rel_tol=1e-15)
         for line in text.splitlines()
         if "quotient of function 9" in line
     )
-    assert designed.average.lo == designed.average.bounds[0][0]
+    assert coarse.average.lo == coarse.average.bounds[0][0]
 
 
 def test_bounds_of_one_proof_agree(designed):
@@ -149,7 +156,7 @@ def test_a_constant_slope_is_its_exponent():
     assert hi - lo < 1e-12
 
 
-def orbits(throw, counts=(400, 5000), seed=3):
+def orbits(throw, counts=(400, 2000), seed=3):
     """Throws of many orbits from random places, after the first: places, sides and codes, by throw."""
     random = np.random.default_rng(seed)
     x = random.uniform(0.4, 0.7, counts[0]) * throw.arm_length
@@ -175,7 +182,12 @@ def place(x):
     return x
 
 
-def require_orbits_inside(seed):
+SEEDS = [0, 1, *(pytest.param(k, marks=pytest.mark.sweep) for k in (2, 3, 4))]
+SEEDS += [pytest.param(k, marks=pytest.mark.repeats) for k in range(5, 20)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_orbits_lie_inside(seed):
     """A feeder near one of the paper: what its orbits do on average lies in the bounds."""
     random = np.random.default_rng(seed)
     nominal = ls.load(["paper-designed", "paper-initial"][seed % 2])
@@ -192,21 +204,10 @@ def require_orbits_inside(seed):
         assert hi - lo < (0.02 if name != "place" else 0.2)
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_orbits_lie_inside(seed):
-    require_orbits_inside(seed)
-
-
-@pytest.mark.sweep
-@pytest.mark.parametrize("seed", range(2, 20))
-def test_orbits_of_many_feeders_lie_inside(seed):
-    require_orbits_inside(seed)
-
-
 def test_a_share_of_places_and_a_function(designed):
     proof = ls.average("paper-designed", of=[{2: [(20.0, 40.0)]}, lambda x: x * x, "lyapunov"], cells=2000)
     throw, counted = ls.load("paper-designed").map, []
-    for x, side, _ in orbits(throw, (400, 2000)):
+    for x, side, _ in orbits(throw):
         counted.append([((side == 2) & (x > 20.0)).mean(), (x * x).mean()])
     means = np.mean(counted, axis=0)
     for name, mean in zip(("share_of_20_to_40_on_side_2", "function"), means, strict=True):
@@ -384,12 +385,15 @@ def everywhere_open(forged):
             forged.arrays[f"0.{word}"][own & (side == k)] = cells[0], cells[-1]
 
 
+def in_function(k, **more):
+    """Change a function's keys."""
+    return lambda f: section_of_average(f)["functions"][k].update(more)
+
+
+CAVITY = {"position": "22 in", "width": "9 in", "depth": "9 in", "angle": "20 deg"}
 FORGED = {
     "a narrower upper end": (end_moved(0, "upper", -0.3), "upper end of the average is not proved"),
-    "a narrower lower end of another function": (
-        end_moved(4, "lower", 0.3),
-        "lower end of the average is not proved",
-    ),
+    "a narrower lower end": (end_moved(4, "lower", 0.3), "lower end of the average is not proved"),
     "functions exchanged": (exchanged, "function 1: "),
     "no weights": (average_changed("weight", lambda w: 0.0 * w), "weight is not between"),
     "smaller weights": (average_changed("weight", lambda w: 0.9 * w), "weight is smaller"),
@@ -398,33 +402,32 @@ FORGED = {
     "no runs": (average_changed("runs", lambda r: r[:0]), "no runs beside it"),
     "all cells undecided": (everywhere_open, "more than 2048 cells"),
     "noise": (lambda f: f.header.update(noise={"landing.x": "0.001 in"}), "it is about one scene"),
-    "one more run": (
-        average_changed("runs", lambda r: np.concatenate([r, r])),
-        "runs beside no undecided cell",
-    ),
+    "one more run": (average_changed("runs", lambda r: np.concatenate([r, r])), "runs beside no undecided cell"),
     "numbers that overflow": (average_changed("upper", lambda u: u + 1e300), "u are not between"),
     "an interval of a quantity": (as_interval, "nor with a tolerance or an interval"),
     "a cavity before the cells end": (
-        lambda f: scene_of(f).update(
-            cavity={"position": "22 in", "width": "9 in", "depth": "9 in", "angle": "20 deg"}
-        ),
-        "where parts fall into the cavity",
+        lambda f: scene_of(f).update(cavity=CAVITY), "where parts fall into the cavity",
     ),
     "a component without cells": (
-        lambda f: section_of_average(f).update(components=[3]),
-        "component 3 has no cells",
+        lambda f: section_of_average(f).update(components=[3]), "component 3 has no cells",
     ),
-}
+    # files that are none
+    "no function": (lambda f: section_of_average(f).update(functions=[]), None),
+    "a quotient of a function that is none": (lambda f: section_of_average(f).update(quotients=[[0, 99]]), None),
+    "a quotient by what may be 0": (lambda f: section_of_average(f).update(quotients=[[0, 5]]), None),
+    "a step on a branch that is none": (in_function(1, of={"steps": [[0, 2]]}), None),
+    "a step on a side that is none": (in_function(1, of={"steps": [[3, 0]]}), None),
+    "a parameter in a formula": (in_function(1, of={"formula": {"ops": [["p", "b"]], "out": [0]}}), None),
+    "ends that do not ascend": (in_function(10, upper=[(0.0).hex()]), None),
+    "an end that is too large": (in_function(0, upper=[(2.0**1000).hex()]), None),
+    "too few columns": (average_changed("upper", lambda u: u[:, 1:]), None),
+    "an array too many": (lambda f: f.arrays.update({"0.average.more": np.zeros(3)}), None),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FORGED)
 def test_a_forged_average_is_denied(name, designed_file, tmp_path):
-    forged = opened(designed_file)
-    change, why = FORGED[name]
-    change(forged)
-    report = ls.recheck(forged.seal().write(tmp_path / "forged.zip"))
-    reasons = {name: said for name, _, said in report.claims}
-    assert (report.verdict, why in reasons["average"]) == ("failed", True), reasons
+    require_denied(designed_file, FORGED[name], tmp_path)
 
 
 def test_an_image_may_not_meet_too_many_cells(designed_file, monkeypatch):
@@ -433,42 +436,12 @@ def test_an_image_may_not_meet_too_many_cells(designed_file, monkeypatch):
     assert "an image meets more than 2 cells" in ls.recheck(designed_file).reason
 
 
-BAD = {
-    "no function": lambda f: section_of_average(f).update(functions=[]),
-    "a quotient of a function that is none": lambda f: section_of_average(f).update(quotients=[[0, 99]]),
-    "a quotient by what may be 0": lambda f: section_of_average(f).update(quotients=[[0, 5]]),
-    "a step on a branch that is none": lambda f: section_of_average(f)["functions"][1].update(
-        of={"steps": [[0, 2]]}
-    ),
-    "a step on a side that is none": lambda f: section_of_average(f)["functions"][1].update(
-        of={"steps": [[3, 0]]}
-    ),
-    "a parameter in a formula": lambda f: section_of_average(f)["functions"][1].update(
-        of={"formula": {"ops": [["p", "b"]], "out": [0]}}
-    ),
-    "ends that do not ascend": lambda f: section_of_average(f)["functions"][10].update(upper=[(0.0).hex()]),
-    "an end that is too large": lambda f: section_of_average(f)["functions"][0].update(
-        upper=[(2.0**1000).hex()]
-    ),
-    "too few columns": average_changed("upper", lambda u: u[:, 1:]),
-    "an array too many": lambda f: f.arrays.update({"0.average.more": np.zeros(3)}),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_a_file_that_is_none_is_told(name, designed_file, tmp_path):
-    forged = opened(designed_file)
-    BAD[name](forged)
-    report = ls.recheck(forged.seal().write(tmp_path / "bad.zip"))
-    assert report.verdict == "bad file", (report.verdict, report.reason)
-
-
 def test_a_claim_of_one_component_of_two_says_where_that_lies(designed_file):
     """A file may leave a component out, as that of a sink: its numbers are not those of all attracting cells."""
     claimed = read_certificate(*open_certificate(designed_file)).claims["average"]
     assert "every start in the attracting cells these averages" in average_statement(claimed, False)
     claimed["cells"].component[0] = 1
-    assert "every start in component 0 (side 0: [15.2" in average_statement(claimed, False)
+    assert "every start in component 0 (side 0: [15.1" in average_statement(claimed, False)
 
 
 # ---------------------------------------------------------------- no answer
@@ -483,33 +456,27 @@ def reason(scene, **how):
 
 def test_scenes_without_an_average_say_why():
     assert "effects beyond the minimal model" in reason("paper-quadrilateral")
-    text = ls.load("paper-designed").as_dict()
-    spread = text | {
-        "world": {"scatter": {"speed": "0.1 %"}},
-        "effects": {"spread": "bounded"},
-    }
-    assert "a spread" in reason(ls.load(spread))
+    spread = {"world": {"scatter": {"speed": "0.1 %"}}, "effects": {"spread": "bounded"}}
+    assert "a spread" in reason(ls.load(ls.load("paper-designed").as_dict() | spread))
     resting = random_scene(np.random.default_rng(4), "exact", "signed")
-    if "no attracting" not in reason(resting, cells=500):
-        assert "no solution" in reason(resting, cells=500)
+    assert re.search("no attracting|no solution", reason(resting, cells=500))
+
+
+REFUSED = [
+    ("flips_per_throws", "did you mean 'flips_per_throw'"),
+    ({7: [(8.0, 9.0)]}, "allowed: 0, 1, 2"),
+    ({2: [(60.0, 70.0)]}, "where states of side 2 lie"),
+    ([(60.0, 70.0)], "where states of side 0 lie"),
+    ([("10 kg", "20 kg")], "kg"),
+    ("mean", "side_shares"),
+    (["lyapunov", 3.0], "a function of x"),
+    ([(2.0, 1.0)], "the lower one first"),
+]
 
 
 def test_what_is_no_average_of_a_scene_is_refused():
-    for of, allowed in (
-        ("flips_per_throws", "did you mean 'flips_per_throw'"),
-        ({7: [(8.0, 9.0)]}, "allowed: 0, 1, 2"),
-        ({2: [(60.0, 70.0)]}, "where states of side 2 lie"),
-        ([(60.0, 70.0)], "where states of side 0 lie"),
-        ([("10 kg", "20 kg")], "kg"),
-    ):
+    for of, allowed in REFUSED:
         with pytest.raises(LimitsetsError, match=allowed):
-            ls.average("paper-designed", of=of)
-    for of, allowed in (
-        ("mean", "side_shares"),
-        (["lyapunov", 3.0], "a function of x"),
-        ([(2.0, 1.0)], "the lower one first"),
-    ):
-        with pytest.raises(AnswerError, match=allowed):
             ls.average("paper-designed", of=of)
     with pytest.raises(AnswerError, match="the cells of an average"):
         ls.average("paper-designed", cells=0)

@@ -10,8 +10,6 @@ from itertools import product
 import numpy as np
 import pytest
 
-pytest.importorskip("flint", reason="the checker needs python-flint")
-
 import limitsets as ls
 from limitsets.proofs.prover.attraction import attraction
 from limitsets.proofs.prover.bands import throws_below
@@ -64,7 +62,7 @@ class Attacked:
             moved = {name: self.scene.value(name) + float(width) * sign for (name, width), sign in widths}
             yield self.scene.with_values(moved).map
 
-    def highest(self, random, inside=20, throws=100_000):
+    def highest(self, random, inside=5, throws=100_000):
         """Highest place off the side that long orbits reach."""
         return max(highest_off(throw, throws, self.side) for throw in self.scenes(random, inside))
 
@@ -104,7 +102,11 @@ def test_no_orbit_exceeds_it_with_the_worst_landings_either():
     assert box.proved(reached + 0.003)
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.sweep) for k in range(1, 12))])
+SEEDS = [0, *(pytest.param(k, marks=pytest.mark.sweep) for k in (1, 2, 3))]
+SEEDS += [pytest.param(k, marks=pytest.mark.repeats) for k in range(4, 12)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_random_boxes_are_never_proved_below_an_orbit(seed):
     random = np.random.default_rng(seed)
     names = random.choice(list(DESIGNED), int(random.integers(1, 6)), replace=False).tolist()
@@ -113,7 +115,7 @@ def test_random_boxes_are_never_proved_below_an_orbit(seed):
     # another model in which the designed scenes keep parts on the arm
     model = ("exact", "energy") if "designed" in name and seed % 2 else None
     box = Attacked(name, widths, model=model, cells=512)
-    reached = box.highest(random, inside=10, throws=30_000)
+    reached = box.highest(random, inside=5, throws=30_000)
     for less in (1e-7, 1e-3):
         assert not box.proved(reached - less)
 

@@ -4,18 +4,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-
-pytest.importorskip("flint", reason="the checker needs python-flint")
-
 from limitsets.robust import absorption_brackets
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
+from limitsets.checker import horizon
 from limitsets.checker.laws import uniform_law
 from limitsets.checker.map_chances import places_on
 from limitsets.checker.noisy_map import mesh_of_map
-from tests.proofs.forge import opened, spoiled
-from tests.proofs.test_noisy_maps import half, itself, section_of
+from tests.proofs.forge import opened
+from tests.proofs.test_noisy_maps import half, itself, own, require_denied, section_of
 
 
 def to_middle(x):
@@ -81,12 +79,13 @@ def test_probabilities_and_times_are_those_in_closed_form(case, tmp_path):
     first, last = answer.quantile(0.55)
     assert first <= np.argmax(exact >= 0.55) <= last
     assert "steps" in answer.table().text()
-    report = ls.recheck(answer.save(tmp_path / "known.proof.zip"))
+    report = ls.recheck(answer.save(tmp_path / "known.proof.zip", recheck=False))
     assert report.verdict == "proved"
 
 
-def test_orbits_that_never_end_have_no_mean_and_no_probability_from_below():
+def test_orbits_that_never_end_have_no_mean_and_no_probability_from_below(monkeypatch):
     """From -0.2 to 0.2 no step leads out, and the place lies elsewhere."""
+    monkeypatch.setattr(horizon, "MOST_MEAN", 60)
     answer = absorption_brackets(
         ls.map(half), ls.grid([(-1.0, 1.0)], cells=20), noise=0.1, absorbing={"top": [(0, 0.9, 1.0)]},
         starts=[(0, -0.1, 0.1)], throws=5,
@@ -136,7 +135,7 @@ def test_random_orbits_end_within_the_bounds(case):
         the_map, ls.grid([(-0.5, 1.2)], cells=300), noise=noise, absorbing={"hit": [place]},
         starts=[(0, 0.0, 0.5)], throws=10, **how,
     )  # fmt: skip
-    rng, count = np.random.default_rng(3), 200_000
+    rng, count = np.random.default_rng(3), 100_000
     e = noise["landing"] if isinstance(noise, dict) else noise
     x, ended, hit = rng.uniform(0.0, 0.5, count), np.zeros(count, int), np.zeros(count, bool)
     for n in range(1, 600):
@@ -150,6 +149,8 @@ def test_random_orbits_end_within_the_bounds(case):
             for name, share in zip(("hit", "any"), some, strict=True):
                 lo, hi = answer.within[name][:, -1]
                 assert lo - error <= share <= hi + error
+        if n > 10 and (ended > 0).all():
+            break
     assert (ended > 0).all()
     lo, hi = answer.ever["hit"]
     assert lo - error <= hit.mean() <= hi + error
@@ -203,7 +204,7 @@ def test_a_slope_beyond_the_domain_proves_no_mean(tmp_path):
     answer = absorption_brackets(
         ls.map(to_level, p=0.5), ls.grid([(-1.0, 1.0)], cells=20), noise={"p": 0.1}, throws=2, mean=False
     )
-    forged = opened(answer.save(tmp_path / "base.proof.zip"))
+    forged = opened(answer.save(tmp_path / "base.proof.zip", recheck=False))
     steep = 2**20
     programs = [
         ([["x", 0], ["c", str(steep)], ["mul", 1, 0], ["c", "0.9375"], ["add", 2, 3]], 1),
@@ -241,56 +242,40 @@ def without_node_at_1(forged):
         forged.arrays[name] = np.delete(forged.arrays[name], at)
 
 
+def number(name, at, value):
+    return lambda f: f.arrays[f"0.{name}"].__setitem__(at, value)
+
+
 FORGED = {
-    "more noise": (lambda f: section_of(f).update(landing="1.1"), "is proved"),
-    "another place": (lambda f: section_of(f).update(absorbing={"top": box(2, 3)}), "no nodes"),
+    "more noise": (own(landing="1.1"), "is proved"),
+    "another place": (own(absorbing={"top": box(2, 3)}), "no nodes"),
     "a place that its nodes do not end": (without_node_at_1, "its ends are no nodes"),
-    "a place beyond the domain": (
-        lambda f: section_of(f).update(absorbing={"top": box(1, 3.5)}), "reaches beyond the domain",
-    ),
-    "starts beyond the domain": (lambda f: section_of(f).update(starts=box(-1, 1)), "beyond the domain"),
-    "other starts": (lambda f: section_of(f).update(starts=box(0.5, 1)), "is proved"),
+    "a place beyond the domain": (own(absorbing={"top": box(1, 3.5)}), "reaches beyond the domain"),
+    "starts beyond the domain": (own(starts=box(-1, 1)), "beyond the domain"),
+    "other starts": (own(starts=box(0.5, 1)), "is proved"),
     "a larger probability": (
         lambda f: section_of(f)["ever"][0].__setitem__(slice(1, 3), [(0.3).hex(), (0.4).hex()]), "is proved",
     ),
-    "a longer mean": (lambda f: section_of(f).update(mean=[(2.1).hex(), (3.0).hex()]), "is proved"),
-    "a function that is lower at a node": (
-        lambda f: f.arrays["0.ever.0.upper"].__setitem__(20, 0.0), "upper function is none",
-    ),
-    "a probability within some steps": (
-        lambda f: f.arrays["0.within.0"].__setitem__((3, 1), 0.1), "within 3 steps",
-    ),
+    "a longer mean": (own(mean=[(2.1).hex(), (3.0).hex()]), "is proved"),
+    "a function that is lower at a node": (number("ever.0.upper", 20, 0.0), "upper function is none"),
+    "a probability within some steps": (number("within.0", (3, 1), 0.1), "within 3 steps"),
     "a probability from below where nothing says that orbits end": (
         lambda f: section_of(f)["mean"].__setitem__(1, None) or f.arrays.pop("0.mean.upper") is None, "the throws end",
     ),
-    "a function with a slope beyond the domain": (
-        lambda f: f.arrays["0.mean.upper"].__setitem__(-1, 9.0), "not constant beyond the domain",
-    ),
+    "a function with a slope beyond the domain": (number("mean.upper", -1, 9.0), "not constant beyond the domain"),
+    # files that are none
+    "no noise": (own(landing="0"), None),
+    "a key too many": (own(more=1), None),
+    "a place that overlaps another": (own(absorbing={"top": box(1, 3), "more": box(2, 3)}), None),
+    "starts that count twice": (own(starts=box(0, 1) + box(0.5, 1)), None),
+    "a place named as the exits": (own(absorbing={"exits": box(1, 3)}), None),
+    "a function of other cells": (lambda f: f.arrays.update({"0.mean.upper": np.ones(7)}), None),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("case", FORGED)
 def test_what_is_forged_is_denied(case, saved, tmp_path):
-    change, reason = FORGED[case]
-    report = ls.recheck(spoiled(saved, change, tmp_path / "forged.zip"))
-    assert (report.verdict, reason in str(report)) == ("failed", True), str(report)
-
-
-BAD = {
-    "no noise": lambda f: section_of(f).update(landing="0"),
-    "a key too many": lambda f: section_of(f).update(more=1),
-    "a place that overlaps another": lambda f: section_of(f).update(
-        absorbing={"top": box(1, 3), "more": box(2, 3)}
-    ),
-    "starts that count twice": lambda f: section_of(f).update(starts=box(0, 1) + box(0.5, 1)),
-    "a place named as the exits": lambda f: section_of(f).update(absorbing={"exits": box(1, 3)}),
-    "a function of other cells": lambda f: f.arrays.update({"0.mean.upper": np.ones(7)}),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_files_are_refused(case, saved, tmp_path):
-    assert ls.recheck(spoiled(saved, BAD[case], tmp_path / "forged.zip")).verdict == "bad file"
+    require_denied(saved, FORGED[case], tmp_path)
 
 
 def inverse(x):

@@ -5,11 +5,8 @@ import math
 import numpy as np
 import pytest
 
-pytest.importorskip("flint", reason="the checker needs python-flint")
-
 import limitsets as ls
-from tests.proofs.forge import opened, spoiled
-from tests.proofs.test_noisy_maps import itself, section_of
+from tests.proofs.test_noisy_maps import itself, own, require_denied, section_of
 
 TAU = 2.0 * math.pi
 
@@ -71,8 +68,8 @@ def test_random_orbits_lie_within_the_bounds(case):
     answer = ls.average(the_map, ls.grid([(lo, hi)], cells=400, periodic=True), functions, noise=noise)
     rng = np.random.default_rng(4)
     e = noise["landing"] if isinstance(noise, dict) else noise
-    x, rows = rng.uniform(lo, hi, 20_000), []
-    for k in range(400):
+    x, rows = rng.uniform(lo, hi, 10_000), []
+    for k in range(250):
         x = lo + (step(x, rng) + rng.uniform(-e, e, x.size) - lo) % (hi - lo)
         if k >= 50:
             rows.append([x] if logs is None else [logs(x), x])
@@ -84,10 +81,9 @@ def test_random_orbits_lie_within_the_bounds(case):
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory):
-    path = tmp_path_factory.mktemp("circles") / "wavy.proof.zip"
     circle = ls.grid([(0.0, 1.0)], cells=60, periodic=True)
-    ls.average(ls.map(wavy, a=0.8), circle, itself, noise=0.2).save(path)
-    return path
+    path = tmp_path_factory.mktemp("circles") / "wavy.proof.zip"
+    return ls.average(ls.map(wavy, a=0.8), circle, itself, noise=0.2).save(path, recheck=False)
 
 
 def test_a_saved_answer_is_rechecked(saved):
@@ -101,11 +97,12 @@ def last_node(forged, place):
 
 
 FORGED = {
+    "nodes beyond the period": (lambda f: last_node(f, 1.0), None),  # a bad file
     "another function near the seam": (
         lambda f: f.arrays["0.long-run.upper"].__setitem__(slice(1, 3), 5.0), "the upper end",
     ),
-    "less noise": (lambda f: section_of(f).update(landing="0.1"), "end is"),
-    "noise beyond half a period": (lambda f: section_of(f).update(landing="0.7"), "the noise is longer than a period"),
+    "less noise": (own(landing="0.1"), "end is"),
+    "noise beyond half a period": (own(landing="0.7"), "the noise is longer than a period"),
     "starts beyond the seam": (
         lambda f: section_of(f)["starts"][0].update(box=[[(0.5).hex(), (1.5).hex()]]), "beyond the nodes",
     ),
@@ -116,12 +113,4 @@ FORGED = {
 
 @pytest.mark.parametrize("case", FORGED)
 def test_what_is_forged_is_denied(case, saved, tmp_path):
-    change, reason = FORGED[case]
-    report = ls.recheck(spoiled(saved, change, tmp_path / "forged.zip"))
-    assert (report.verdict, reason in str(report)) == ("failed", True), str(report)
-
-
-def test_nodes_beyond_the_period_are_a_bad_file(saved, tmp_path):
-    forged = opened(saved)
-    last_node(forged, 1.0)
-    assert ls.recheck(forged.seal().write(tmp_path / "forged.zip")).verdict == "bad file"
+    require_denied(saved, FORGED[case], tmp_path)
