@@ -227,7 +227,6 @@ def test_what_is_not_proved_names_the_next_command(capfd):
 def test_a_share_that_is_undecided_names_the_next_command(capfd):
     _, out, _ = run(capfd, "analyse paper-designed --cells 64")
     assert "of all starts; next: limitsets analyse paper-designed --cells 256 (finer cells)" in out
-    assert "undecided: " not in run(capfd, "analyse paper-designed --cells 4096")[1]
 
 
 # ----------------------------------------------------------------
@@ -410,6 +409,7 @@ def test_a_feeder_that_scatters_without_bounds(capfd):
     assert record["model"]["left_out"] == ["scatter"]
     assert "of the scene without its scatter" in run(capfd, "recheck fed.proof.zip")[1]
     assert not found.proved
+    assert not found.vacuous
     assert found.safe.verdict == found.fed.verdict == proved
     assert proved in found.tables()[1].csv()
 
@@ -428,13 +428,12 @@ def test_a_sheet_of_a_scene_that_scatters(capfd):
 def test_a_feeder_that_feeds_nothing_says_so_first(capfd):
     """The end is beyond all that the throws reach: 23.4 in on side 2, known_answers.md; most stay on the arm."""
     file = written(with_cavity(position="26 in"))
-    out = prints(capfd, "feed", file, *QUICK, "-o", "fed", code=1)
-    assert out.splitlines()[0].startswith("paper-designed: nothing is fed, none of 100 parts thrown")
+    out = prints(capfd, "feed", file, "--trials", "20", "--no-level", "-o", "fed", code=1)
+    assert out.splitlines()[0].startswith("paper-designed: nothing is fed, none of 20 parts thrown")
     assert "throws until" not in out
     record = json.loads(Path("fed/feeding.json").read_text(encoding="utf-8"))
     assert record["vacuous"] is True
     assert sum(record["trials"]["counts"][name] for name in ("right", "wrong", "wall")) == 0
-    assert not ls.feed(with_cavity(), prove=False, level=False, trials=10).vacuous
 
 
 def test_the_explorer_names_it():
