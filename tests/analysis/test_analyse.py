@@ -374,7 +374,7 @@ def check_throws(scene: ls.scene.Scene) -> None:
 
 
 @pytest.mark.sweep
-@settings(max_examples=30, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(scenes())
 def test_an_answer_or_an_error(table: dict[str, Any]) -> None:
     try:
@@ -397,8 +397,11 @@ def test_an_answer_or_an_error(table: dict[str, Any]) -> None:
 # An error asked for: which method is picked for it, and whether what is reached is true.
 
 
-@pytest.mark.parametrize("name", ["paper-designed", "paper-initial"])
-@pytest.mark.parametrize("error", [0.5, 0.05, 1e-3, 1e-6, 1e-10])
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [("paper-designed", error) for error in (0.5, 1e-3, 1e-10)]
+    + [("paper-initial", error) for error in (0.05, 1e-6)],
+)
 def test_the_error_asked_for_is_met_and_known(name, error):
     plans = []
     found = ls.analyse(name, error=error, announce=plans.append)

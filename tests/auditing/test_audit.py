@@ -361,10 +361,11 @@ def test_auto_says_that_effects_need_the_exact_flight():
 
 @pytest.mark.sweep
 def test_auto_leaves_out_what_cannot_be_simulated_beside_what_is_on():
-    # without restitution the bounce changes nothing, and the stroke is called for as in the minimal model
+    """Without restitution the bounce changes nothing, and the stroke is called for as in the minimal model."""
     world = {"stroke": "6 deg", "restitution": 0.0, "bounce_threshold": "0.01 in"}
-    assert "drive" in choose_effects(told("paper-initial", world, auto=True)).switched_on
-    chosen = choose_effects(told("paper-initial", world, auto=True, bounce=True))
+    minimal = ls.audit(told("paper-designed", world)).on("limit-set")
+    assert [each.called_for for each in minimal if each.effect == "drive"] == [True]
+    chosen = choose_effects(told("paper-designed", world, auto=True, bounce=True))
     assert "drive" not in chosen.switched_on
     assert chosen.left_out["drive"] == "called for, but it cannot be simulated together with bounce"
 

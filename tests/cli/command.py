@@ -3,10 +3,12 @@
 import json
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
+from unittest import mock
 
 import limitsets as ls
-from limitsets.face.cli import main
+from limitsets.face.cli import commands, main
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -35,6 +37,22 @@ def prints(capfd, *words, code=0):
 def json_of(capfd, *words, code=0):
     """What it prints with --json."""
     return json.loads(prints(capfd, *words, "--json", code=code))
+
+
+def both(capfd, *words, code=0):
+    """What it prints as text, and what it prints with --json, of an answer that is computed once; code None is any."""
+    give, between = commands._give, "-" * 72
+
+    def twice(asked, answer, file):
+        give(asked, answer, file)
+        print(between, flush=True)
+        give(replace(asked, json=True), answer, file)
+
+    with mock.patch.object(commands, "_give", twice):
+        ended, out, err = run(capfd, *words)
+    assert code in (ended, None), err
+    text, _, record = out.partition(between)
+    return text, json.loads(record)
 
 
 def refusal(capfd, *words):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.command import json_of, prints, refusal, run, written
+from tests.cli.command import documented, json_of, prints, refusal, run, written
 from tests.feeding.scenes import with_cavity
 from tests.trays.scenes import with_tray
 
@@ -111,6 +111,7 @@ def test_a_page_by_default_named_after_the_scene(capfd):
 
 def test_json_alone_and_a_place_with_a_unit(capfd):
     film = json_of(capfd, "animate paper-designed --start '53.34 cm,2' --throws 1 -o run.gif --slow 1")
+    assert set(film) == documented("animate")
     assert film == {"film": "run.gif", "bytes": Path("run.gif").stat().st_size}
 
 

@@ -181,6 +181,7 @@ def test_a_goal_that_fails_names_the_next_command(capfd):
     assert "limitsets design paper-initial --goal" in Path("found/report.md").read_text()
     _, out, _ = run(capfd, "analyse paper-designed --cells 1024 -o held")
     assert "next: limitsets certify paper-designed" in out
+    assert not any(word in out for word in ("careful", "undecided: "))
 
 
 def test_a_goal_that_is_not_proved_names_the_certificate(capfd):
@@ -206,7 +207,6 @@ def test_throws_outside_the_model_are_named_on_the_terminal(capfd):
     chamfered = {"part": part, "arm": arm, "throw": {"speed": "200 deg/s"}, "gravity": {"tilt": "30 deg"}}
     out = prints(capfd, f"analyse {written(chamfered)} --cells 1024 -o found")
     assert "careful: of some throws of the limit set from side 2, 3 another vertex lands first" in out
-    assert "careful" not in prints(capfd, "analyse paper-designed --cells 1024 -o other")
 
 
 def test_the_next_command_is_one_that_can_be_pasted(capfd):
@@ -303,8 +303,6 @@ def test_the_sheet_tells_them_too(tmp_path):
     seconds, parts = re.search(r"\(([\d.]+) s, ([\d.]+) parts per minute\)", row).groups()
     assert float(seconds) == pytest.approx(mean / 2.0, rel=5e-3)
     assert float(parts) == pytest.approx(120.0 / mean, rel=5e-3)
-    plain = ls.robustness(ls.load(own(world={"scatter": {"speed": "0.5 %"}})), **quick)
-    assert "parts per minute" not in robustness_page(plain, {})
 
 
 def test_a_speed_in_a_wrong_unit_is_asked_about(capfd):

@@ -11,7 +11,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.face.cli.arguments import bounds_of
-from tests.cli.command import documented, json_of, names_in, prints, refusal, run, written
+from tests.cli.command import both, documented, json_of, names_in, prints, refusal, run, written
 from tests.fitting.machines import ABOVE, ALONG, HEIGHT, RADIUS, farthest, film
 
 # ----------------------------------------------------------------
@@ -46,6 +46,7 @@ def test_a_file_and_a_folder(capfd):
     folder = Path("deep/found")
     assert names_in(folder) == {"paper-initial-design.toml", "design.json", "design.png", "part.png"}
     assert record == json.loads((folder / "design.json").read_text(encoding="utf-8"))
+    assert set(record) == documented("design --critical-points")
     assert record["reached"] is True
     assert record["targets"] == [10, 10, 20]
     assert len(record["path"]) == 3
@@ -111,11 +112,13 @@ def test_bounds_that_are_turned_round_are_refused(word):
 # `limitsets design --robust`: search without proof, its files, and what it refuses.
 
 
+FEW = "--evaluations 4 --vary part.mass.center.along,throw.kappa --seconds 0"
+
+
 @pytest.mark.sweep
 def test_a_search_writes_scene_answer_and_figure(here, capfd):
     given = written(tolerance={"throw.speed": "1 %"})
-    words = "--evaluations 4 --vary part.mass.center.along,throw.kappa --seconds 0 --out found"
-    record = json_of(capfd, f"design {given} --robust {words}")
+    record = json_of(capfd, f"design {given} --robust {FEW} --out found")
     assert record["margins"] == []
     assert names_in("found") == {"paper-designed-robust.toml", "design.json", "front.png", "part.png"}
     kept = json.loads(Path("found/design.json").read_text(encoding="utf-8"))
@@ -127,22 +130,23 @@ def test_a_search_writes_scene_answer_and_figure(here, capfd):
 
 @pytest.mark.sweep
 def test_the_scene_alone(capfd):
-    out = prints(capfd, "design paper-designed --robust --evaluations 20 --seconds 0 -o found.toml")
+    given = written(tolerance={"throw.speed": "1 %"})
+    out = prints(capfd, f"design {given} --robust {FEW} -o found.toml")
     assert out.splitlines()[-1] == "scene: found.toml"
-    assert names_in() == {"found.toml"}
+    assert names_in() == {given, "found.toml"}
     assert ls.load("found.toml").value("throw.kappa") > 0
 
 
 def test_where_nothing_is_found_the_nearest_miss_is_written(capfd):
-    line = "design paper-designed --robust --bounds part.mass.center.along=0.1:0.2 --evaluations 20"
-    out = prints(capfd, line, "-o", "missed", code=1)
+    line = "design paper-designed --robust --bounds part.mass.center.along=0.1:0.2 --evaluations 6"
+    out, printed = both(capfd, line, "-o", "missed", "--csv", "missed.csv", code=1)
     assert "nearest miss" in out
     assert "none that feeds among" in out
     assert out.splitlines()[-1] == "scene: missed/paper-designed-robust.toml (the nearest miss, no answer)"
     record = json.loads(Path("missed/design.json").read_text(encoding="utf-8"))
     assert sum(record["ruled_out"].values()) == record["evaluations"]
     assert ls.load(record["scene"]) == ls.load("missed/paper-designed-robust.toml")
-    assert set(json_of(capfd, line, "--csv", "missed.csv", code=1)) == set(record)
+    assert set(printed) == set(record)
     assert "nearest miss" in Path("missed.csv").read_text(encoding="utf-8")
 
 
@@ -163,8 +167,9 @@ def throws():
     Path("throws.csv").write_text("\n".join(lines), encoding="utf-8")
 
 
-def test_json_has_the_keys_of_the_docs(capfd, throws):
-    record = json_of(capfd, "fit paper-designed throws.csv", "--error", "0.508 mm", "--no-margin")
+def test_a_table_and_files_and_the_keys_of_the_docs(capfd, throws):
+    line = "fit paper-designed throws.csv --error '0.508 mm' --no-margin -o out --csv t.csv"
+    out, record = both(capfd, line)
     assert set(record) == documented("fit")
     assert record["unit"] == "in"
     assert record["error"] == 0.02
@@ -179,10 +184,6 @@ def test_json_has_the_keys_of_the_docs(capfd, throws):
         assert set(each) == {"row", "column", "recorded", "fits"}
     assert ls.load(record["scene"]).goal == ls.load("paper-designed").goal
     assert record["enough"] is None
-
-
-def test_a_table_and_files(capfd, throws):
-    out = prints(capfd, "fit paper-designed throws.csv --error 0.02 --no-margin -o out --csv t.csv")
     assert names_in("out") == {"fitted.toml", "fit.json", "part.png", "residuals.png"}
     rows = list(csv.DictReader(Path("t.csv").read_text(encoding="utf-8").splitlines()))
     speed = rows[0]

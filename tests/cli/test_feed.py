@@ -14,7 +14,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.base.errors import AnswerError
-from tests.cli.command import DOCS, json_of, names_in, prints, refusal, run, written
+from tests.cli.command import DOCS, both, json_of, names_in, prints, refusal, run, written
 from tests.feeding.own_throws import thrown
 from tests.feeding.scenes import with_cavity
 from tests.plates import left_by_some
@@ -109,15 +109,14 @@ def test_many_parts_at_once(capfd):
     tables = {"world": {"friction": 0.9, "throw_rate": "2 Hz"}, "effects": {"contact": True}}
     many = written(with_cavity(tables=tables))
     quick = ("--no-proof", "--trials", "20", "--parts", "2", "--batches", "2")
-    crowds = json_of(capfd, f"feed {many}", *quick)["crowds"]
+    out, record = both(capfd, f"feed {many}", *quick)
     line = next(line for line in PAGE.splitlines() if line.startswith("| `crowds`"))
     named = re.search(r"`\{(.*?)\}`", line).group(1).split(", ")
-    for crowd, between in zip(crowds, (True, False), strict=True):
+    for crowd, between in zip(record["crowds"], (True, False), strict=True):
         assert list(crowd) == named
         assert (crowd["parts"], crowd["batches"], crowd["between"]) == (2, 2, between)
         rate = crowd["right_per_throw"]["value"]
         assert crowd["right_per_minute"] == pytest.approx(120.0 * rate)
-    out = prints(capfd, f"feed {many}", *quick)
     assert "2 parts at once that push each other (arm: hinge):" in out
     assert "right per throw" in out
     assert "effects.contact" in refusal(capfd, f"feed {fed()}", *quick)
@@ -256,7 +255,7 @@ def test_all_others_name_the_lines(capfd):
 def test_with_the_lines_all_of_them_go(capfd):
     written_chamfer(goal={"stays_on_arm": True})
     for kind in ("part", "limit-set", "map", "basins", "morse", "flight"):
-        prints(capfd, "plot chamfered.toml", kind, "-o", f"{kind}.png")
+        prints(capfd, "plot chamfered.toml", kind, "-o", f"{kind}.png", "--cells", "256")
     titles = [axes.get_title() for axes in ls.plot.map(ls.load("chamfered.toml")).axes]
     assert titles[3] == "on side 3: no part rests there"
     code, out, _ = run(capfd, "throw chamfered.toml --x 20 --side 0 --count 50 --json")
@@ -325,17 +324,18 @@ def test_a_margin_names_an_effect_of_which_nothing_is_proved():
         ls.margin(ls.load(tree))
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("command", ["certify", "margin", "analyse"])
-def test_a_proposed_command_answers_or_is_not_proposed(capfd, law, command):
-    """`certify` proposed `margin`, which refused; `margin` proposed `certify`, which refuses normal scatter."""
-    name = latch(law)
-    words = [command, name, *(("--no-recheck",) if command == "certify" else ())]
-    out = run(capfd, *words)[1]
+def proposes_what_runs(out, law):
     (line,) = [each for each in out.splitlines() if each.startswith("next: ")] or [""]
     assert ("limitsets certify" in line) <= (law == "bounded")
     # not every start stays on the arm, so that all margins are 0
     assert "limitsets margin" not in line
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("command", ["certify --no-recheck", "margin"])
+def test_a_proposed_command_answers_or_is_not_proposed(capfd, law, command):
+    """`certify` proposed `margin`, which refused; `margin` proposed `certify`, which refuses normal scatter."""
+    proposes_what_runs(run(capfd, f"{command} {latch(law)}")[1], law)
 
 
 def test_noise_that_covers_the_scatter_does_not_break_its_assumption(capfd):
@@ -354,8 +354,12 @@ def test_a_sampled_limit_set_is_said_to_be_without_scatter(capfd):
     assert "limit set 0, of throws without scatter: from 90.7 % of all starts" in out
     assert "but without scatter no part gets there: the limit set ends at x = 441.826 mm" in out
     assert "But without scatter no part gets there" in Path("found/report.md").read_text(encoding="utf-8")
-    _, out, _ = run(capfd, "analyse", latch(None), "-o", "found")
+    proposes_what_runs(out, "gaussian")
+    _, out, _ = run(capfd, "analyse", latch(None), "--cells", "256", "-o", "plain")
     assert "without scatter" not in out
+    proposes_what_runs(
+        run(capfd, "analyse", latch("bounded"), "--cells", "256", "-o", "bounded")[1], "bounded"
+    )
 
 
 def test_feed_says_what_ends_a_part_and_how_throws_scatter(capfd):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import limitsets as ls
-from tests.cli.command import documented, json_of, names_in, prints, refusal, run, written
+from tests.cli.command import both, documented, json_of, names_in, prints, refusal, written
 
 SCENE = "one-bit.toml"
 FEW = ("--starts", "2=17:18", "--cells", "256")
@@ -49,10 +49,10 @@ def test_json_has_the_keys_of_the_page(capfd):
 
 def test_brackets_are_proved_beside_the_thrown_parts(capfd):
     few = (*FEW, "--noise", "landing.x=0.005 in", "--brackets", "300")
-    out = prints(capfd, "feedback", SCENE, *few)
+    out, record = both(capfd, "feedback", SCENE, *few)
     said = re.search(r"PROVED \(deviations .* per length\): ([\d.]+) to ([\d.]+) throws on average", out)
     assert said is not None
-    record = json_of(capfd, "feedback", SCENE, *few)["brackets"]
+    record = record["brackets"]
     assert float(said[1]) <= record["mean"]["lo"] <= record["mean"]["hi"] <= float(said[2])
     assert 0.0 <= record["come"]["lo"] <= record["come"]["hi"] <= 1.0
     assert "--brackets" in refusal(capfd, "feedback", SCENE, "--brackets", "3")
@@ -129,11 +129,10 @@ def test_no_policy_is_exit_1(capfd):
 
 def test_a_sweep_names_the_best_place(capfd):
     words = ("feedback", SCENE, *FEW, "--sweep", "18:20:3", "--parts", "100")
-    record = json_of(capfd, *words)
+    out, record = both(capfd, *words)
     assert [place["x"] for place in record["places"]] == [18.0, 19.0, 20.0]
     assert all(set(place) == {"x", "verdict", "within"} for place in record["places"])
     assert record["within"] == min(each["within"] for each in record["places"] if each["verdict"] == "solved")
-    _, out, _ = run(capfd, *words)
     assert "19 in" in out
 
 

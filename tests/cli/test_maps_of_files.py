@@ -196,18 +196,7 @@ def test_an_atlas_of_a_map(capfd, mymap):
 
 
 def test_averages_under_noise_of_a_parameter(capfd, mymap):
-    how = (
-        "average",
-        f"{mymap}:ricker",
-        "--set",
-        "r=2.6",
-        "--domain",
-        "0.06:2.2",
-        "--of",
-        "0:1",
-        "--cells",
-        "300",
-    )
+    how = f"average {mymap}:ricker --set r=2.6 --domain 0.06:2.2 --of 0:1 --cells 300".split()
     _, out, _ = run_of_file(capfd, *how, "--noise", "r=0.1", "--noise", "0.02")
     assert "steps land within 0.02 of the image and r deviates by at most 0.1 at every step, evenly" in out
     assert ls.recheck("ricker.averages.proof.zip").verdict == "proved"

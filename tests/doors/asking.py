@@ -6,12 +6,14 @@ import json
 import tomllib
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import limitsets as ls
 from limitsets.base.errors import LimitsetsError
 from limitsets.face.cli import main
 from limitsets.face.explorer.work import answers
 from limitsets.feeder.scene.left_out import WITHOUT_SCATTER
+from limitsets.parameters.margins import single
 from limitsets.parameters.margins.margin_result import bound
 
 # How much narrower than what is proved, and wider than what is refuted, a tolerance is asked of `certify`.
@@ -27,7 +29,25 @@ def command(*words: str) -> tuple[int, Any, str]:
 
 
 def asked(scene: Any, quantity: str, folder: Path) -> dict[str, Any]:
-    """Ask each door; what it gives as proved and refuted, or why it does not answer."""
+    """Ask each door; what it gives as proved and refuted, or why it does not answer.
+
+    A bracket is searched for once: a door that asks the very same of the very same scene is given it again, and one
+    that asks anything else (another goal, reading, width or scene) searches by itself.
+    """
+    kept: dict[str, Any] = {}
+    search = single._single
+
+    def once(query: Any, scale: Any, width: Any, tell: Any) -> Any:
+        key = repr((ls.dump(query.scene), query.goals, scale, width))
+        if key not in kept:
+            kept[key] = search(query, scale, width, tell)
+        return kept[key]
+
+    with mock.patch.object(single, "_single", once):
+        return _asked(scene, quantity, folder)
+
+
+def _asked(scene: Any, quantity: str, folder: Path) -> dict[str, Any]:
     file = folder / "scene.toml"
     loaded = ls.load(tomllib.loads(scene) if isinstance(scene, str) else scene)
     file.write_text(ls.dump(loaded), encoding="utf-8")

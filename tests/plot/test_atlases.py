@@ -1,6 +1,7 @@
 """Figures of atlases and bifurcations."""
 
 import math
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -28,6 +29,19 @@ def feeders():
     return ls.atlas("paper-designed", X, Y, variables=wanted, options={"throws": 500}, chunk=(16, 24))
 
 
+@cache
+def along_speed():
+    return ls.atlas("paper-designed", "throw.speed=150:165:7", variables=["threshold", "class"])
+
+
+def lines_of(axes, gid):
+    return [each for each in (*axes.lines, *axes.collections) if each.get_gid() == gid]
+
+
+def words_of(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
 def image_of(figure):
     (found,) = figure.axes[0].images
     return found
@@ -49,7 +63,7 @@ def test_each_pixel_has_the_colour_of_its_class(feeders):
 def test_the_legend_is_in_words_and_numbers_stand_in_the_largest_regions(feeders):
     figure = ls.plot.atlas(feeders)
     entries = legend(feeders.dataset)
-    texts = [text.get_text().replace("\n  ", "") for text in figure.legends[0].get_texts()]
+    texts = [text.replace("\n  ", "") for text in words_of(figure)]
     assert texts[0].startswith(f"1: {entries[0].words} (")
     # 158.02 deg/s is sqrt(g/kappa) of the file's decimals
     assert texts[-1] == f"paper-designed: {math.degrees(math.sqrt(193.045 / 25.3778518)):.6g}, -0.2"
@@ -63,25 +77,25 @@ def test_the_legend_is_in_words_and_numbers_stand_in_the_largest_regions(feeders
 
 
 def test_the_design_is_marked_where_it_is(feeders):
-    (star,) = [line for line in ls.plot.atlas(feeders).axes[0].lines if line.get_gid() == "design"]
+    (star,) = lines_of(ls.plot.atlas(feeders).axes[0], "design")
     speed = math.degrees(math.sqrt(193.045 / 25.3778518))
     assert star.get_xdata()[0] == pytest.approx(speed, rel=1e-12)
     assert star.get_ydata()[0] == pytest.approx(-0.2, rel=1e-12)
     outside = ls.atlas("paper-designed", "throw.speed=130:140:3", variables=["class"])
-    assert not [line for line in ls.plot.atlas(outside).axes[0].lines if line.get_gid() == "design"]
+    assert not lines_of(ls.plot.atlas(outside).axes[0], "design")
 
 
 def test_lines_part_the_classes_and_nothing_else(feeders):
     numbers = feeders.dataset["class"].values
     wanted = (numbers[1:] != numbers[:-1]).sum() + (numbers[:, 1:] != numbers[:, :-1]).sum()
-    (lines,) = [each for each in ls.plot.atlas(feeders).axes[0].collections if each.get_gid() == "boundaries"]
+    (lines,) = lines_of(ls.plot.atlas(feeders).axes[0], "boundaries")
     assert len(lines.get_segments()) == wanted
 
 
 @pytest.mark.sweep
 def test_a_class_looks_alike_in_every_picture():
     few = ls.atlas(maps.Logistic(3.8), "r=3.83:3.832:2", domain=[(0, 1)])
-    many = ls.atlas(maps.Logistic(3.8), "r=2.8:3.832:120", domain=[(0, 1)])
+    many = ls.atlas(maps.Logistic(3.8), "r=2.8:3.832:12", domain=[(0, 1)])
     looks = []
     for found in (few, many):
         (number,) = {each.number for each in legend(found.dataset) if "a cycle of 3" in each.words}
@@ -146,8 +160,7 @@ def test_surfaces_show_the_largest_attractor_and_nothing_where_there_is_none(fee
 
 
 def test_the_line_of_the_goal_parts_what_holds_from_what_does_not(feeders):
-    collections = ls.plot.atlas_surface(feeders, "threshold").axes[0].collections
-    (line,) = [each for each in collections if each.get_gid() == "level"]
+    (line,) = lines_of(ls.plot.atlas_surface(feeders, "threshold").axes[0], "level")
     data = feeders.dataset
     for x, y in line.get_paths()[0].vertices[::5]:
         near = data.threshold.sel({"throw.speed": x, "arm.surface_height": y}, method="nearest")
@@ -155,12 +168,14 @@ def test_the_line_of_the_goal_parts_what_holds_from_what_does_not(feeders):
 
 
 @pytest.mark.parametrize("goal", ["oriented_beyond", "reaches"])
-def test_the_map_has_a_line_where_the_goal_ends_with_ticks_where_it_fails(goal):
-    tree = ls.load("paper-designed").as_dict()
-    tree["goal"] = {goal: {"x": "20 in", "side": 2 if goal == "oriented_beyond" else 0}}
-    found = ls.atlas(ls.load(tree), X, Y, variables=["class", "threshold"])
+def test_the_map_has_a_line_where_the_goal_ends_with_ticks_where_it_fails(goal, feeders):
+    """The scene's own goal, and one that side 0 gets to 20 in."""
+    tree = ls.load("paper-designed").as_dict() | {"goal": {"reaches": {"x": "20 in", "side": 0}}}
+    found = feeders
+    if goal == "reaches":
+        found = ls.atlas(ls.load(tree), X, Y, variables=["class", "threshold"])
     figure = ls.plot.atlas(found)
-    (line,) = [each for each in figure.axes[0].collections if each.get_gid() == "goal"]
+    (line,) = lines_of(figure.axes[0], "goal")
     ticked = line.get_path_effects()[-1]
     angle = math.radians(ticked._angle)
     threshold = found.dataset["threshold"]
@@ -181,12 +196,12 @@ def test_the_map_has_a_line_where_the_goal_ends_with_ticks_where_it_fails(goal):
                     assert ((near > 20.0) if goal == "oriented_beyond" else (near < 20.0)) == inside
                     checked += 1
     assert checked > 20
-    assert "the goal fails on the side of the ticks" in [t.get_text() for t in figure.legends[0].get_texts()]
+    assert "the goal fails on the side of the ticks" in words_of(figure)
 
 
 def test_of_one_quantity_the_line_of_the_goal_stands_where_the_threshold_is_its_x():
-    found = ls.atlas("paper-designed", "throw.speed=150:165:7", variables=["threshold", "class"])
-    (line,) = [each for each in ls.plot.atlas(found).axes[0].lines if each.get_gid() == "goal"]
+    found = along_speed()
+    (line,) = lines_of(ls.plot.atlas(found).axes[0], "goal")
     x, values = found.dataset["throw.speed"].values, found.dataset["threshold"].values
     assert line.get_xdata()[0] == pytest.approx(np.interp(-20.0, -values, x))  # it falls with the speed
     assert line.get_path_effects()[-1]._angle == 90  # to the left of a line upwards: slower
@@ -195,8 +210,7 @@ def test_of_one_quantity_the_line_of_the_goal_stands_where_the_threshold_is_its_
 def test_where_no_line_is_the_legend_says_whether_the_goal_holds():
     for speeds, word in (("165:168:3", "holds"), ("150:152:3", "fails")):
         found = ls.atlas("paper-designed", f"throw.speed={speeds}", variables=["threshold", "class"])
-        texts = [text.get_text() for text in ls.plot.atlas(found).legends[0].get_texts()]
-        assert f"the goal {word} wherever there is a limit set" in texts
+        assert f"the goal {word} wherever there is a limit set" in words_of(ls.plot.atlas(found))
 
 
 def test_each_hatch_says_one_thing():
@@ -211,8 +225,7 @@ def test_where_no_part_gets_to_x_it_is_said():
         tree = ls.load("paper-designed").as_dict()
         tree["goal"] = {"oriented_beyond": {"x": f"{x} in", "side": 2}}
         found = ls.atlas(ls.load(tree), "throw.kappa=25.3778518:25.3778519:2")
-        texts = [text.get_text() for text in ls.plot.atlas(found).legends[0].get_texts()]
-        assert (f"no part gets to x = {x}" in texts) == words
+        assert (f"no part gets to x = {x}" in words_of(ls.plot.atlas(found))) == words
 
 
 @pytest.mark.parametrize(
@@ -239,9 +252,8 @@ def test_a_long_legend_stays_in_the_picture():
 
 
 def test_one_quantity_is_a_line():
-    found = ls.atlas("paper-designed", "throw.speed=150:165:7", variables=["threshold", "class"])
-    figure = ls.plot.atlas_surface(found, "threshold")
-    (line,) = [each for each in figure.axes[0].lines if each.get_gid() == "values"]
+    found = along_speed()
+    (line,) = lines_of(ls.plot.atlas_surface(found, "threshold").axes[0], "values")
     assert np.array_equal(line.get_ydata(), found.dataset.threshold.values)
     assert image_of(ls.plot.atlas(found)).get_array().shape[:2] == (1, 7)
 
@@ -301,8 +313,7 @@ def test_every_side_shows_its_bands_its_critical_points_and_the_event(thrown):
     (mark,) = named(figure.axes[1], "border collision")
     assert mark.get_xdata()[0] == pytest.approx(math.degrees(event.values[0]["throw.speed"]))
     assert mark.get_ydata()[0] == pytest.approx(event.collision.x)
-    words = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert words == ["attractor 0", "critical point", "event: border collision"]
+    assert words_of(figure) == ["attractor 0", "critical point", "event: border collision"]
 
 
 def test_against_t_or_another_quantity(thrown):

@@ -19,7 +19,6 @@ from limitsets import plot
 from limitsets.base.errors import AnswerError, MapError
 from limitsets.face.plot.parts import refused_part
 from limitsets.face.plot.style import SETS, extents_of, keep_apart, stretch
-from limitsets.face.report.writing import write, write_audit
 from limitsets.feeder.scene.reading import sketch
 from limitsets.feeder.thrower import fly
 from tests.cli.command import run
@@ -398,14 +397,6 @@ def test_names_of_the_sides_keep_off_the_part_and_each_other(source):
     assert not any(path.intersects_bbox(box) for box in boxes)
     assert not any(one.overlaps(two) for k, one in enumerate(boxes) for two in boxes[:k])
     assert all(figure.bbox.contains(*corner) for box in boxes for corner in box.corners())
-
-
-def test_it_is_the_first_figure_of_reports(tmp_path):
-    write(ls.analyse("paper-designed", 256), tmp_path)
-    write_audit(ls.audit("paper-designed"), tmp_path)
-    for page in ("report.md", "audit.md"):
-        assert re.search(r"!\[.*?\]\((.*?)\)", (tmp_path / page).read_text())[1] == "part.png"
-    assert (tmp_path / "part.png").exists()
 
 
 CORNERS = [[0, 0], [130, 0], [60, 30], [150, 70]]
