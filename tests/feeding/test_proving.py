@@ -183,7 +183,7 @@ def test_the_first_cells_keep_the_time_too(monkeypatch):
     proved_feeding(end, noise, seconds=0.0)  # and compiles
     began = time.process_time()
     found = proved_feeding(end, noise, seconds=1.0)
-    assert time.process_time() - began < 10.0
+    assert time.process_time() - began < 20.0
     assert (found.safe.verdict, found.fed.verdict) == ("undecided", "undecided")
     assert "pieces, not 256, which would take longer" in found.fed.reason
 
