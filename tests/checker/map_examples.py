@@ -76,12 +76,6 @@ def gap():
 
 
 @functools.cache
-def henon(cells=512):
-    arrays = arrays_of(HENON, uniform((-1.5, 1.5), (-0.5, 0.5), cells=cells), {"a": [1.4], "b": [0.3]})
-    return MapCertificate(HENON, [({"a": "1.4", "b": "0.3"}, {"trapping": {}, "basin": {}}, arrays)])
-
-
-@functools.cache
 def seven(a="1.24", width=1e-9):
     """The attracting 7-cycle of Henon's map at a = 1.24 (a range: the boxes are wider)."""
 

@@ -379,13 +379,6 @@ ODD = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ODD)
-def test_odd_files_are_refused(name, tmp_path):
-    certificate = known.gap().copy()
-    ODD[name](certificate)
-    refused(certificate, tmp_path)
-
-
 ODD_CYCLES = {
     "boxes missing": {"boxes": []},
     "side missing": {"side": [0]},
@@ -401,58 +394,41 @@ ODD_CYCLES = {
     "radius below 0": {"radius": hexed(-1.0)},
     "a key too many": {"period": 7},
 }
+CONVERGING = [  # components, and the cycles to which they converge
+    ([0, 1], [0]), ([0, 1], [0, 0]), ([0, 0], [0, 1]), ([], []), ([-1], [0]), ([0], [1]), ([0], [-1]), ([True], [0])
+]  # fmt: skip
+ALL_ODD = {name: (known.gap, forge) for name, forge in ODD.items()}
+ALL_ODD |= {f"cycles: {name}": (known.seven, first_cycle(**changed)) for name, changed in ODD_CYCLES.items()}
+ALL_ODD |= {
+    f"converges: {c} {k}": (known.delayed, with_section("converges", components=c, cycles=k)) for c, k in CONVERGING
+} | {
+    "converges without a radius": (known.delayed, first_cycle(radius=None)),
+    "converges without cycles": (known.delayed, lambda c: c.header["boxes"][0]["claims"].pop(0)),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ODD_CYCLES)
-def test_odd_cycles_are_refused(name, tmp_path):
-    certificate = known.seven().copy()
-    cycle_of(certificate).update(ODD_CYCLES[name])
+@pytest.mark.parametrize("name", ALL_ODD)
+def test_odd_files_are_refused(name, tmp_path):
+    make, forge = ALL_ODD[name]
+    certificate = make().copy()
+    forge(certificate)
     refused(certificate, tmp_path)
 
 
 @pytest.mark.parametrize(
-    "section",
+    ("make", "forge", "why"),
     [
-        {"components": [0, 1], "cycles": [0]},
-        {"components": [0, 1], "cycles": [0, 0]},
-        {"components": [0, 0], "cycles": [0, 1]},
-        {"components": [], "cycles": []},
-        {"components": [-1], "cycles": [0]},
-        {"components": [0], "cycles": [1]},
-        {"components": [0], "cycles": [-1]},
-        {"components": [True], "cycles": [0]},
+        (known.two_ages, lambda c: c.claim("expanding", least=hexed(1.5)), "one dimension"),
+        (known.ricker, put("goal", "starts", value=None), "name its starts"),
+        (known.ricker, lambda c: c.claim("basin", box=1), "with cycles alone"),
+        (known.ricker, put("goal", value=None), "no goal"),
+        (known.ricker, lambda c: c.arrays.clear(), "missing"),
     ],
 )
-def test_odd_sections_of_converges_are_refused(section, tmp_path):
-    certificate = known.delayed().copy()
-    certificate.claims()["converges"].update(section)
-    refused(certificate, tmp_path)
-
-
-def test_converges_needs_radius_and_cycles(tmp_path):
-    certificate = known.delayed().copy()
-    cycle_of(certificate)["radius"] = None
-    refused(certificate, tmp_path)
-    certificate = known.delayed().copy()
-    del certificate.header["boxes"][0]["claims"][0]
-    refused(certificate, tmp_path)
-
-
-def test_slopes_are_of_one_dimension_and_refutations_name_their_starts(tmp_path):
-    plane = known.two_ages().copy().claim("expanding", least=hexed(1.5))
-    assert "one dimension" in plane.recheck(tmp_path).reason
-    margin = known.ricker().copy()
-    margin.header["goal"]["starts"] = None
-    assert "name its starts" in margin.recheck(tmp_path).reason
-    margin = known.ricker().copy()
-    margin.claim("basin", box=1)
-    assert "with cycles alone" in margin.recheck(tmp_path).reason
-    margin = known.ricker().copy()
-    margin.header["goal"] = None
-    assert "no goal" in margin.recheck(tmp_path).reason
-    cells = known.ricker().copy()
-    cells.arrays.clear()
-    assert "missing" in cells.recheck(tmp_path).reason
+def test_slopes_are_of_one_dimension_and_refutations_name_their_starts(make, forge, why, tmp_path):
+    certificate = make().copy()
+    forge(certificate)
+    assert why in certificate.recheck(tmp_path).reason
 
 
 def test_bytes_that_are_no_certificate_are_refused(tmp_path):

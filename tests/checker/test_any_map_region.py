@@ -1,6 +1,7 @@
 """Regions of parameters of a map: exact shares, and files whose boxes are no region."""
 
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import pytest
@@ -48,7 +49,8 @@ def test_shares_are_exact_and_printed_to_the_safe_side(tmp_path, capsys):
     assert "PROVED, boxes of parameters: 1 proved, 1 refuted" in text
 
 
-def two():
+@cache
+def of_two():
     """Boxes in the plane of Leslie's two parameters, which claim nothing but the first."""
     cells = arrays_of(
         known.LESLIE,
@@ -70,6 +72,10 @@ def two():
         "axes": [{"parameter": "a", "borders": a}, {"parameter": "b", "borders": b}]
     }
     return certificate
+
+
+def two():
+    return of_two().copy()
 
 
 def test_a_box_of_a_plane_counts_by_its_area(tmp_path):

@@ -1,6 +1,7 @@
 """What a policy leads to under known laws: known answers, thrown parts, forged files."""
 
 import itertools
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,31 +20,25 @@ from limitsets.feeder.scene.surroundings import BeyondSensor, SideSensor
 from limitsets.parameters.noise.sampling import ManyParts, scattering_map
 from limitsets.proofs.policies import policy_chances
 from limitsets.systems.maps import images
-from tests.checker.test_policy import CAVITY, FEW, scene_with
+from tests.checker.test_policy import FEW, policies, scene_with
 from tests.proofs.forge import opened
 
 BOTH = Scattering(speed=Uniform(0.01), landing=Uniform(0.05))
 
 
-def policies():
-    """Policies by what they are asked: a place, a place with an error, a side with a cavity that catches."""
-    few = {"starts": FEW, "cells": 256}
-    return {
-        "place": ls.feedback(scene_with(), **few),
-        "error": ls.feedback(scene_with(), BeyondSensor(19.0, 0.02), noise={"throw.speed": "0.1 %"}, **few),
-        "catch": ls.feedback(scene_with(cavity=CAVITY), SideSensor(2), mode="catch", starts=FEW, cells=512),
-    }
+@cache
+def chances_of(asked):
+    return policy_chances(policies()[asked], BOTH, cells=500)
 
 
 @pytest.fixture(scope="module")
-def solved():
-    return policies()
-
-
-@pytest.fixture(scope="module")
-def written(solved, tmp_path_factory):
-    chances = policy_chances(solved["catch"], BOTH, cells=200)
+def written(tmp_path_factory):
+    chances = policy_chances(policies()["catch"], BOTH, cells=200)
     return chances, opened(chances.save(tmp_path_factory.mktemp("chances") / "catch.proof.zip"))
+
+
+def recheck(forged, folder):
+    return ls.recheck(forged.seal().write(folder / "forged.proof.zip"))
 
 
 def section_of(file):
@@ -76,13 +71,12 @@ def test_one_throw_comes_with_the_probability_of_its_law():
     assert abs(chances.mean[0] - 1.0) < 1e-9 > abs(chances.mean[1] - 1.0)
 
 
-def test_a_policy_that_is_proved_for_the_noise_brings_all_parts(solved):
+def test_a_policy_that_is_proved_for_the_noise_brings_all_parts():
     # without scatter of the landing functions jump, and coarse cells bound little
-    chances = policy_chances(
-        solved["error"], Scattering(speed=Uniform(0.001), landing=Uniform(1e-3)), cells=1000
-    )
+    policy, little = policies()["error"], Scattering(speed=Uniform(0.001), landing=Uniform(1e-3))
+    chances = policy_chances(policy, little, cells=1000)
     assert chances.come[0] > 0.97
-    assert chances.mean[1] <= solved["error"].found.throws
+    assert chances.mean[1] <= policy.found.throws
 
 
 @pytest.mark.sweep
@@ -90,10 +84,9 @@ def test_a_policy_that_is_proved_for_the_noise_brings_all_parts(solved):
     ("asked", "answer"),
     [("place", "even"), ("catch", "even"), ("error", "even"), ("error", "yes"), ("error", "no")],
 )
-def test_thrown_parts_come_as_often_as_is_proved(solved, asked, answer):
+def test_thrown_parts_come_as_often_as_is_proved(asked, answer):
     """Parts of the package's own engine of many throws; a sensor near its place says yes, no or either."""
-    policy, count = solved[asked], 20_000
-    chances = policy_chances(policy, BOTH, cells=500)
+    policy, chances, count = policies()[asked], chances_of(asked), 20_000
     throws, come = thrown(policy, BOTH, count, {"even": None, "yes": 1.0, "no": -1.0}[answer])
     for (lo, hi), row in ((chances.mean, throws), (chances.come, come)):
         error = 5.0 * row.std() / count**0.5
@@ -204,7 +197,7 @@ def test_bounds_that_are_nearer_are_denied(written, tmp_path, word, end):
     pair = section_of(forged)[word]
     lo, hi = (float.fromhex(each) for each in pair)
     pair[end] = (0.99 * lo + 0.01 * hi if end == 0 else 0.01 * lo + 0.99 * hi).hex()
-    report = ls.recheck(forged.seal().write(tmp_path / "forged.proof.zip"))
+    report = recheck(forged, tmp_path)
     assert report.verdict == "failed"
     assert f"policy-chances: {word}: " in report.reason
     assert "is claimed, only" in report.reason
@@ -215,7 +208,7 @@ def test_a_table_that_stops_leaves_parts_that_have_to_be_caught(written, tmp_pat
     forged.arrays["throw"] = np.full_like(forged.arrays["throw"], -1)
     for word in ("mean", "come"):
         section_of(forged)[word] = [(0.0).hex(), (1.0).hex()]
-    report = ls.recheck(forged.seal().write(tmp_path / "forged.proof.zip"))
+    report = recheck(forged, tmp_path)
     assert (report.verdict, "the table stops" in report.reason) == ("failed", True)
 
 
@@ -227,63 +220,58 @@ def test_an_answer_that_leads_to_no_state_ends_the_throws(tmp_path):
     file.arrays["after"] = np.full_like(file.arrays["after"], -1)
     section_of(file)["mean"] = [(1.0 - 1e-9).hex(), (1.0 + 1e-9).hex()]
     section_of(file)["come"] = [(0.0).hex(), (1e-9).hex()]
-    assert ls.recheck(file.seal().write(tmp_path / "b.proof.zip")).verdict == "proved"
+    assert recheck(file, tmp_path).verdict == "proved"
 
 
-def changed_table(forged, name, place, value):
-    forged.arrays[name] = forged.arrays[name].copy()
-    forged.arrays[name][place] = value
+def table(name, place, value):
+    return lambda f: f.arrays[name].__setitem__(place, value)
+
+
+def section(*keys, **changed):
+    def change(f):
+        at = section_of(f)
+        for key in keys:
+            at = at[key]
+        at.update(changed)
+
+    return change
+
+
+ABSORBING = {"here": [[2, "21 in", "22 in"]]}
 
 
 @pytest.mark.parametrize(
     ("change", "verdict", "why"),
     [
-        (
-            lambda f: changed_table(f, "left", slice(None), 1),
-            "failed",
-            "the number of throws left does not fall",
-        ),
-        (lambda f: changed_table(f, "after", 0, 9999), "failed", "a next state is none"),
-        (lambda f: changed_table(f, "throw", 0, 7), "failed", "a throw is none of those to choose from"),
-        (lambda f: section_of(f)["first"].update(yes=9999), "failed", "the state to begin in is none"),
-        (
-            lambda f: section_of(f).update(mean=[(9.0).hex(), (1.0).hex()]),
-            "bad file",
-            "mean: the ends are negative, or",
-        ),
-        (
-            lambda f: section_of(f).update(absorbing={"here": [[2, "21 in", "22 in"]]}),
-            "bad file",
-            "the places where parts end are those of the policy",
-        ),
-        (lambda f: section_of(f)["scene"].update(effects={}), "bad file", "with effects"),
-        (
-            lambda f: section_of(f)["laws"].update({"landing.x": {"uniform": "0.06 in"}}),
-            "failed",
-            "is claimed",
-        ),
-        (lambda f: section_of(f)["goal"].update(x="21 in"), "bad file", "parts are caught elsewhere"),
+        (table("left", slice(None), 1), "failed", "the number of throws left does not fall"),
+        (table("after", 0, 9999), "failed", "a next state is none"),
+        (table("throw", 0, 7), "failed", "a throw is none of those to choose from"),
+        (section("first", yes=9999), "failed", "the state to begin in is none"),
+        (section(mean=[(9.0).hex(), (1.0).hex()]), "bad file", "mean: the ends are negative, or"),
+        (section(absorbing=ABSORBING), "bad file", "the places where parts end are those of the policy"),
+        (section("scene", effects={}), "bad file", "with effects"),
+        (section("laws", **{"landing.x": {"uniform": "0.06 in"}}), "failed", "is claimed"),
+        (section("goal", x="21 in"), "bad file", "parts are caught elsewhere"),
         (lambda f: section_of(f)["starts"].append([2, "17.5 in", "18 in"]), "bad file", "overlap"),
     ],
 )
 def test_what_is_no_such_claim_is_denied(written, tmp_path, change, verdict, why):
     forged = written[1].copy()
     change(forged)
-    report = ls.recheck(forged.seal().write(tmp_path / "forged.proof.zip"))
+    report = recheck(forged, tmp_path)
     assert report.verdict == verdict
     assert why in report.reason
 
 
-def test_what_cannot_be_asked_is_refused(solved):
-    unsolved = ls.feedback(scene_with(), "none", starts=FEW, cells=64, throws=1)
-    with pytest.raises(AnswerError, match=r"the policy is .not-solved."):
-        policy_chances(unsolved)
-    with pytest.raises(AnswerError, match="the cells of an expectation is 0"):
-        policy_chances(solved["place"], cells=0)
-    for cells in ("8", 8.5):
-        with pytest.raises(AnswerError, match="the argument cells"):
-            policy_chances(solved["place"], cells=cells)
-    with pytest.raises(AnswerError, match="more than 120000 nodes"):
-        policy_chances(solved["place"], Scattering(landing=Gaussian(0.02)), cells=45_000)
-    with pytest.raises(AnswerError, match="of speed and landing place"):
-        policy_chances(solved["place"], Scattering(tilt=Uniform(0.01)))
+def test_what_cannot_be_asked_is_refused():
+    place = policies()["place"]
+    for policy, scatter, how, said in (
+        (ls.feedback(scene_with(), "none", starts=FEW, cells=64, throws=1), None, {}, r"the policy is .not-solved."),
+        (place, None, {"cells": 0}, "the cells of an expectation is 0"),
+        (place, None, {"cells": "8"}, "the argument cells"),
+        (place, None, {"cells": 8.5}, "the argument cells"),
+        (place, Scattering(landing=Gaussian(0.02)), {"cells": 45_000}, "more than 120000 nodes"),
+        (place, Scattering(tilt=Uniform(0.01)), {}, "of speed and landing place"),
+    ):  # fmt: skip
+        with pytest.raises(AnswerError, match=said):
+            policy_chances(policy, scatter, **how)

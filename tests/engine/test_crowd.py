@@ -50,15 +50,6 @@ def test_parts_that_pass_through_each_other_land_where_the_map_says(scene, step)
     assert max(errors) < STUDY_02
 
 
-@pytest.mark.parametrize(("side", "r"), [(0, 10), (1, 10), (2, 20)])
-def test_parts_flip_from_the_critical_points_on(side, r):
-    """To 1e-6 in at a step of 1e-3 (study 02), and to a multiple of the step squared."""
-    crowd = Crowd([DESIGNED] * 2, between=False, friction=1.0)
-    for number, x in enumerate((r - 1e-4, r + 1e-4)):
-        crowd.place(number, x, side)
-    assert [rest.side for rest in crowd.throw()] == [side, (side + 1) % 3]
-
-
 def test_parts_that_do_not_meet_land_alike_with_contact_and_without():
     rests = []
     for between in (True, False):
@@ -121,19 +112,6 @@ def collide(part, masses, poses, velocities, **how):
     gained = -part.kappa * crowd.step
     before = [(across, up + gained, rate) for across, up, rate in before]  # what gravity adds in that step
     return np.array(before), np.array(after), [tuple(body.position) for body in bodies]
-
-
-@pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
-def test_a_central_impact_of_two_parts(e):
-    """v1' = v1 - (1 + e) m2/(m1 + m2) (v1 - v2), and nothing across without friction."""
-    square = polygon(4)
-    poses = [(5.0, 40.0, 0.0), (5.0 + math.sqrt(2.0) + 0.05, 40.0, 0.0)]
-    how = {"sliding": 0.0, "restitution": e}
-    before, after, _ = collide(square, (1.0, 3.0), poses, [(4.0, 1.0), (-2.0, 1.0)], **how)
-    share = (1 + e) * 6.0 / 4.0
-    assert after[0, 0] == pytest.approx(4.0 - 3.0 * share, abs=1e-9)
-    assert after[1, 0] == pytest.approx(-2.0 + share, abs=1e-9)
-    assert after[:, 1:] == pytest.approx(before[:, 1:], abs=1e-9)
 
 
 @pytest.mark.parametrize("e", [0.0, 0.5])

@@ -10,48 +10,31 @@ pytest.importorskip("flint", reason="the checker needs python-flint")
 
 from tests.thrower.effects.copies import environment_of_copy
 
-GUST = '''"""Effect `gust`: air that moves lessens gravity."""
-
-from typing import Any, NamedTuple
+GUST = """from typing import NamedTuple
 
 from limitsets.feeder.thrower.motion import Effect, at_kappa, declare, thrown
-from limitsets.feeder.thrower.params import Throw
 from limitsets.feeder.world import Fact
 from limitsets.numbers.jit import kernel
 
 
 class Gust(NamedTuple):
-    """By how much gravity is less [length/s^2], and a share."""
-
-    lift: float
     share: float
 
 
 @kernel
-def _lifted(gust: Gust, bare: Throw) -> Throw:
+def lifted(gust, bare):
     return at_kappa(bare, bare.kappa * (1.0 - gust.share))
 
 
-def _of(world: Any, how: Any) -> Gust:
-    return Gust(world.lift, world.lift_share)
+FACTS = {
+    "lift": Fact("the lift", "acceleration", meaning="what gravity is less"),
+    "lift_share": Fact("the share of lift", most=0.5, words="0.1"),
+}
+thrown.on(Gust, lifted)
+declare(Effect("gust", Gust, lambda world, how: Gust(world.lift_share), "the air rests", (*FACTS,), facts=FACTS))
+"""
 
-
-thrown.on(Gust, _lifted)
-declare(
-    Effect(
-        "gust",
-        Gust,
-        _of,
-        "the air rests",
-        ("lift", "lift_share"),
-        facts={
-            "lift": Fact("the lift", "acceleration", meaning="what gravity is less"),
-            "lift_share": Fact("the share of lift", most=0.5, words="0.1"),
-        },
-    )
-)
-'''
-
+# What files outside the package do as well (refusals, certificates) is asked in test_outside.py.
 SCRIPT = """
 import pickle, sys
 import limitsets as ls
@@ -61,7 +44,7 @@ from limitsets.feeder.scene.left_out import Model
 
 kernels = "limitsets.feeder.thrower.motion"
 whole = ls.load("paper-designed").as_dict()
-scene = ls.load(whole | {"world": {"friction": 0.3}})
+ls.load(whole | {"world": {"friction": 0.3}})
 assert kernels not in sys.modules  # what states no fact of an effect's loads none
 facts = {"friction": 0.3, "lift": "2 cm/s^2", "lift_share": 0.25}
 scene = ls.load(whole | {"world": facts})
@@ -73,21 +56,13 @@ blown = ls.load(whole | {"world": facts, "effects": {"gust": True}})
 assert Model.of(blown).left_out == ("friction",)
 assert blown.map.effects[0].share == 0.25
 assert '# lift = "1 m/s^2"' in starting_text("mine", "mine.toml")
-for world, effects in (
-    ({"lift_shar": 0.25}, {}),
-    ({"lift": "2 cm"}, {}),
-    ({"lift_share": 0.6}, {}),
-    ({"lift": "2 cm/s^2"}, {"gust": True}),
-):
+for world in ({"lift_shar": 0.25}, {"lift": "2 cm"}):
     try:
-        ls.load(whole | {"world": world, "effects": effects})
+        ls.load(whole | {"world": world})
     except ls.errors.SceneError as error:
         print(error)
-
 from limitsets.proofs.prover.certificate import in_certificate
-
 text = in_certificate(scene.text)
-assert text["world"] == {"friction": 0.3, "other": {"lift": "2 cm/s^2", "lift_share": 0.25}}
 read_scene(text, None)
 assert left_out(text, None) == ["friction", "lift", "lift_share"]
 """
@@ -102,24 +77,9 @@ def test_one_file_and_one_line(tmp_path: Path) -> None:
     known = face.read_text(encoding="utf-8")
     assert known.count("import drive, landing") == 1
     face.write_text(known.replace("import drive, landing", "import gust, drive, landing"), encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", SCRIPT],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=environment,
-    )
+    command = [sys.executable, "-W", "error", "-c", SCRIPT]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 0, done.stderr
-    refused = done.stdout.splitlines()
-    assert len(refused) == 4
-    for line, words in zip(
-        refused,
-        (
-            ("world.lift_shar", "it is not known", "lift_share"),
-            ("world.lift", "this acceleration", "2 cm", "a unit of m/s^2"),
-            ("world.lift_share", "the share of lift", "0.6", "from 0 to 0.5"),
-            ("effects.gust", "the fact world.lift_share", "missing"),
-        ),
-        strict=True,
-    ):
-        assert all(word in line for word in words), line
+    misspelt, unit = done.stdout.splitlines()
+    assert all(word in misspelt for word in ("world.lift_shar", "it is not known", "lift_share"))
+    assert all(word in unit for word in ("world.lift", "this acceleration", "2 cm", "a unit of m/s^2"))

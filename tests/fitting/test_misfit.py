@@ -80,13 +80,13 @@ def rejected(count, seed, **how):
 @pytest.mark.sweep
 @pytest.mark.parametrize("effect", ["roll", "slip"])
 def test_the_power_is_90_percent(effect):
-    assert told_apart(effect, 40, seed=22) >= 36  # of a thousand in the benchmarks
+    assert told_apart(effect, 20, seed=22) >= 18  # of a thousand in the benchmarks
 
 
 @pytest.mark.sweep
-@pytest.mark.parametrize("flipped", [0.0, 0.05])
+@pytest.mark.parametrize("flipped", [0.05, pytest.param(0.0, marks=pytest.mark.repeats)])
 def test_the_level_is_5_percent(flipped):
-    assert rejected(100, seed=24, flipped=flipped) <= binom.ppf(0.999, 100, 0.05)
+    assert rejected(60, seed=24, flipped=flipped) <= binom.ppf(0.999, 60, 0.05)
 
 
 @pytest.mark.parametrize("effect", [None, "roll", pytest.param("slip", marks=pytest.mark.sweep)])
@@ -200,7 +200,7 @@ def test_a_film_that_fits_is_left_alone():
 @pytest.mark.sweep
 def test_no_mistake_is_invented_for_a_part_that_rolls():
     draw = np.random.default_rng(74)
-    for _ in range(3):
+    for _ in range(2):
         told = "\n".join(lines_of(ls.fit(*spoiled_film(draw, "roll"))))
         assert "something that it leaves out, like rolling or slipping" in told
 

@@ -2,7 +2,6 @@
 
 import json
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ import pytest
 import limitsets as ls
 from limitsets.base.errors import AnswerError, LimitsetsError, SceneError
 from limitsets.feeder.thrower import impact_angles
-from limitsets.parameters.design import critical_jacobian, for_critical, limit_sets_along, solving as trials
+from limitsets.parameters.design import critical_jacobian, limit_sets_along, solving as trials
 from tests.inverse import exact
 
 # ----------------------------------------------------------------
@@ -73,20 +72,6 @@ def test_the_pairs_of_the_paper(name, known, counted, tmp_path):
     assert found.scene.kappa == again.kappa
     assert found.residual == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
     assert found.condition == pytest.approx(6.9 if again.flip == "energy" else 7.1, abs=0.06)
-
-
-@pytest.mark.parametrize("name", ["paper-initial-small-angle", "paper-initial"])
-def test_perturbed_starts_reach_the_same_point(name):
-    scene, random, ends = ls.load(name), np.random.default_rng(7), []
-    center = np.array([scene.value(ALONG), scene.value(ABOVE), np.log(scene.kappa)])
-    for _ in range(6):
-        along, above, log = (center + 0.1 * random.standard_normal(3)).tolist()
-        start = scene.with_values({ALONG: along, ABOVE: above, KAPPA: float(np.exp(log))})
-        found = ls.design(start, critical_points=WANTED, vary=(ALONG, ABOVE, KAPPA), starts=0)
-        assert found.reached
-        assert found.evaluations <= 25
-        ends.append([after for _, after, _ in found.quantities().values()])
-    assert np.ptp(ends, axis=0).max() < 1e-8
 
 
 def test_stages_move_the_targets_evenly(counted):
@@ -190,16 +175,6 @@ def test_what_cannot_be_reached_says_what_is_in_the_way():
     assert misses == pytest.approx(found.residual, abs=1e-9)
     fixed = ls.design("paper-initial", critical_points=[None, None, 25], vary=["part.sides[0]"], starts=0)
     assert "the critical point of side 2 does not depend on what is varied" in fixed.message
-
-
-def test_an_edge_is_in_the_way_within_twice_what_a_part_is_kept_off_it():
-    scene, none = ls.load("paper-initial"), np.zeros(0)
-    unknowns = SimpleNamespace(lo=none, hi=none, names=())
-    slack = 1e-3 * np.ptp(scene.vertices, axis=0).max() * np.array([9, 2.1, 1.9, 9, 9, 9, 9, 1.0, 2.9])
-    trial = SimpleNamespace(slope=none, at=none, jacobian=SimpleNamespace(slack=slack))
-    said = for_critical._in_the_way(SimpleNamespace(scene=scene, unknowns=unknowns, sides=()), trial)
-    edges = "the level of side 0", "the right end of side 2"
-    assert said == [f"the centre of mass is at {each}: beyond it the part tips over" for each in edges]
 
 
 @pytest.mark.sweep

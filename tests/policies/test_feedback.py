@@ -123,8 +123,6 @@ def test_the_place_of_the_sensor_matters(scene):
     found = places(scene, [10.0, 18.0, 20.0], cells=512)
     assert [each.sensor.x for each in found] == [10.0, 18.0, 20.0]
     assert [each.solved for each in found] == [False, True, True]
-    alone = ls.feedback(scene, BeyondSensor(18.0), cells=512)
-    assert abs(alone.found.throws - found[1].found.throws) <= 1  # its cells have other borders
 
 
 def test_more_noise_than_a_policy_can_bear(scene):
@@ -204,11 +202,7 @@ def test_a_side_without_a_throw_that_stays_is_told_apart():
     found = ls.feedback(scene, starts={2: (19.4, 19.5)}, cells=128)
     assert (found.found.verdict, found.found.throws) == ("solved", 1)
     assert found.found.policy.throws[found.found.policy.throw[found.found.policy.first[0]]] == "own"
-
-
-def test_throws_without_a_sensor(scene):
-    """From 19.4 to 19.5 on side 2 its own throw is enough, whatever a sensor says."""
-    found = ls.feedback(scene, "none", starts={2: (19.4, 19.5)}, cells=128)
+    found = ls.feedback(scene, "none", starts={2: (19.4, 19.5)}, cells=128)  # enough whatever a sensor says
     assert (found.found.verdict, found.found.throws, found.question) == ("solved", 1, "nothing is asked")
     assert simulate(found, 500).throws.tolist() == [0, 500]
     assert found.to_json()["sensor"] is None
@@ -379,7 +373,7 @@ def test_what_is_not_compared_changes_no_answer(monkeypatch):
     compare(range(200, 300))
 
 
-@pytest.mark.sweep
+@pytest.mark.repeats
 def test_many_random_systems_against_the_definition():
     assert {None, 0, 1, 2, 3, 4} <= set(compare(range(1000, 4000)))
 

@@ -86,17 +86,7 @@ def wall(params, z, side):
     return (value, value, value), side, 1 if z[0] > params.at else 0
 
 
-def wall_on(params, z, side, branch):
-    value = branch - 0.5
-    return (value, value, value), side, ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-
-def wall_margin(params, z, side):
-    return z[0] - params.at
-
-
-TWO_BASINS = {"dimension": 3, "branches": ("before", "beyond")}
-ls.register(Wall, image=wall, image_on=wall_on, margin=wall_margin, **TWO_BASINS)
+ls.register(Wall, image=wall, dimension=3, branches=("before", "beyond"))
 
 
 class Turnstile(NamedTuple):
@@ -164,21 +154,6 @@ def grebogi(params, z, side):
 
 
 ls.register(Grebogi, image=grebogi, dimension=2)
-
-
-class Ikeda(NamedTuple):
-    """Ikeda's map: at u = 0.9 an attracting fixed point near (2.97, 4.15) beside a chaotic attractor."""
-
-    u: float
-
-
-def ikeda(params, z, side):
-    angle = 0.4 - 6.0 / (1.0 + z[0] * z[0] + z[1] * z[1])
-    turned = z[0] * math.cos(angle) - z[1] * math.sin(angle), z[0] * math.sin(angle) + z[1] * math.cos(angle)
-    return (1.0 + params.u * turned[0], params.u * turned[1]), side, 0
-
-
-ls.register(Ikeda, image=ikeda, dimension=2)
 
 
 class Waves(NamedTuple):

@@ -9,7 +9,7 @@ import limitsets as ls
 from limitsets.base.errors import AnswerError
 from limitsets.systems.resilience import uncertainty
 from tests.maps_of_tests import Contraction, ThreeState, TwoState
-from tests.resilience.maps_with_basins import Excursion, Gaps, Grebogi, Ikeda, Sheet, Turnstile, Wall, Waves
+from tests.resilience.maps_with_basins import Excursion, Gaps, Grebogi, Sheet, Turnstile, Wall, Waves
 from tests.resilience.test_shares import CUBIC, LN2, TWO_SIDES, setting
 
 # ----------------------------------------------------------------
@@ -267,7 +267,7 @@ def entropies(label, box):
     return each.mean(), each[mixed].mean()
 
 
-def grebogi_ends(angle, x, steps=600):
+def grebogi_ends(angle, x, steps=100):
     """Which fixed point orbits of Grebogi's map come to: 1 for (pi, 0.3), 0 for (0, -0.3); apart from the package."""
     for _ in range(steps):
         turned = angle + 1.32 * np.sin(2.0 * angle) - 0.9 * np.sin(4.0 * angle) - x * np.sin(angle)
@@ -342,17 +342,11 @@ def test_entropies_of_starts_are_those_of_own_orbits(fractal):
     assert edge.lo < border < edge.hi
 
 
-def test_the_bracket_of_starts_holds_the_entropy_of_seven_times_as_many(fractal):
-    found = ROOM.basin_entropy(*fractal, box=6, starts=90_000)
-    fine = ROOM.basin_entropy(*fractal, box=6, starts=640_000)
-    assert found.value < fine.value < found.hi
-
-
 def test_entropies_of_starts_lie_in_their_brackets_in_nineteen_of_twenty_cases():
     """Against the shares of 360 000 starts of boxes that a sine cuts, which are exact to 1e-3."""
     rng, held = np.random.default_rng(0), []
     at = (np.arange(600) + 0.5) / 100.0 - 1.0
-    for seed in range(20):
+    for seed in range(10):
         params = Waves(rng.uniform(2.0, 20.0), rng.uniform(0.5, 3.0), rng.uniform(0.0, 6.0))
         sine = np.sin(params.pitch * at[:, None] + params.shift) + params.steep * (at[None, :] - 2.0) > 0.0
         exact = entropies(np.where(at[:, None] > 3.5, at[None, :] > 3.0, sine).astype(float), 60)
@@ -360,14 +354,16 @@ def test_entropies_of_starts_lie_in_their_brackets_in_nineteen_of_twenty_cases()
         for measure, value in zip((ROOM.basin_entropy, ROOM.boundary_basin_entropy), exact, strict=True):
             found = measure(*which, box=6, starts=3600, seed=seed)
             held.append(found.lo <= value <= found.hi)
-    assert sum(held) >= 37  # of 40: 38 expected
+    assert sum(held) >= 18  # of 20: 19 expected
 
 
 @pytest.mark.sweep
 def test_orbits_of_starts_come_back():
     """A third of the starts stays, a third leaves and comes back, a third leaves for good."""
     graph, attractors = setting(Excursion(5.0), [(0.0, 3.0)], 300)
-    cells, found = (ROOM.basin_stability(graph, attractors, starts=starts) for starts in (None, 8000))
+    cells, found = (
+        ROOM.basin_stability(graph, attractors, starts=starts, steps=200) for starts in (None, 8000)
+    )
     assert cells.attractors[0].share == pytest.approx(1.0 / 3.0, abs=0.01)
     assert cells.cut
     assert "border of the domain" in cells.table().caption
@@ -375,16 +371,18 @@ def test_orbits_of_starts_come_back():
     assert found.exits["outside"].lo <= 1.0 / 3.0 <= found.exits["outside"].hi
     assert not found.cut
     assert "border" not in found.table().caption
-    times = ROOM.convergence_times(graph, attractors, starts=8000)
+    times = ROOM.convergence_times(graph, attractors, starts=8000, steps=200)
     assert times.attractors[0].longest == 2
     assert times.exits["outside"].longest == 1
     assert times.exits["outside"].starts == pytest.approx(8000 / 3, abs=200)
     # the only boundary is at 2, in a third of the seventh of ten boxes; cells see the one at 1 in the fourth
-    whole, cut = (ROOM.basin_entropy(graph, attractors, box=30, starts=each) for each in (6000, None))
+    whole, cut = (
+        ROOM.basin_entropy(graph, attractors, box=30, starts=each, steps=200) for each in (6000, None)
+    )
     assert whole.value == pytest.approx((math.log(3.0) - 2.0 / 3.0 * LN2) / 10.0, abs=1e-3)
     assert cut.value == pytest.approx(whole.value, abs=0.005)
     assert (whole.cut, cut.cut) == (False, True)
-    met = ROOM.wada(graph, attractors, starts=3000)
+    met = ROOM.wada(graph, attractors, starts=3000, steps=200)
     assert met.of <= 3
 
 
@@ -399,34 +397,16 @@ def test_the_arm_ends_where_its_domain_does():
     assert not ROOM.basin_stability(*setting(scene.map, scene.domain, 512)).cut
 
 
-def test_starts_of_ikeda_come_back_to_the_fixed_point():
-    domain, rng = [(-2.0, 6.0), (-2.0, 6.0)], np.random.default_rng(7)
-    x, y = rng.uniform(-2.0, 6.0, (2, 20_000))
-    left = np.zeros(x.size, dtype=bool)
-    for _ in range(1000):
-        angle = 0.4 - 6.0 / (1.0 + x * x + y * y)
-        c, s = np.cos(angle), np.sin(angle)
-        x, y = 1.0 + 0.9 * (x * c - y * s), 0.9 * (x * s + y * c)
-        left |= (np.abs(x - 2.0) > 4.0) | (np.abs(y - 2.0) > 4.0)
-    comes = np.hypot(x - 2.97213, y - 4.14595) < 1e-2
-    assert comes.mean() - (comes & ~left).mean() > 0.05
-    graph, attractors = setting(Ikeda(0.9), domain, (200, 200))
-    found = ROOM.basin_stability(graph, attractors, starts=10_000, steps=2000)
-    (own,) = [k for k, each in enumerate(attractors) if each.cells.holds([[2.97213, 4.14595]], 0)[0]]
-    assert found.attractors[own].lo - 0.01 <= comes.mean() <= found.attractors[own].hi
-    assert found.attractors[own].lo > (comes & ~left).mean() + 0.02
-
-
 def test_shocks_of_starts_go_past_where_orbits_come_back():
     graph, attractors = setting(Excursion(5.0), [(0.0, 3.0)], 300)
     cells = ROOM.minimal_fatal_shock(graph, attractors, 0.5)
     assert cells.hi == pytest.approx(0.5, abs=0.05)
-    found = ROOM.minimal_fatal_shock(graph, attractors, 0.5, starts=4000)
+    found = ROOM.minimal_fatal_shock(graph, attractors, 0.5, starts=4000, steps=200)
     assert (found.how, found.lo, found.into, found.cut) == ("sampled", 0.0, "outside", False)
     assert 1.5 <= found.hi < 1.503
     assert found.shock[0] == found.hi
     graph, attractors = setting(Excursion(5.0), [(0.0, 2.0)], 200)
-    none = ROOM.minimal_fatal_shock(graph, attractors, 0.5, starts=400)
+    none = ROOM.minimal_fatal_shock(graph, attractors, 0.5, starts=400, steps=200)
     assert (none.hi, none.into, none.cut) == (math.inf, None, True)
     assert none.to_json()["into"] is None
     assert "cut off by the border" in none.table().caption
