@@ -382,7 +382,7 @@ def test_pieces_of_a_tolerance_claim_the_fewest_starts():
     near = {"0": {"q": (1.5).hex()}}
     far = {"0": {"q": (1.25).hex()}}
     every = claim("every", 1.0, near_joint=near)
-    almost = claim("almost-every", 1.0, thinning=7, near_joint=far)
+    almost = claim("almost-every", 0.875, thinning=7, near_joint=far)
 
     def cells(first, *, counts=True):
         def shares_from(section):  # as much as the starts claimed leave of 0 to 10
@@ -396,6 +396,7 @@ def test_pieces_of_a_tolerance_claim_the_fewest_starts():
     assert joined.starts == joined.section["starts"] == "almost-every"
     assert joined.section["thinning"] == 7
     assert joined.section["near_joint"] == far
+    assert (joined.shares["share"], joined.shares["open"]) == (0.875, 0.125)  # of the piece that says less
     some = claim({"from": {"0": 2.0}}, 0.9, lost={"0": (1.9).hex()})
     more = claim({"from": {"0": 2.5}}, 0.8, lost={"0": (1.8).hex()})
     joined = weakest_of([some, more], [cells(1.5), cells(2.0)])

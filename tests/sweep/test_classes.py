@@ -179,6 +179,8 @@ def test_the_legend_of_a_map_names_the_ends_of_the_domain():
     ways = "some starts leave over the upper end and some starts leave over the lower end"
     assert first.words.endswith(ways)
     assert last.words == "no attractors; all starts leave, some over either end"
+    one_way = named_class("no-attractor;leaves:some;collapses:none")  # the others are undecided
+    assert one_way.said(("leave", "leaves"), ("go", "goes"), "all go") == "no attractors; some starts leave"
     # beside 0 two fixed points attract at 1.5: its table has columns for no more
     shares = [name for name in found.to_dataframe().columns if name.startswith("share")]
     assert shares == ["share[0]", "share[1]"]
