@@ -44,10 +44,6 @@ def half(params, x, side):
     return params.slope * x, side, 0
 
 
-def halved(x):
-    return x / 2
-
-
 ls.register(Half, image=half)
 made, registered, number = ls.map(ricker, r=2.3), Half(0.5), 3
 """
@@ -218,7 +214,7 @@ def test_averages_under_noise_of_a_parameter(capfd, mymap):
 def test_an_orbit_ends_as_surely_and_as_soon_as_in_closed_form(capfd, mymap):
     # a step from x lands evenly in [x/2 - 1, x/2 + 1]: above 1 with probability x/4, below 0 with 1/2 - x/4; so p(x) =
     # x/4 + p/2 with p the mean over [0, 1]: p = 1/4; and half of all orbits end at each step: 2 steps
-    how = ["absorption", f"{mymap}:halved", "--domain", "0:3", "--noise", "1", "--absorbing", "top=1:3"]
+    how = ["absorption", f"{mymap}:registered", "--domain", "0:3", "--noise", "1", "--absorbing", "top=1:3"]
     some = ["--starts", "0:0.5", "--starts", "0.5:1", "--cells", "300", "--steps", "20"]
     code, out, _ = run_of_file(capfd, *how, *some, "--json", "--csv", "t.csv")
     record = json.loads(out)
@@ -229,9 +225,9 @@ def test_an_orbit_ends_as_surely_and_as_soon_as_in_closed_form(capfd, mymap):
     lo, hi = record["within"]["any"].values()
     assert all(low <= 1 - 0.5**n <= high for n, (low, high) in enumerate(zip(lo, hi, strict=True)))
     assert set(record) == set(documented("absorption"))
-    assert record["certificate"]["file"] == "halved.absorption.proof.zip"
+    assert record["certificate"]["file"] == "registered.absorption.proof.zip"
     Path(mymap).unlink()
-    assert ls.recheck("halved.absorption.proof.zip").verdict == "proved"
+    assert ls.recheck("registered.absorption.proof.zip").verdict == "proved"
 
 
 def test_orbits_that_need_not_end_have_no_mean(capfd, mymap):
@@ -248,16 +244,16 @@ def test_orbits_that_need_not_end_have_no_mean(capfd, mymap):
         "--cells",
         "20",
     ]
-    words = ["absorption", f"{mymap}:halved", *how, "--steps", "5", "--no-recheck"]
+    words = ["absorption", f"{mymap}:registered", *how, "--steps", "5", "--no-recheck"]
     code, out, _ = run_of_file(capfd, *words)
     assert code == 0
     assert re.search(r"until an orbit ends: at least [\d.e+]+; nothing is proved from above", out)
     assert "not rechecked" in out
     for wrong, why in (
         (["paper-designed"], "limitsets feed SCENE --brackets N"),
-        ([f"{mymap}:halved", "--noise", "1", "--domain", "0:3", "--absorbing", "1:3"], "NAME=LO:HI"),
-        ([f"{mymap}:halved", "--noise", "1", "--domain", "0:3", "--starts", "1"], "--starts: the box is '1'"),
-        ([f"{mymap}:halved", "--domain", "0:3"], "pass noise=e"),
+        ([f"{mymap}:registered", "--noise", "1", "--domain", "0:3", "--absorbing", "1:3"], "NAME=LO:HI"),
+        ([f"{mymap}:registered", "--noise", "1", "--domain", "0:3", "--starts", "1"], "--starts: the box is '1'"),
+        ([f"{mymap}:registered", "--domain", "0:3"], "pass noise=e"),
     ):
         code, _, err = run_of_file(capfd, "absorption", *wrong)
         assert (code, why in err) == (2, True), err
