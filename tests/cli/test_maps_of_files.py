@@ -252,7 +252,10 @@ def test_orbits_that_need_not_end_have_no_mean(capfd, mymap):
     for wrong, why in (
         (["paper-designed"], "limitsets feed SCENE --brackets N"),
         ([f"{mymap}:registered", "--noise", "1", "--domain", "0:3", "--absorbing", "1:3"], "NAME=LO:HI"),
-        ([f"{mymap}:registered", "--noise", "1", "--domain", "0:3", "--starts", "1"], "--starts: the box is '1'"),
+        (
+            [f"{mymap}:registered", "--noise", "1", "--domain", "0:3", "--starts", "1"],
+            "--starts: the box is '1'",
+        ),
         ([f"{mymap}:registered", "--domain", "0:3"], "pass noise=e"),
     ):
         code, _, err = run_of_file(capfd, "absorption", *wrong)
