@@ -72,8 +72,8 @@ def log_slope(m, i, x, kappa):
 
 
 def test_throws_lie_between_the_bounds(designed):
-    flips, shares, exponent = thrown("designed", 0.003, 0.02, parts=6000)
-    error = 5.0 / math.sqrt(6000 * 150)  # of counts that depend on each other little
+    flips, shares, exponent = thrown("designed", 0.003, 0.02)
+    error = 5.0 / math.sqrt(20_000 * 150)  # of counts that depend on each other little
     sampled = {"flips_per_throw": flips} | {
         f"share_of_side_{k}": share for k, share in enumerate(shares.tolist())
     }
