@@ -226,6 +226,13 @@ def test_an_orbit_ends_as_surely_and_as_soon_as_in_closed_form(capfd, mymap):
     assert all(low <= 1 - 0.5**n <= high for n, (low, high) in enumerate(zip(lo, hi, strict=True)))
     assert set(record) == set(documented("absorption"))
     assert record["certificate"]["file"] == "registered.absorption.proof.zip"
+    # with a range of slopes s: p is s/2, and still half of all orbits end at each step
+    _, out, _ = run_of_file(capfd, *how, *some, "--set", "slope=0.4:0.5", "--no-recheck", "--json")
+    of_range = json.loads(out)
+    assert [each["slope"] for each in of_range["parameters"]] == [0.4, 0.5]
+    (least, most), (soonest, latest) = of_range["ever"]["top"].values(), of_range["mean"].values()
+    assert 0.19 < least <= 0.2 < 0.25 <= most < 0.26
+    assert 1.999 < soonest <= 2 <= latest < 2.001
     Path(mymap).unlink()
     assert ls.recheck("registered.absorption.proof.zip").verdict == "proved"
 

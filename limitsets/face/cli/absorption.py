@@ -74,15 +74,18 @@ def absorption(
     form, remedy = "NAME=LO:HI", "name a place, the sign =, and two numbers with : between them"
     for name, text in named(absorbing, ABSORBING, "where orbits end", form, remedy, once=False):
         places.setdefault(name, []).extend(_ranges([text], ABSORBING))
-    how: dict[str, Any] = {
-        "noise": noise_of_words(noise),
-        "absorbing": places,
-        "starts": _ranges(starts, STARTS) or None,
-        "upper": chosen.upper,
-    }
     line, denied = ls.grid(domain_of(chosen, domain), cells=cells), None
     with saved(file) as draft:  # refuses a place that cannot be written before anything is proved
-        brackets = absorption_brackets(chosen.lower, line, throws=steps, progress=run.tell, **how)
+        brackets = absorption_brackets(
+            chosen.lower,
+            line,
+            upper=chosen.upper,
+            noise=noise_of_words(noise),
+            absorbing=places,
+            starts=_ranges(starts, STARTS) or None,
+            throws=steps,
+            progress=run.tell,
+        )
         run.tell("recheck", 0, 1)
         begun = time.perf_counter()
         try:
@@ -101,10 +104,9 @@ def absorption(
         yield f"{chosen.name}: proved where {brackets.scatter.words()}"
         yield brackets.table()
         least, most = brackets.mean
-        mean = (
-            outward(least, most) if most < math.inf else f"at least {least:.6g}; nothing is proved from above"
-        )
-        yield f"the mean number of steps until an orbit ends: {mean}"
+        low, _ = outward(least, least).split(" to ")  # rounded down
+        bounds = outward(least, most) if most < math.inf else f"at least {low}; nothing is proved from above"
+        yield f"the mean number of steps until an orbit ends: {bounds}"
         for share in SHARES:
             first, last = brackets.quantile(share)
             if first is not None and last is not None:
