@@ -233,6 +233,9 @@ def test_an_orbit_ends_as_surely_and_as_soon_as_in_closed_form(capfd, mymap):
     (least, most), (soonest, latest) = of_range["ever"]["top"].values(), of_range["mean"].values()
     assert 0.19 < least <= 0.2 < 0.25 <= most < 0.26
     assert 1.999 < soonest <= 2 <= latest < 2.001
+    _, out, _ = run_of_file(capfd, *how, *some, "--no-recheck")
+    low, high = re.search(r"until an orbit ends: ([\d.]+) to ([\d.]+)\n", out).groups()
+    assert 1.9999 < float(low) <= 2 <= float(high) < 2.0001
     Path(mymap).unlink()
     assert ls.recheck("registered.absorption.proof.zip").verdict == "proved"
 
