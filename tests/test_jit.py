@@ -85,6 +85,24 @@ def image(params, x, side):
 ls.register(WithConstant, image=image)
 """,
     "constants": "GAIN = 2.0",
+    # Numbers of a small table stand in the machine code, of a large one its address.
+    "with_tables": """
+from typing import NamedTuple
+import numpy as np
+import limitsets as ls
+from constants import GAIN
+SMALL, LARGE = np.full(9, GAIN), np.full(300_000, GAIN)
+class WithSmall(NamedTuple):
+    size: float
+class WithLarge(NamedTuple):
+    size: float
+def small(params, x, side):
+    return SMALL[int(x)] * x + params.size, side, 0
+def large(params, x, side):
+    return LARGE[int(x)] * x + params.size, side, 0
+ls.register(WithSmall, image=small)
+ls.register(WithLarge, image=large)
+""",
     "with_fields": """
 from typing import NamedTuple
 import limitsets as ls
@@ -170,6 +188,7 @@ EVERYTHING = (
 from with_helper import WithHelper
 from with_plain import WithPlain
 from with_constant import WithConstant
+from with_tables import WithLarge, WithSmall
 from with_fields import WithFields
 from with_part import WithPart
 from with_generic import WithGeneric
@@ -182,19 +201,22 @@ ls.register(InScript, image=image)
 
 run(
     leslie=leslie, henon=henon, helper=(WithHelper(1.0), 2.0), plain=(WithPlain(1.0), 2.0),
-    constant=(WithConstant(1.0), 2.0), fields=(WithFields(push=1.0, pull=5.0), 2.0),
+    constant=(WithConstant(1.0), 2.0), small=(WithSmall(1.0), 2.0), large=(WithLarge(1.0), 2.0),
+    fields=(WithFields(push=1.0, pull=5.0), 2.0),
     part=(WithPart(5.0), 2.0), generic=(WithGeneric(1.0), 2.0),
     script=(InScript(1.0), 2.0),
 )
 """
 )
-NOT_KEPT = {"generic", "script"}
+NOT_KEPT = {"generic", "script", "large"}
 ANSWERS = {
     "leslie": [2.0 + 2.0 * 3.0, 1.0],  # exp 0 = 1
     "henon": [1.0 - 0.5 * 2.0**2 + 10.0, 8.0],
     "helper": 3.0,
     "plain": 2.0 * 2.0 + 10.0 * 1.0,
     "constant": 5.0,
+    "small": 5.0,
+    "large": 5.0,
     "fields": 3.0,
     "part": 10.0,
     "generic": 3.0,
@@ -218,6 +240,8 @@ ANSWERS_AFTER = {
     "helper": 1.0,
     "plain": 2.0 * 2.0 + 20.0 * 1.0,
     "constant": 7.0,
+    "small": 7.0,
+    "large": 7.0,
     "part": 7.0,
     "generic": 1.0,
 }

@@ -29,9 +29,21 @@ from limitsets.base.progress import (
     silent,
 )
 from limitsets.base.proposals import proposed
-from limitsets.base.tables import Column, Table, Tabled, aligned, bands_of, facts, how_found, joined
+from limitsets.base.tables import (
+    BETWEEN,
+    Column,
+    Table,
+    Tabled,
+    aligned,
+    bands_of,
+    facts,
+    how_found,
+    joined,
+    rounded,
+)
 
 __all__ = [
+    "BETWEEN",
     "GOES_ON",
     "LONGEST",
     "AnswerError",
@@ -66,6 +78,7 @@ __all__ = [
     "picked",
     "proposed",
     "replaced",
+    "rounded",
     "shown",
     "shown_in_notebooks",
     "silent",

@@ -10,6 +10,7 @@ import io
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass, fields, is_dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from html import escape
 from itertools import accumulate
 from pathlib import Path
@@ -43,13 +44,17 @@ class Column:
     show : str or callable
         How people see a value: a format like ".4f", or a function of it.
     ends : bool
-        Whether a value is a pair, the two ends of an interval; they are two columns of CSV.
+        Whether a value is a pair, the two ends of an interval; they are two columns of CSV.  A format rounds them
+        outward: the interval that people see holds the other.
+    inward : bool
+        Whether they are rounded inward: of places for each of which something is proved.
     """
 
     head: str
     unit: str = ""
     show: Show = ""
     ends: bool = False
+    inward: bool = False
 
     @property
     def title(self) -> str:
@@ -70,10 +75,13 @@ class Column:
 
     def text(self, value: Any) -> str:
         """Write a value for people."""
-        if self.ends and value is not None:
-            low, high = map(self._text, value)
-            return low if low == high else f"{low} to {high}"
-        return self._text(value)
+        if not self.ends or value is None:
+            return self._text(value)
+        low, high = value
+        if isinstance(self.show, str) and low != high:
+            low, high = rounded(low, self.show, up=self.inward), rounded(high, self.show, up=not self.inward)
+        low, high = self._text(low), self._text(high)
+        return low if low == high else f"{low} to {high}"
 
     def _text(self, value: Any) -> str:
         if value is None or (isinstance(value, float) and math.isnan(value)):
@@ -84,6 +92,28 @@ class Column:
         if isinstance(value, bool):
             return "yes" if value else "no"
         return format(value, self.show) if self.show and not isinstance(value, str) else str(value)
+
+
+BETWEEN = Column("between", show=".6f", ends=True)
+"""Of a number that is proved to lie between two others."""
+
+
+def rounded(value: float, show: str, *, up: bool) -> str:
+    """Write a number by a format like ".4f" or ".6g", rounded up or down, so that a bound stays a bound.
+
+    A float counts as the shortest decimal that reads as it: 1.2 in is 1.2, although the float is a little less.
+
+    Examples
+    --------
+    >>> rounded(2 / 3, ".4f", up=False), rounded(2 / 3, ".3g", up=True), rounded(1.2, ".6f", up=True)
+    ('0.6666', '0.667', '1.200000')
+    """
+    if not (show and math.isfinite(value)):
+        return format(value, show)
+    exact, digits = Decimal(repr(float(value))), int(show[1:-1])
+    last = -digits if show[-1] == "f" else exact.adjusted() + (show[-1] == "g") - digits
+    whole = Context(prec=400, rounding=ROUND_CEILING if up else ROUND_FLOOR)  # of any float
+    return format(float(exact.quantize(Decimal(1).scaleb(last), context=whole)) + 0.0, show)  # no -0
 
 
 def _plain(value: Any) -> Any:

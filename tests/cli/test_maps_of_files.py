@@ -3,12 +3,14 @@
 import json
 import re
 import sys
+from functools import partialmethod
 from pathlib import Path
 
 import pytest
 
 import limitsets as ls
 from limitsets.face.cli import main
+from limitsets.proofs.chances.absorption import AbsorptionBrackets
 from tests.cli.command import documented, json_of, names_in, prints, refusal, run
 
 FILE = """
@@ -238,6 +240,18 @@ def test_an_orbit_ends_as_surely_and_as_soon_as_in_closed_form(capfd, mymap):
     assert 1.9999 < float(low) <= 2 <= float(high) < 2.0001
     Path(mymap).unlink()
     assert ls.recheck("registered.absorption.proof.zip").verdict == "proved"
+
+
+def test_brackets_that_the_checker_denies_are_no_answer(capfd, mymap, monkeypatch):
+    right = AbsorptionBrackets.save
+    monkeypatch.setattr(AbsorptionBrackets, "save", partialmethod(right, allowance=-1e-5))
+    how = ["--domain", "0:3", "--noise", "1", "--absorbing", "top=1:3", "--starts", "0:1", "--cells", "50"]
+    code, out, err = run_of_file(capfd, "absorption", f"{mymap}:registered", *how, "--steps", "5")
+    assert (code, out) == (2, "")
+    assert err.startswith(
+        "limitsets: registered.absorption.denied.zip: the certificate's claim probabilities is 'denied"
+    )
+    assert sorted(file.name for file in Path().glob("*.zip")) == ["registered.absorption.denied.zip"]
 
 
 def test_orbits_that_need_not_end_have_no_mean(capfd, mymap):

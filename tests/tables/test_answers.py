@@ -5,12 +5,14 @@ import io
 import math
 import sys
 import time
+from decimal import Decimal
 from html.parser import HTMLParser
 from types import SimpleNamespace
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
 import limitsets as ls
 from limitsets import progress
@@ -207,6 +209,33 @@ def test_people_see_rounded_numbers():
     table = made([(0, (1.004, 2.006), 0.25, True), (1, (3.0, 3.0), None, False)])
     assert table.shown() == [["0", "1.00 to 2.01", "0.2", "yes"], ["1", "3.00", "-", "no"]]
     assert table.heads == ["side", "x [in]", "share", "settled"]
+
+
+@given(
+    st.floats(-1e6, 1e6),
+    st.floats(-1e6, 1e6),
+    st.sampled_from([".6f", ".2f", ".6g", ".3g", ".10g", ".1e"]),
+)
+def test_an_interval_that_people_see_holds_the_other(one, other, show):
+    ends = sorted((one, other))
+    for inward in (False, True):
+        texts = Column("x", show=show, ends=True, inward=inward).text(ends).split(" to ")
+        for text, end, up in zip((texts[0], texts[-1]), ends, (inward, not inward), strict=True):
+            seen, exact = Decimal(text), Decimal(repr(end))
+            if one == other:
+                assert text == format(end, show)
+            else:
+                assert seen >= exact if up else seen <= exact
+            unit = Decimal(f"1e-{show[1:-1]}") * (1 if show[-1] == "f" else 10 * abs(exact))
+            assert abs(seen - exact) <= unit
+
+
+def test_a_number_with_few_digits_keeps_them():
+    # 1.2 and 0.1 are no floats: 1.2 as a float is less, 0.1 is more
+    assert Column("x", show=".6f", ends=True).text((0.1, 1.2)) == "0.100000 to 1.200000"
+    assert Column("x", show=".6g", ends=True, inward=True).text((0.1, 1.2)) == "0.1 to 1.2"
+    assert Column("x", show=".6f", ends=True).text((-1e-9, math.inf)) == "-0.000001 to inf"
+    assert Column("x", show=".6f", ends=True, inward=True).text((-1e-9, 3e300))[:11] == "0.000000 to"
 
 
 def test_html_is_well_formed_and_escaped():

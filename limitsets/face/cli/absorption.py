@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import limitsets as ls
-from limitsets.base import AnswerError, Table
-from limitsets.face.cli.arguments import named, outward, said_of, with_ending
+from limitsets.base import BETWEEN, AnswerError, Table, rounded
+from limitsets.face.cli.arguments import certified, named, said_of, with_ending
 from limitsets.face.cli.average import noise_of_words
 from limitsets.face.cli.commands import Answer, Run, Words, command, limits
-from limitsets.face.cli.output import saved
 from limitsets.face.cli.subjects import MapOfFile, domain_of, spans, subject
 
 # Cells of the domain; what stands in the name of a certificate; what is named where places are read.
@@ -64,7 +62,6 @@ def absorption(
         The certificate, NAME.proof.zip; ./ and the name of the map with .absorption by default.
     """
     from limitsets.proofs.chances.absorption import absorption_brackets
-    from limitsets.proofs.prover.certificate import DeniedError
 
     chosen = subject(map_, set_)
     if not isinstance(chosen, MapOfFile):
@@ -74,38 +71,26 @@ def absorption(
     form, remedy = "NAME=LO:HI", "name a place, the sign =, and two numbers with : between them"
     for name, text in named(absorbing, ABSORBING, "where orbits end", form, remedy, once=False):
         places.setdefault(name, []).extend(_ranges([text], ABSORBING))
-    line, denied = ls.grid(domain_of(chosen, domain), cells=cells), None
-    with saved(file) as draft:  # refuses a place that cannot be written before anything is proved
-        brackets = absorption_brackets(
-            chosen.lower,
-            line,
-            upper=chosen.upper,
-            noise=noise_of_words(noise),
-            absorbing=places,
-            starts=_ranges(starts, STARTS) or None,
-            throws=steps,
-            progress=run.tell,
-        )
-        run.tell("recheck", 0, 1)
-        begun = time.perf_counter()
-        try:
-            brackets.save(draft, recheck=not no_recheck)
-        except DeniedError as error:  # the file is kept
-            denied = error
-    if denied:
-        raise denied
-    written = {
-        "file": str(file),
-        "denied": False,
-        "recheck": None if no_recheck else time.perf_counter() - begun,
-    }
+    brackets = absorption_brackets(
+        chosen.lower,
+        ls.grid(domain_of(chosen, domain), cells=cells),
+        upper=chosen.upper,
+        noise=noise_of_words(noise),
+        absorbing=places,
+        starts=_ranges(starts, STARTS) or None,
+        throws=steps,
+        progress=run.tell,
+    )
+    run.tell("recheck", 0, 1)
+    brackets, written = certified(brackets, file, proved=True, recheck=not no_recheck)
 
     def words() -> Iterator[str | Table]:
         yield f"{chosen.name}: proved where {brackets.scatter.words()}"
         yield brackets.table()
         least, most = brackets.mean
-        low, _ = outward(least, least).split(" to ")  # rounded down
-        bounds = outward(least, most) if most < math.inf else f"at least {low}; nothing is proved from above"
+        bounds = f"at least {rounded(least, '.6f', up=False)}; nothing is proved from above"
+        if most < math.inf:
+            bounds = BETWEEN.text(brackets.mean)
         yield f"the mean number of steps until an orbit ends: {bounds}"
         for share in SHARES:
             first, last = brackets.quantile(share)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import time
 from contextlib import suppress
@@ -192,18 +191,24 @@ def certified(
     if not proved:
         return answer, written
     begin, file = time.perf_counter(), with_ending(file)
+    denied = None
     with saved(file) as draft:
         try:
             answer.save(draft, recheck=recheck, workers=None)
         except DeniedError as error:
-            kept = str(file.with_name(Path(error.file or "").name))
-            answer = answer.denied(error.claims if claim is None else error.claims[claim])
-            return answer, written | {"file": kept, "denied": True, "recheck": time.perf_counter() - begin}
-        # A certificate of other values gives way: it may be the last that knows them, but not to replace it would be in
-        # the way of everyone who edits a scene and proves again.  What differs is known now: both have one form.
-        before, after = _question_of(file), _question_of(draft)
-        if before and after and before != after:
-            say_other("the certificate", file, before[0]["name"])
+            denied = error
+        else:
+            # A certificate of other values gives way: it may be the last that knows them, but not to replace it would
+            # be in the way of everyone who edits a scene and proves again.  What differs is known: both have one form.
+            before, after = _question_of(file), _question_of(draft)
+            if before and after and before != after:
+                say_other("the certificate", file, before[0]["name"])
+    if denied is not None:
+        kept = file.with_name(Path(denied.file or "").name)
+        if not hasattr(answer, "denied"):  # it is that claim, and nothing else
+            raise DeniedError.of(kept, denied.claims)
+        answer = answer.denied(denied.claims if claim is None else denied.claims[claim])
+        return answer, written | {"file": str(kept), "denied": True, "recheck": time.perf_counter() - begin}
     return answer, written | {"file": str(file), "recheck": time.perf_counter() - begin if recheck else None}
 
 
@@ -228,8 +233,3 @@ def said_of(written: dict[str, Any] | None, missing: str, *, partly: bool = Fals
     left = ", of what is proved only" if partly else ""
     done = "not rechecked" if seconds is None else f"rechecked in {seconds:.2g} s"
     return [f"certificate: {file}{left}, {done} (check it: {proposed('recheck', file)})"]
-
-
-def outward(low: float, high: float) -> str:
-    """Write a proved bracket, rounded outward."""
-    return f"{math.floor(low * 1e6) / 1e6:.6f} to {math.ceil(high * 1e6) / 1e6:.6f}"

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import limitsets as ls
-from limitsets.base import Table
+from limitsets.base import BETWEEN, Table
 from limitsets.face import report
-from limitsets.face.cli.arguments import certified, deviations, laid_ranges, outward, said_of, scattering_of
+from limitsets.face.cli.arguments import certified, deviations, laid_ranges, said_of, scattering_of
 from limitsets.face.cli.commands import Answer, Run, Scene, Seed, Words, command, limits
 
 if TYPE_CHECKING:
@@ -207,9 +207,9 @@ def _proved(brackets: AbsorptionBrackets) -> Iterator[str]:
     for name in ("right", "wrong", "wall"):
         if name in brackets.within:
             low, high = brackets.within[name][:, -1].tolist()
-            yield f"PROVED: {FED[name]} within {last} throws: {outward(low, high)}"
+            yield f"PROVED: {FED[name]} within {last} throws: {BETWEEN.text((low, high))}"
         if name in brackets.ever:
-            yield f"PROVED: {FED[name]} after any number of throws: {outward(*brackets.ever[name])}"
+            yield f"PROVED: {FED[name]} after any number of throws: {BETWEEN.text(brackets.ever[name])}"
     first, by = brackets.quantile(0.95)
     if first is not None and by is not None:
         count = f"{first}" if first == by else f"{first} to {by}"

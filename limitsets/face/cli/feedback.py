@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
-from limitsets.base import LimitsetsError, Table
+from limitsets.base import BETWEEN, LimitsetsError, Table
 from limitsets.face import report
 from limitsets.face.cli.arguments import (
     certified,
     deviations,
     goal_at,
     named,
-    outward,
     place,
     places_of,
     said_of,
@@ -211,7 +210,7 @@ def _proved(proved: PolicyChances | None) -> Iterator[str]:
     if proved is not None:
         scattered = proved.scatter.given()
         laws = "deviations equally likely within the noise, independent" if scattered else "no noise"
-        mean, come = (outward(*pair) for pair in (proved.mean, proved.come))
+        mean, come = map(BETWEEN.text, (proved.mean, proved.come))
         yield f"PROVED ({laws}; starts equally likely per length): {mean} throws on average,"
         yield f"    and the part comes with a probability of {come}"
 

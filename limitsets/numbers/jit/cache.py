@@ -311,6 +311,10 @@ def _source_cache(folder: Path) -> type | None:
                 name = f"{py_func.__module__}.{py_func.__qualname__}"
                 self._filename_base = f"{name}-{line}.py{sys.version_info[0]}{sys.version_info[1]}{abi}"
 
+            def check_cachable(self, cres: Any) -> bool:
+                """Whether machine code can be kept: not where it holds the address of a large table."""
+                return not cres.library.has_dynamic_globals
+
         class SourceCache(caching.FunctionCache):  # type: ignore[misc]  # numba has no types
             _impl_class = SourceImpl
 

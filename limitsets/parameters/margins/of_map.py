@@ -177,7 +177,7 @@ class MarginOfMap(Saved):
         """Give the tables that show it, the one that is saved as CSV first."""
         sizes = Column("proved up to", show=bound), Column("refuted from", show=bound_above)
         row = (self.quantity, self.nominal, self.proved, self.refuted, self.direction, self.interval)
-        values = Column("proved for", show=".6g", ends=True)
+        values = Column("proved for", show=".6g", ends=True, inward=True)
         heads = ("parameter", Column("value", show=".6g"), *sizes, "direction", values)
         return (Table(heads, [row], "Margin", "deviations: proved below, refuted above"),)
 

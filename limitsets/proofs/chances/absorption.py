@@ -150,7 +150,14 @@ class AbsorptionBrackets(Tabled):
             },
         )
 
-    def save(self, path: str | Path, *, allowance: float = ALLOWANCE, recheck: bool = True) -> Path:
+    def save(
+        self,
+        path: str | Path,
+        *,
+        allowance: float = ALLOWANCE,
+        recheck: bool = True,
+        workers: int | None = 1,
+    ) -> Path:
         """Write the brackets as a certificate, which gets its name once the checker has made the steps anew.
 
         Parameters
@@ -161,6 +168,8 @@ class AbsorptionBrackets(Tabled):
             The claimed brackets are wider by this at both ends; bounds of the mean by this times the number of throws.
         recheck : bool
             Whether to check it first: from seconds to as long as the proof.
+        workers : int, optional
+            Processes that check it, as in `limitsets.recheck`.
 
         Raises
         ------
@@ -179,7 +188,9 @@ class AbsorptionBrackets(Tabled):
         'proved'
         """
         forever = self.mean, self.ever, self.functions
-        return write(path, self.chain, self.within, forever, allowance=allowance, recheck=recheck)
+        how = {"recheck": recheck, "workers": workers}
+        write(path, self.chain, self.within, forever, allowance=allowance, **how)
+        return Path(path)
 
 
 # ----------------------------------------------------------------

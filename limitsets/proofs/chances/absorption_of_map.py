@@ -95,10 +95,10 @@ def chain_of_map(
             allowed = "places apart from each other, on cells whose images are enclosed"
             raise AnswerError("the chain", type(lower).__name__, allowed, str(error)) from None
 
-    def packed(path: str | Path, section: dict[str, Any], arrays: dict[str, Array], recheck: bool) -> None:
+    def packed(path: str | Path, section: dict[str, Any], arrays: dict[str, Array], **how: Any) -> None:
         nodes = {f"nodes.{side}": each for side, each in enumerate(edges)}
         part = Part((lower, upper), {"probabilities": section}, nodes | arrays)
-        write_map(path, grid.domain, [part], goal=None, recheck=recheck)
+        write_map(path, grid.domain, [part], goal=None, **how)
 
     nodes = Nodes(np.concatenate(edges), np.cumsum([0, *(each.size for each in edges)]))
     return Chain(section, nodes, steps, row, packed), own

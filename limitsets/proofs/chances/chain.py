@@ -53,14 +53,14 @@ class Chain:
     row : checker.means.Rows
         Makes the mean over the starts.
     pack : callable
-        Writes a certificate: called with the file, the section of the claim, arrays, and whether to recheck it.
+        Writes a certificate: called with the file, the section of the claim, arrays, and how to recheck it.
     """
 
     section: dict[str, Any]
     nodes: Nodes
     steps: Steps
     row: Rows
-    pack: Callable[[str | Path, dict[str, Any], dict[str, Array], bool], object]
+    pack: Callable[..., object]
 
 
 def chain_of(
@@ -104,9 +104,9 @@ def chain_of(
         section, setting, nodes = setting_of(scene, scatter, starts, absorbing, cells)
         steps, row = chain_on(setting, [nodes.place[nodes.of_side(k)] for k in range(len(scene.sides))], told)
 
-    def packed(path: str | Path, section: dict[str, Any], arrays: dict[str, Array], recheck: bool) -> None:
+    def packed(path: str | Path, section: dict[str, Any], arrays: dict[str, Array], **how: Any) -> None:
         claims = [{"claim": "probabilities", "section": section}]
-        pack(path, section["scene"]["model"], claims, arrays | edges_of(nodes), recheck=recheck)
+        pack(path, section["scene"]["model"], claims, arrays | edges_of(nodes), **how)
 
     return Chain(section, nodes, steps, row, packed)
 
@@ -264,8 +264,8 @@ def write(
     forever: tuple[tuple[float, float], Mapping[str, tuple[float, float]], Mapping[str, Array]],
     *,
     allowance: float,
-    recheck: bool,
-) -> Path:
+    **how: Any,
+) -> None:
     """Write it, replacing an older file whole; `forever` are the mean, what is `ever`, and the functions of both."""
     names = [name for name in within if name != EXITS]
     section: dict[str, Any] = chain.section | {"names": names, "quantiles": [], "mean": None}
@@ -292,8 +292,7 @@ def write(
     arrays = dict(functions) | {
         f"within.{k}": np.ascontiguousarray(pair.T) for k, pair in enumerate(claimed.values())
     }
-    chain.pack(path, section, arrays, recheck)
-    return Path(path)
+    chain.pack(path, section, arrays, **how)
 
 
 def edges_of(nodes: Nodes) -> dict[str, Array]:

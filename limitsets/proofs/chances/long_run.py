@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limitsets.base import (
+    BETWEEN,
     AnswerError,
     Column,
     Progress,
@@ -90,7 +91,7 @@ class LongRunAverages(Saved):
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = [(name.replace("_", " "), (lo, hi), hi - lo) for name, (lo, hi) in self.numbers.items()]
-        heads = ("average", Column("between", show=".6f", ends=True), Column("width", show=".2g"))
+        heads = ("average", BETWEEN, Column("width", show=".2g"))
         said = f"{self.how}: from every start in these places, almost surely, as throws go on for ever"
         places = [(side, (lo, hi)) for side, lo, hi in self.starts]
         starts = Table(

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from limitsets.base import (
+    BETWEEN,
     AnswerError,
-    Column,
     Progress,
     Table,
     added_up,
@@ -83,7 +83,7 @@ class PolicyChances(Saved):
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         rows = [("mean number of throws", self.mean), ("probability to come", self.come)]
-        return (Table(("number", Column("between", show=".6f", ends=True)), rows, self.scene, self.how),)
+        return (Table(("number", BETWEEN), rows, self.scene, self.how),)
 
     def to_json(self) -> dict[str, Any]:
         """Give the bounds as JSON takes them."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from limitsets.base import AnswerError, Column, Table, as_table, bands_of, picked
+from limitsets.base import AnswerError, Column, Table, as_table, bands_of, picked, rounded
 from limitsets.feeder.goals import Goal, Laid, by_side
 from limitsets.feeder.scene import Model, Scene
 from limitsets.feeder.scene.quantities import text_at, texts
@@ -238,11 +239,13 @@ def _starts(starts: Any) -> str | None:
     if not isinstance(starts, dict):
         return None if starts is None else str(starts)
     if "within" in starts:
-        spans = [(side, *pair) for side, pairs in starts["within"].items() for pair in pairs]
-        return "within " + ", ".join(f"x = {lo:.6g} to {hi:.6g} on side {side}" for side, lo, hi in spans)
+        spans = [(side, pair) for side, pairs in starts["within"].items() for pair in pairs]
+        x = Column("x", show=".6g", ends=True, inward=True)
+        return "within " + ", ".join(f"x = {x.text(pair)} on side {side}" for side, pair in spans)
     ((word, places),) = starts.items()
     foot = " - a_{}" if word == "from_foot" else ""
-    return "from " + ", ".join(f"x{foot.format(side)} = {x:.6g} on side {side}" for side, x in places.items())
+    first = {side: rounded(x, ".6g", up=True) for side, x in places.items()}
+    return "from " + ", ".join(f"x{foot.format(side)} = {x} on side {side}" for side, x in first.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,7 +323,7 @@ class Proof(Saved):
             )
             for each in self.claims
         ]
-        shares = [Column(word, show=".4f") for word in SHARES]
+        shares = [Column(word, show=partial(rounded, show=".4f", up=word == "open")) for word in SHARES]
         heads: tuple[Column | str, ...] = ("claim", "verdict", "starts", *shares, "missing", "not simulated")
         claims = Table(heads, rows, f"{self.scene.name}: proofs", self.model.sentence)
         if not any(each.written for each in self.claims):

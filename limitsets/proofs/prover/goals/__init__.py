@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from limitsets.base import rounded
 from limitsets.feeder.goals import Goal, laid_words, unknown_goal
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.attraction import Attraction, near_section
@@ -193,7 +194,7 @@ def sentence(section: Mapping[str, Any]) -> str:
         return f"{said} {COMES[starts]}"
     ((word, places),) = starts.items()
     beyond = ", ".join(
-        f"x{f' - a_{side}' * (word == 'from_foot')} > {float.fromhex(x):.6g} on side {side}"
+        f"x{f' - a_{side}' * (word == 'from_foot')} > {rounded(float.fromhex(x), '.6g', up=True)} on side {side}"
         for side, x in places.items()
     )
     but = ", but for starts of total length zero" if "thinning" in section else ""
