@@ -152,7 +152,7 @@ class Table:
     >>> found.csv()
     'x low [in],x high [in],side\n1.0,1.3333333333333333,0\n'
     >>> found.shown()
-    [['1.00 to 1.33', '0']]
+    [['1.00 to 1.34', '0']]
     """
 
     columns: Sequence[Column | str]

@@ -193,7 +193,9 @@ class Rows(NamedTuple):
 
     def times(self, values: Array) -> Array:
         """Multiply."""
-        return np.bincount(self.row, self.entry * values[self.column], self.height)
+        product = values.take(self.column)
+        product *= self.entry  # in place: arrays of this size are paid for by their pages
+        return np.bincount(self.row, product, self.height)
 
 
 class Spread(NamedTuple):

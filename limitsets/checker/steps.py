@@ -164,9 +164,10 @@ class Chain:
         mean = self.rows.times(g.values) + (self.rows.off * g.size + more)
         low, high = self.nodes.ends(g)
         at = self.nodes.at
-        off = np.minimum(
-            self.nodes.varied * self.nodes.variation(g), self.nodes.steep * self.nodes.steepest(g)
-        )
+        with np.errstate(over="ignore"):  # the product of two large bounds is none
+            off = np.minimum(
+                self.nodes.varied * self.nodes.variation(g), self.nodes.steep * self.nodes.steepest(g)
+            )
         mean[at] = np.minimum(mean[at] + INFLATE * (self.nodes.much * (high - low) + off), high + more)
         live, bounds = self.live, fixed.copy()
         top = np.zeros(len(mean))

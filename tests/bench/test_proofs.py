@@ -155,7 +155,7 @@ ORBIT = "an orbit of 1e6 throws, whose exponent is known to 5e-4"
 
 
 @pytest.mark.parametrize(
-    ("cells", "width", "search", "again"), [(8192, 6e-5, 0.3, 2.0), (131_072, 4e-6, 3.0, 10.0)]
+    ("cells", "width", "search", "again"), [(8192, 6e-5, 0.3, 2.0), (144_000, 4e-6, 3.0, 10.0)]
 )
 def test_the_exponent_of_the_designed_feeder(
     cells, width, search, again, benchmark, table, tmp_path, monkeypatch

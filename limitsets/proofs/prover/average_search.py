@@ -21,10 +21,10 @@ from limitsets.systems.cells import Grid
 
 # Steps of an iteration, and after how many it is looked whether they settle; by how much the span of its changes is
 # smaller each time, and after how many times without a nearer bound there are no more.
-STEPS, SWEEPS, LESS_SPAN, NEARER, WORSE = 2_000, 8, 0.5, 0.999, 3
+STEPS, SWEEPS, LESS_SPAN, NEARER, WORSE = 2_000, 8, 0.35, 0.999, 3
 # Runs beside a change of branch are this share of the length of a component, and each time this share of that, as long
 # as there is no w or the bounds come nearer; the search with shorter runs begins with so much of what was left.
-RUN, LESS_RUN, WORTH, FIRST_SPAN = 0.125, 0.25, 0.99, 4.0
+RUN, LESS_RUN, WORTH, FIRST_SPAN = 0.125, 0.0625, 0.99, 4.0
 LEAST_S = 2.0**-60
 # What weights leave to the checker, as a share of s; by which share of them they may still fall.
 ROOM, LARGER = 0.05, 3e-4
