@@ -5,6 +5,7 @@ import io
 import math
 import sys
 import time
+from dataclasses import replace
 from decimal import Decimal
 from html.parser import HTMLParser
 from types import SimpleNamespace
@@ -18,6 +19,7 @@ import limitsets as ls
 from limitsets import progress
 from limitsets.base.tables import Column, Table, Tabled, aligned, facts, joined
 from limitsets.parameters.margins.single import Margin
+from limitsets.proofs.prover.goals import sentence
 
 # ----------------------------------------------------------------
 # Every public answer is shown in a notebook: well-formed, labelled, with its numbers; and saved in full.
@@ -113,6 +115,22 @@ def test_proofs_and_their_recheck(tmp_path):
     rows = shown(report)[0]
     assert [row[0] for row in rows[1:]] == [*(name for name, _, _ in report.claims), "certificate"]
     assert rows[-1][1] == "PROVED"
+
+
+def test_what_is_proved_of_starts_is_not_rounded_up():
+    proof = ls.certify("paper-designed", claims=["invariant"])
+    shares = {"share": 0.99996, "leaves": 0.00006, "creeps": 0.00001, "open": 0.00001}
+    for starts, words in (
+        ({"from": {2: 1.23456712}}, "from x = 1.23457 on side 2"),
+        ({"from_foot": {0: 0.00123456712}}, "from x - a_0 = 0.00123457 on side 0"),
+        ({"within": {1: [(1.23456789, 2.0)]}}, "within x = 1.23457 to 2 on side 1"),
+        ({"within": {1: [(1.23456123, 2.34567899)]}}, "within x = 1.23457 to 2.34567 on side 1"),
+    ):
+        claim = replace(proof.claims[0], starts=starts, shares=shares)
+        row = replace(proof, claims=(claim,)).tables()[-2].shown()[0]
+        assert row[2:7] == [words, "0.9999", "0.0000", "0.0000", "0.0001"]
+    said = sentence({"kind": "stays_on_arm", "starts": {"from": {"2": (1.23456112).hex()}}})
+    assert "x > 1.23457 on side 2" in said
 
 
 @pytest.mark.sweep
