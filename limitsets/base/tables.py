@@ -47,7 +47,8 @@ class Column:
         Whether a value is a pair, the two ends of an interval; they are two columns of CSV.  A format rounds them
         outward: the interval that people see holds the other.
     inward : bool
-        Whether they are rounded inward: of places for each of which something is proved.
+        Whether they are rounded inward: of places for each of which something is proved.  Where this would leave none,
+        every digit is shown.
     """
 
     head: str
@@ -78,10 +79,17 @@ class Column:
         if not self.ends or value is None:
             return self._text(value)
         low, high = value
-        if isinstance(self.show, str) and low != high:
-            low, high = rounded(low, self.show, up=self.inward), rounded(high, self.show, up=not self.inward)
-        low, high = self._text(low), self._text(high)
-        return low if low == high else f"{low} to {high}"
+        if low == high:
+            return self._text(low)
+        texts = self._end(low, up=self.inward), self._end(high, up=not self.inward)
+        if self.inward and low < high and float(texts[0]) > float(texts[1]):
+            texts = str(_plain(low)), str(_plain(high))
+        return texts[0] if texts[0] == texts[1] else " to ".join(texts)
+
+    def _end(self, value: Any, *, up: bool) -> str:
+        if self.show and isinstance(self.show, str) and value is not None and math.isfinite(value):
+            return rounded(value, self.show, up=up)
+        return self._text(value)
 
     def _text(self, value: Any) -> str:
         if value is None or (isinstance(value, float) and math.isnan(value)):
@@ -99,7 +107,7 @@ BETWEEN = Column("between", show=".6f", ends=True)
 
 
 def rounded(value: float, show: str, *, up: bool) -> str:
-    """Write a number by a format like ".4f" or ".6g", rounded up or down, so that a bound stays a bound.
+    """Write a finite number by a format like ".4f" or ".6g", rounded up or down, so that a bound stays a bound.
 
     A float counts as the shortest decimal that reads as it: 1.2 in is 1.2, although the float is a little less.
 
@@ -108,8 +116,6 @@ def rounded(value: float, show: str, *, up: bool) -> str:
     >>> rounded(2 / 3, ".4f", up=False), rounded(2 / 3, ".3g", up=True), rounded(1.2, ".6f", up=True)
     ('0.6666', '0.667', '1.200000')
     """
-    if not (show and math.isfinite(value)):
-        return format(value, show)
     exact, digits = Decimal(repr(float(value))), int(show[1:-1])
     last = -digits if show[-1] == "f" else exact.adjusted() + (show[-1] == "g") - digits
     whole = Context(prec=400, rounding=ROUND_CEILING if up else ROUND_FLOOR)  # of any float

@@ -10,7 +10,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.face.cli import main
-from limitsets.proofs.chances.absorption import AbsorptionBrackets
+from limitsets.proofs.chances import absorption
 from tests.cli.command import documented, json_of, names_in, prints, refusal, run
 
 FILE = """
@@ -242,9 +242,20 @@ def test_an_orbit_ends_as_surely_and_as_soon_as_in_closed_form(capfd, mymap):
     assert ls.recheck("registered.absorption.proof.zip").verdict == "proved"
 
 
+def test_a_place_that_cannot_be_written_is_refused_before_the_proof(capfd, mymap, monkeypatch):
+    monkeypatch.setattr(
+        absorption, "absorption_brackets", lambda *_, **__: pytest.fail("it was proved first")
+    )
+    how = ["--domain", "0:3", "--noise", "1", "--absorbing", "top=1:3", "--save", f"{mymap}/x"]
+    code, out, err = run_of_file(capfd, "absorption", f"{mymap}:registered", *how)
+    assert (code, out) == (2, "")
+    assert "a place that can be written" in err
+    assert not list(Path().rglob("*draft*"))
+
+
 def test_brackets_that_the_checker_denies_are_no_answer(capfd, mymap, monkeypatch):
-    right = AbsorptionBrackets.save
-    monkeypatch.setattr(AbsorptionBrackets, "save", partialmethod(right, allowance=-1e-5))
+    right = absorption.AbsorptionBrackets.save
+    monkeypatch.setattr(absorption.AbsorptionBrackets, "save", partialmethod(right, allowance=-1e-5))
     how = ["--domain", "0:3", "--noise", "1", "--absorbing", "top=1:3", "--starts", "0:1", "--cells", "50"]
     code, out, err = run_of_file(capfd, "absorption", f"{mymap}:registered", *how, "--steps", "5")
     assert (code, out) == (2, "")

@@ -248,6 +248,18 @@ def test_an_interval_that_people_see_holds_the_other(one, other, show):
             assert abs(seen - exact) <= unit
 
 
+def test_ends_that_are_none_are_dashes_and_no_shown_interval_is_turned_round():
+    x, inside = Column("x", show=".6f", ends=True), Column("x", show=".6g", ends=True, inward=True)
+    assert [x.text(ends) for ends in ((math.nan, math.nan), (None, None), (None, 3.0))] == [
+        "-",
+        "-",
+        "- to 3.000000",
+    ]
+    assert (
+        inside.text((1.2345671, 1.2345672)) == "1.2345671 to 1.2345672"
+    )  # no number of six digits lies between
+
+
 def test_a_number_with_few_digits_keeps_them():
     # 1.2 and 0.1 are no floats: 1.2 as a float is less, 0.1 is more
     assert Column("x", show=".6f", ends=True).text((0.1, 1.2)) == "0.100000 to 1.200000"

@@ -12,6 +12,7 @@ from limitsets.base import BETWEEN, AnswerError, Table, rounded
 from limitsets.face.cli.arguments import certified, named, said_of, with_ending
 from limitsets.face.cli.average import noise_of_words
 from limitsets.face.cli.commands import Answer, Run, Words, command, limits
+from limitsets.face.cli.output import saved
 from limitsets.face.cli.subjects import MapOfFile, domain_of, spans, subject
 
 # Cells of the domain; what stands in the name of a certificate; what is named where places are read.
@@ -71,6 +72,8 @@ def absorption(
     form, remedy = "NAME=LO:HI", "name a place, the sign =, and two numbers with : between them"
     for name, text in named(absorbing, ABSORBING, "where orbits end", form, remedy, once=False):
         places.setdefault(name, []).extend(_ranges([text], ABSORBING))
+    with saved(file):  # a place that cannot be written is refused before anything is proved
+        pass
     brackets = absorption_brackets(
         chosen.lower,
         ls.grid(domain_of(chosen, domain), cells=cells),

@@ -188,8 +188,7 @@ class AbsorptionBrackets(Tabled):
         'proved'
         """
         forever = self.mean, self.ever, self.functions
-        how = {"recheck": recheck, "workers": workers}
-        write(path, self.chain, self.within, forever, allowance=allowance, **how)
+        write(path, self.chain, self.within, forever, allowance=allowance, recheck=recheck, workers=workers)
         return Path(path)
 
 
