@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
-from limitsets.base import AnswerError, LimitsetsError, Table
+from limitsets.base import AnswerError, LimitsetsError, Table, rounded
 from limitsets.face import report
 from limitsets.face.cli.arguments import (
     certified_claims,
@@ -44,6 +45,9 @@ REFUTED = {
     "almost-every": "The goal fails for starts of positive total length.",
 }
 
+
+# A proved number in words stays a bound.
+_down, _up = partial(rounded, up=False), partial(rounded, up=True)
 
 # Cells along each axis of a map's domain.
 CELLS = 512
@@ -217,16 +221,16 @@ def _words(proof: Proof, claim: Claim) -> list[str]:
         return _goal(proof, claim)
     if claim.claim == "expanding":
         slope = float.fromhex(claim.section["least_slope"])
-        entropy = "" if proof.noise else f"; topological entropy {_down(math.log(slope), 5)} at least"
+        entropy = "" if proof.noise else f"; topological entropy {_down(math.log(slope), '.5f')} at least"
         return [
-            f"In the attracting cells each throw stretches distances by {_down(slope, 6)} at least{entropy}.",
+            f"In the attracting cells each throw stretches distances by {_down(slope, '.6f')} at least{entropy}.",
             "So no repeating sequence of places attracts; each that exists is unstable.",
         ]
     if claim.claim == "end-points":
         ends = [(end["side"], end["which"], end["outer"], end["inner"]) for end in claim.section["ends"]]
         return [
             f"side {side}, {which} end: x = {float.fromhex(outer):.12f} {scene.unit},"
-            f" within {abs(float.fromhex(outer) - float.fromhex(inner)):.1e}"
+            f" within {_up(abs(float.fromhex(outer) - float.fromhex(inner)), '.1e')}"
             for side, which, outer, inner in ends
         ]
     if claim.claim == "cycles":
@@ -276,12 +280,9 @@ def _sentence(text: str) -> str:
 
 def _attraction(proof: Proof, claim: Claim) -> list[str]:
     unit, bound, points = proof.scene.unit, proof.max_throws(), claim.jog_fixed_points
-    extents = {
-        side: ", ".join(f"{_down(lo, 3)} to {_up(hi, 3)}" for lo, hi in parts)
-        for side, parts in proof.outer_extents().items()
-    }
-    growth = _down(bound["near_joint"], 6)
-    starts = ", ".join(f"{_up(x, 6)} {unit} on side {side}" for side, x in bound["beyond"].items())
+    extents = {side: report.pages.intervals(parts) for side, parts in proof.outer_extents().items()}
+    growth = _down(bound["near_joint"], ".6f")
+    starts = ", ".join(f"{_up(x, '.6f')} {unit} on side {side}" for side, x in bound["beyond"].items())
     where, edge, foot = "and every side", "the joint", "a"
     if points is not None:
         where, edge, foot = "beyond R*", "R*", "R*"
@@ -298,7 +299,7 @@ def _two_basins(proof: Proof, points: dict[str, list[float]]) -> list[str]:
     """Say what becomes of parts near the joint if the arm's surface is above the joint."""
     unit = proof.scene.unit
     lines = [
-        f"side {side}: R* between x = {_down(lo, 10)} and {_up(hi, 10)} {unit}"
+        f"side {side}: R* between x = {_down(lo, '.10f')} and {_up(hi, '.10f')} {unit}"
         for side, (lo, hi) in points.items()
     ]
     between = ["Between the two ends nothing is claimed: it depends on the throws."] if proof.noise else []
@@ -308,16 +309,6 @@ def _two_basins(proof: Proof, points: dict[str, list[float]]) -> list[str]:
         "From every position nearer than R*, jogs bring the part ever closer to x = a: it never leaves its side.",
         *between,
     ]
-
-
-def _down(value: float, digits: int) -> str:
-    """Write a proved number, rounded down."""
-    return f"{math.floor(value * 10**digits) / 10**digits:.{digits}f}"
-
-
-def _up(value: float, digits: int) -> str:
-    """Write a proved number, rounded up."""
-    return f"{math.ceil(value * 10**digits) / 10**digits:.{digits}f}"
 
 
 def _orbit(proof: Proof, claim: Claim) -> Iterator[str | Table]:

@@ -16,7 +16,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from limitsets.base import AnswerError, proposed
+from limitsets.base import AnswerError, proposed, rounded
 from limitsets.feeder.goals import (
     Goal,
     OrientedBeyond,
@@ -110,14 +110,15 @@ def in_time(throws: float | None, rate: float | None, *, parts: bool = False) ->
 
 
 def intervals(parts: Iterable[tuple[float, float]], digits: int = 3) -> str:
-    """Write intervals.
+    """Write intervals, rounded outward.
 
     Examples
     --------
-    >>> intervals([(1.0, 2.0), (3.0, 4.5)], 1)
-    '1.0 to 2.0, 3.0 to 4.5'
+    >>> intervals([(1.0, 2.0), (3.0, 4.51)], 1)
+    '1.0 to 2.0, 3.0 to 4.6'
     """
-    return ", ".join(f"{lo:z.{digits}f} to {hi:z.{digits}f}" for lo, hi in parts)
+    show = f".{digits}f"
+    return ", ".join(f"{rounded(lo, show, up=False)} to {rounded(hi, show, up=True)}" for lo, hi in parts)
 
 
 def bands(extents: Extents) -> list[tuple[float, float, tuple[int, ...]]]:
