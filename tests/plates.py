@@ -1,6 +1,7 @@
 """Parts of some centimetres as an engineer writes them, in millimetres: three plates with a lead weight."""
 
 from copy import deepcopy
+from typing import Any
 
 # The scene of docs/scene.md: four corners.
 LEAD_QUAD = {
@@ -67,3 +68,24 @@ def plate(*changes: tuple[str, str], name: str = "plate", more: str = "") -> str
         assert old in text
         text = text.replace(old, new)
     return text
+
+
+def bracket() -> dict[str, Any]:
+    """An L of steel with a notch in its base, a round and a three-cornered hole, and a lead weight; five sides."""
+    corners = [(0, 0), (30, 0), (30, 5), (50, 5), (50, 0), (80, 0), (80, 40), (40, 40), (40, 80), (0, 80)]
+    holes = [
+        {"center": {"x": "20 mm", "y": "60 mm"}, "diameter": "10 mm"},
+        {"vertices": [["10 mm", "10 mm"], ["20 mm", "10 mm"], ["10 mm", "20 mm"]]},
+    ]
+    points = [{"x": "60 mm", "y": "20 mm", "mass": "18 g"}]
+    return {
+        "name": "bracket",
+        "part": {
+            "vertices": [[f"{x} mm", f"{y} mm"] for x, y in corners],
+            "holes": holes,
+            "mass": {"plate_density": "7850 kg/m^3", "plate_thickness": "2 mm", "points": points},
+        },
+        "arm": {"surface_height": "-4 mm", "length": "400 mm"},
+        "throw": {"speed": "150 deg/s"},
+        "gravity": {"tilt": "30 deg"},
+    }

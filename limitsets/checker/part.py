@@ -3,9 +3,12 @@
 docs/certificates.md, "What is claimed", names the parameters; docs/model.md has the geometry.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from itertools import product
 from typing import Any
+
+from flint import arb
 
 from .balls import ONE, ZERO, Arb, Centred, centred, exact, span
 from .file import quantity, require, rows, table
@@ -67,12 +70,13 @@ def read_part(
     part: Any, unit: Fraction, read: Callable[[object, str], Any]
 ) -> tuple[list[tuple[Any, ...]], Any]:
     """Compute (a_i, d_i, L_i, a_i + L_next - a_next) of every side, and rho, in the arithmetic of `read`."""
-    vertices = read_polygon(part, read)
+    outline, corners = read_polygon(part, read, unit)
+    vertices = [outline[k] for k in corners]
     n = len(vertices)
     mass = part["mass"]
     if "plate_density" in mass:
         table(mass, "part.mass", "plate_density", "plate_thickness points")
-        start, rho2 = read_plate(mass, vertices, unit, read)
+        start, rho2 = read_plate(part, outline, unit, read)
         (ex, ey), along, above, rho, own = (ONE, ZERO), ZERO, ZERO, rho2.sqrt(), -1
     else:
         table(mass, "part.mass", "center radius_of_gyration")
@@ -99,14 +103,18 @@ def read_part(
     return [(a, d, long, a + ll - aa) for (a, d, long), (aa, _, ll) in zip(rests, after, strict=True)], rho
 
 
-def read_polygon(part: object, read: Callable[[object, str], Any]) -> list[tuple[Arb, Arb]]:
-    """Read the vertices, counterclockwise; side i goes from vertex -i to vertex 1 - i (mod their number).
+def read_polygon(
+    part: object, read: Callable[[object, str], Any], unit: Fraction
+) -> tuple[list[tuple[Arb, Arb]], list[int]]:
+    """Read the outline, counterclockwise, and which of its vertices are corners of its convex hull, on which it rests.
 
-    So side 0 is the edge from vertex 0 to vertex 1, and the left vertex of side i is the right vertex of side i+1.
+    Side i of the hull goes from its corner -i to its corner 1 - i (mod their number).  So side 0 is the edge from
+    corner 0 to corner 1, and the left vertex of side i is the right vertex of side i+1.
     """
-    keys = table(part, "part", "mass", "sides vertices")
+    keys = table(part, "part", "mass", "sides vertices holes")
     require(("sides" in keys) != ("vertices" in keys), "part: either sides or vertices")
     require(isinstance(keys["mass"], dict), "part.mass is not an object")
+    require("holes" not in keys or "plate_density" in keys["mass"], "part.holes: of a plate alone")
     if "sides" in keys:
         three = rows(keys["sides"], "part.sides", 3, 3)
         base, left, right = (read(q, f"part.sides[{i}]") for i, q in enumerate(three))
@@ -114,17 +122,57 @@ def read_polygon(part: object, read: Callable[[object, str], Any]) -> list[tuple
         y2 = left**2 - x**2
         positive = all(bool(q > 0) for q in (base, left, right, y2))
         require(positive, "the sides form no triangle")
-        vertices = [(ZERO, ZERO), (base, ZERO), (x, y2.sqrt())]
+        outline, corners = [(ZERO, ZERO), (base, ZERO), (x, y2.sqrt())], [0, 1, 2]
     else:
-        pairs = [rows(v, "a vertex", 2, 2) for v in rows(keys["vertices"], "part.vertices", 3, 64)]
-        vertices = [(read(x, "part.vertices"), read(y, "part.vertices")) for x, y in pairs]
+        pairs = [rows(v, "a vertex", 2, 2) for v in rows(keys["vertices"], "part.vertices", 3, 1000)]
+        outline = [(read(x, "part.vertices"), read(y, "part.vertices")) for x, y in pairs]
+        corners = list(range(len(pairs)))
+        if "plate_density" in keys["mass"]:
+            corners = hull_of([[ends_of(each, "part.vertices", unit) for each in pair] for pair in pairs])
+    require(3 <= len(corners) <= 256, "the hull of the part has fewer than 3 or more than 256 corners")
+    vertices = [outline[k] for k in corners]
     n = len(vertices)
     for k in range(n):
         (px, py), (ex, ey), _ = side_frame(vertices, -k)
         for j in set(range(n)) - {k, (k + 1) % n}:
             beyond = (vertices[j][1] - py) * ex - (vertices[j][0] - px) * ey
             require(bool(beyond > 0), "the vertices are not those of a convex polygon, counterclockwise")
-    return vertices
+    return outline, corners
+
+
+Ends = Sequence[tuple[Fraction, Fraction]]  # least and largest x, least and largest y of a vertex
+
+
+def hull_of(places: Sequence[Ends]) -> list[int]:
+    """Find the corners of the convex hull, ascending: no other vertex lies beyond one of its sides, exactly.
+
+    Their candidates are those of the middles.  The cross product is affine in each coordinate, so its least value for
+    all coordinates between their ends is that at one of the corners of the box.
+    """
+    middles = [tuple((lo + hi) / 2 for lo, hi in place) for place in places]
+    order = sorted(range(len(places)), key=lambda k: middles[k])
+    corners: list[int] = []
+    for way in (order, order[::-1]):
+        chain: list[int] = []
+        for k in way:
+            while len(chain) > 1 and cross_of(*(middles[j] for j in (*chain[-2:], k))) <= 0:
+                chain.pop()
+            chain.append(k)
+        corners += chain[:-1]
+    start = corners.index(min(corners))
+    corners = corners[start:] + corners[:start]
+    require(corners == sorted(corners), "the outline of the part is not counterclockwise")
+    for left, right in zip(corners, corners[1:] + corners[:1], strict=True):
+        for k in set(range(len(places))) - set(corners):
+            box = [set(ends) for vertex in (left, right, k) for ends in places[vertex]]
+            least = min(cross_of(at[:2], at[2:4], at[4:]) for at in product(*box))
+            require(least >= 0, f"vertex {k} of the part may lie beyond its convex hull")
+    return corners
+
+
+def cross_of(start: Sequence[Fraction], end: Sequence[Fraction], place: Sequence[Fraction]) -> Fraction:
+    """Compute twice the area of a triangle, positive where the place lies left of the way from start to end."""
+    return (end[0] - start[0]) * (place[1] - start[1]) - (end[1] - start[1]) * (place[0] - start[0])
 
 
 def side_frame(vertices: list[tuple[Arb, Arb]], i: int) -> tuple[tuple[Arb, Arb], tuple[Arb, Arb], Arb]:
@@ -137,19 +185,22 @@ def side_frame(vertices: list[tuple[Arb, Arb]], i: int) -> tuple[tuple[Arb, Arb]
 
 
 def read_plate(
-    mass: dict[str, Any],
-    vertices: list[tuple[Arb, Arb]],
+    part: dict[str, Any],
+    outline: list[tuple[Arb, Arb]],
     unit: Fraction,
     read: Callable[[object, str], Any],
 ) -> tuple[tuple[Arb, Arb], Arb]:
-    """Compute centre of mass and squared radius of gyration of a uniform plate with points of mass on it."""
-    area = sx = sy = second = ZERO
-    for (x0, y0), (x1, y1) in zip(vertices, vertices[1:] + vertices[:1], strict=True):
-        cross = x0 * y1 - x1 * y0
-        area += cross / 2
-        sx += (x0 + x1) * cross / 6
-        sy += (y0 + y1) * cross / 6
-        second += (x0 * x0 + x0 * x1 + x1 * x1 + y0 * y0 + y0 * y1 + y1 * y1) * cross / 12
+    """Compute centre of mass and squared radius of gyration of a uniform plate with holes and points of mass on it."""
+    mass = part["mass"]
+    area, sx, sy, second = moments_of(outline)
+    require(bool(area > 0), "the outline of the part is not counterclockwise")
+    for k, hole in enumerate(rows(part.get("holes", []), "part.holes", 0, 1000)):
+        taken = hole_of(hole, f"part.holes[{k}]", unit)
+        require(bool(taken[0] > 0), f"part.holes[{k}] is not counterclockwise, or empty")
+        area, sx, sy, second = (
+            whole - less for whole, less in zip((area, sx, sy, second), taken, strict=True)
+        )
+    require(bool(area > 0), "the holes are larger than the part")
     thick = "plate_thickness" in mass
     density = quantity(mass["plate_density"], "bulk" if thick else "density", "part.mass.plate_density")
     weight = density.ball() * exact(unit) ** 2
@@ -166,3 +217,36 @@ def read_plate(
         total, sx, sy, second = total + w, sx + w * x, sy + w * y, second + w * (x**2 + y**2)
     require(density.lo > 0 and bool(total > 0), "a mass is not positive")
     return (sx / total, sy / total), second / total - (sx / total) ** 2 - (sy / total) ** 2
+
+
+def moments_of(vertices: list[tuple[Arb, Arb]]) -> tuple[Arb, Arb, Arb, Arb]:
+    """Compute area, first moments and polar second moment of a polygon about the origin."""
+    area = sx = sy = second = ZERO
+    for (x0, y0), (x1, y1) in zip(vertices, vertices[1:] + vertices[:1], strict=True):
+        cross = x0 * y1 - x1 * y0
+        area += cross / 2
+        sx += (x0 + x1) * cross / 6
+        sy += (y0 + y1) * cross / 6
+        second += (x0 * x0 + x0 * x1 + x1 * x1 + y0 * y0 + y0 * y1 + y1 * y1) * cross / 12
+    return area, sx, sy, second
+
+
+def hole_of(hole: object, where: str, unit: Fraction) -> tuple[Arb, Arb, Arb, Arb]:
+    """Compute area and moments of a hole: a circle, or a polygon."""
+
+    def length(value: object) -> Arb:
+        lo, hi = ends_of(value, where, unit)
+        require(lo == hi, f"{where} is an interval")
+        return span(lo, hi)
+
+    keys = table(hole, where, "", "center diameter vertices")
+    if "vertices" in keys:
+        require(len(keys) == 1, f"{where}: vertices alone, or center and diameter")
+        pairs = [rows(v, where, 2, 2) for v in rows(keys["vertices"], where, 3, 1000)]
+        return moments_of([(length(x), length(y)) for x, y in pairs])
+    require(len(keys) == 2, f"{where}: vertices alone, or center and diameter")
+    center = table(keys["center"], f"{where}.center", "x y")
+    x, y, diameter = length(center["x"]), length(center["y"]), length(keys["diameter"])
+    require(bool(diameter > 0), f"{where}.diameter is not positive")
+    area = arb.pi() * diameter**2 / 4
+    return area, area * x, area * y, area * (x**2 + y**2 + diameter**2 / 8)

@@ -107,7 +107,9 @@ class Scene:
 
 
 def quantities(value: object, where: str = "") -> Iterator[tuple[str, object]]:
-    """Name every quantity of a scene."""
+    """Name every quantity of a scene; holes have none, they are exact."""
+    if where == "part.holes":
+        return
     if isinstance(value, dict):
         for key, inner in value.items():
             if where or key in ("part", "arm", "throw", "gravity"):

@@ -10,8 +10,9 @@ import pytest
 
 import limitsets as ls
 from limitsets.base.errors import SceneError
-from limitsets.feeder.scene.checking import examined, starting_text
+from limitsets.feeder.scene.checking import examined
 from limitsets.feeder.scene.schema import Section, Several, schema
+from limitsets.feeder.scene.starting import starting_text
 from limitsets.feeder.scene.validation import refusals
 from tests.cli.command import documented, json_of, names_in, prints, refusal, run, written
 
@@ -65,7 +66,8 @@ def test_every_key_of_the_schema_stands_in_it_with_its_words_and_an_example_that
     text = starting_text("all", "all.toml")
     tree = tomllib.loads(SWITCH.sub("", text))
     # it has both of each two words that exclude each other
-    assert {error.key for error in refusals(tree, None)} == {"part", "part.mass", "gravity", "throw"}
+    both = {"part", "part.mass", "part.holes", "gravity", "throw"}
+    assert {error.key for error in refusals(tree, None)} == both
     for path, key in keys_of(schema(with_effects=True)):
         assert re.search(rf"\b{path[-1]}\b", text), path
         if len(path) == 2:

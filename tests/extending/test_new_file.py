@@ -39,7 +39,7 @@ SCRIPT = """
 import pickle, sys
 import limitsets as ls
 from limitsets.checker.scene import left_out, read_scene
-from limitsets.feeder.scene.checking import starting_text
+from limitsets.feeder.scene.starting import starting_text
 from limitsets.feeder.scene.left_out import Model
 
 kernels = "limitsets.feeder.thrower.motion"

@@ -266,15 +266,15 @@ def test_flight(source, x, side):
     assert corners[:, 0].min() <= x - sides.a[side] + 1e-9
     landed = impact.get_xy()[:-1]
     assert landed[:, 1].min() == pytest.approx(h, abs=1e-9)  # the vertex is on the arm, and nothing below it
-    assert landed[0, 1] == pytest.approx(h, abs=1e-9)
+    struck = landed[np.argmin(landed[:, 1])]
     (path,) = named(above, "path")
     after = ls.orbit(scene.map, x, side, 1)
     to = int(after.side[1])
     at_rest = rest.get_xy()[:-1]
     assert sorted(at_rest[:, 1])[:2] == pytest.approx([h, h], abs=1e-9)
     assert path.get_xdata()[0] == x
-    turned = at_rest[0] if to == side else at_rest[np.argmin(np.hypot(*(at_rest - landed[0]).T))]
-    assert turned == pytest.approx(landed[0], abs=1e-9)  # it turned about the struck vertex
+    turned = at_rest[np.argmin(np.hypot(*(at_rest - struck).T))]
+    assert turned == pytest.approx(struck, abs=1e-9)  # it turned about the struck vertex
     lengths = np.sort(np.hypot(*np.diff(np.vstack([landed, landed[:1]]), axis=0).T))
     assert lengths == pytest.approx(np.sort(sides.length), abs=1e-9)
     title = below.get_title(loc="left")
@@ -288,7 +288,8 @@ def test_flight_by_small_angles_hangs_at_the_vertex_whose_path_is_known():
     figure = plot.flight(scene, 20.5, 2)
     assert "small-angle" in figure.get_suptitle()
     (impact,) = named(figure.axes[0], "impact")
-    assert impact.get_xy()[0, 1] == pytest.approx(scene.surface_height, abs=1e-9)
+    # the left end of side 2, vertex 1, strikes
+    assert impact.get_xy()[1, 1] == pytest.approx(scene.surface_height, abs=1e-9)
     assert not named(figure.axes[1], "turning")
 
 

@@ -9,6 +9,7 @@ import limitsets as ls
 from limitsets.base.errors import SceneError
 from limitsets.feeder.scene import Scene
 from limitsets.feeder.scene.arrays import throw_stack
+from tests.plates import bracket
 from tests.scene.four_gon import FOUR_GON
 
 FIELDS = ("kappa", "surface_height", "arm_length", "radius_of_gyration", "a", "d", "length", "corner")
@@ -48,12 +49,20 @@ BY_SIDES = {
     "part.sides[2]": (20.0, 110.0),
     "part.mass.points[0].y": (-3.0, 40.0),
 }
+SHAPED = {
+    "throw.speed": (1.0, 5.0),
+    "part.vertices[2].y": (-3.0, 60.0),  # through the base, through a hole
+    "part.vertices[7].x": (-5.0, 75.0),  # beyond the hull, and the edge above through a hole
+    "part.vertices[6].y": (10.0, 90.0),
+    "part.mass.points[0].x": (-20.0, 90.0),
+}
 SCENES = {
     "whole": (None, PAPER),
     "designed": ("paper-designed", PAPER),
     "small angle": ("paper-initial-small-angle", PAPER),
     "plate": (FOUR_GON, PLATE),
     "thick plate": (THICK, BY_SIDES),
+    "bracket": (bracket(), SHAPED),
 }
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import math
 import os
-import re
 import sys
 import time
 import tomllib
@@ -252,13 +251,71 @@ TINY = [[f"{x}e-200 cm", f"{y}e-200 cm"] for x, y in ["00", "10", "01"]]
 THIN = {"part/mass/plate_thickness": "0 mm"}
 
 
+def circle(x: float, y: float, diameter: float) -> dict[str, Any]:
+    return {"center": {"x": f"{x} cm", "y": f"{y} cm"}, "diameter": f"{diameter} cm"}
+
+
+def polygon(*places: tuple[float, float]) -> dict[str, Any]:
+    return {"vertices": [[f"{x} cm", f"{y} cm"] for x, y in places]}
+
+
+# In a rectangle of 6 cm by 4 cm.
+HOLES: list[tuple[list[dict[str, Any]], str, str]] = [
+    ([circle(1, 1, 2)], "part.holes", "hole 0 is 'beyond the outline'"),  # it touches two edges
+    ([circle(7, 1, 0.5)], "part.holes", "beyond the outline"),
+    ([circle(3, 2, 20)], "part.holes", "beyond the outline"),
+    ([polygon((1, 1), (7, 1), (1, 2))], "part.holes", "beyond the outline"),
+    ([polygon((7, 1), (8, 1), (8, 2))], "part.holes", "beyond the outline"),
+    ([polygon((-1, -1), (9, -1), (9, 9), (-1, 9))], "part.holes", "beyond the outline"),
+    ([circle(2, 2, 1), circle(2.9, 2, 1)], "part.holes", "hole 1 is 'one that meets hole 0'"),
+    ([circle(2, 2, 3), circle(2, 2, 1)], "part.holes", "meets hole 0"),
+    ([circle(2, 2, 3), polygon((1.8, 1.8), (2.2, 1.8), (2, 2.2))], "part.holes", "meets hole 0"),
+    ([polygon((1, 1), (5, 1), (5, 3), (1, 3)), circle(2, 2, 0.1)], "part.holes", "meets hole 0"),
+    (
+        [polygon((1, 1), (3, 1), (2, 3)), polygon((2, 0.5), (2.2, 0.5), (2.2, 3.5))],
+        "part.holes",
+        "meets hole 0",
+    ),
+    (
+        [polygon((1, 1), (5, 1), (3, 3)), polygon((3, 1.2), (3.2, 1.2), (3, 1.5))],
+        "part.holes",
+        "meets hole 0",
+    ),
+    (
+        [polygon((3, 1.2), (3.2, 1.2), (3, 1.5)), polygon((1, 1), (5, 1), (3, 3))],
+        "part.holes",
+        "meets hole 0",
+    ),
+    ([polygon((1, 1), (1, 2), (2, 1))], "part.holes", "hole 0: the order of the vertices is 'clockwise'"),
+    ([polygon((1, 1), (2, 2), (2, 1), (1, 2))], "part.holes", "hole 0: the boundary"),
+    ([circle(1, 1, 0)], "part.holes[0].diameter", "above 0"),
+    ([circle(1, 1, 1) | {"depth": "1 mm"}], "part.holes[0].depth", "center, diameter, vertices"),
+    ([{"diameter": "1 cm"}], "part.holes[0]", "diameter without center"),
+    ([polygon((1, 1), (2, 1), (2, 2)) | circle(1, 1, 1)], "part.holes[0]", "not both"),
+    ([{"center": {"x": "1 cm", "y": "1 cm"}}], "part.holes[0]", "neither diameter nor vertices"),
+    (
+        [polygon((1, 1), (2, 1), (2, 2)) | {"center": {"x": "1 cm", "y": "1 cm"}}],
+        "part.holes[0]",
+        "without diameter",
+    ),
+    ([{"vertices": [["1 cm", "1 kg"]]}], "part.holes[0].vertices[0].y", "dimension is wrong"),
+]
+
+
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [
         ({"part/vertices/2": ["6 cm"]}, "part.vertices[2]", "number of entries is 1; allowed: at least 2"),
         ({"part/vertices/2/1": "4 s"}, "part.vertices[2].y", "not known"),
         ({"part/vertices/2": "6 cm"}, "part.vertices[2]", "a list"),
-        ({"part/vertices/2": ["1 cm", "1 cm"]}, "part.vertices", "inward"),
+        ({"part/vertices/2": ["1 cm", "-1 cm"]}, "part.vertices", "vertices 0 and 2 meet"),
+        ({"part/vertices/2": ["0 cm", "-4 cm"]}, "part.vertices", "at vertex 3"),  # there and back
+        (
+            {"part/vertices/1": ["6 cm", "-1e-13 cm"], "part/vertices/2": ["9 cm", "0 cm"]},
+            "part.vertices",
+            "vertex 1 is 'almost on the line",
+        ),
+        *(({"part/holes": holes}, key, words) for holes, key, words in HOLES),
         ({"part/vertices": CLOCKWISE}, "part.vertices", "reverse the list"),
         (
             {"part/vertices": SKEWED, "part/mass/points": GONE},
@@ -424,41 +481,43 @@ def test_an_example_is_in_the_unit_of_the_scene() -> None:
         ls.feed(ls.load(plate() | {"goal": {"oriented_beyond": {"x": "300 mm", "side": 1}}}))
 
 
-def test_a_concave_part_is_told_its_hull_ready_to_paste() -> None:
+def test_a_concave_part_whose_mass_is_measured_is_told_its_hull_ready_to_paste() -> None:
+    tree = l_shaped()
+    tree["part"]["vertices"].reverse()
+    centre = {"side": 0, "along": "30 mm", "above": "30 mm"}
+    tree["part"]["mass"] = {"center": centre, "radius_of_gyration": "29 mm"}
+    tree["tolerance"] = {}
     with pytest.raises(SceneError) as caught:
-        ls.load(l_shaped())
+        ls.load(tree)
     assert "convex hull" in caught.value.remedy
+    assert "plate_density" in caught.value.remedy
     pasted = caught.value.remedy.partition("vertices = ")[2].partition("]]")[0] + "]]"
     corners = tomllib.loads(f"vertices = {pasted}")["vertices"]
     # all but the inward corner (20, 20), counterclockwise
     outer = {(f"{x} mm", f"{y} mm") for x, y in L_SHAPED if (x, y) != (20, 20)}
     assert {tuple(pair) for pair in corners} == outer
-    tree = l_shaped()
-    centre = {"side": 0, "along": "30 mm", "above": "30 mm"}
-    tree["part"] = {"vertices": corners, "mass": {"center": centre, "radius_of_gyration": "29 mm"}}
-    tree["tolerance"] = {}
+    tree["part"]["vertices"] = corners
     assert not [error for error in examined(tree)[0] if error.key == "part.vertices"]
 
 
 def test_the_worked_example_of_the_page_is_the_sum_of_its_pieces() -> None:
-    """Two rectangles and a point: areas, centres, and moments by the parallel-axis rule, in mm and g."""
+    """Two rectangles, a disc less and a point: areas, centres, and moments by the parallel-axis rule, in mm and g."""
     page = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
-    example = page.partition("**A concave part**")[2]
-    lines = re.findall(r"`((?:vertices|center|radius_of_gyration) = .*?)`", example)
-    tree = plate() | {"tolerance": {}}
-    tree["part"] = tomllib.loads(lines[0]) | {"mass": tomllib.loads("\n".join(lines[1:3]))}
-    scene = ls.load(tree)
-    assert scene.sides.rests.all()
+    example = page.partition("**A concave part, a part with holes.**")[2]
+    scene = ls.load(
+        plate() | tomllib.loads(example.partition("```toml")[2].partition("```")[0]) | {"tolerance": {}}
+    )
+    assert scene.sides.rests.tolist() == [True] * 5
     by_area = 7850e-9 * 2.0 * 1e3  # g/mm^2
-    pieces = [(80 * 40, 40, 20, 80**2 + 40**2), (40 * 40, 20, 60, 40**2 + 40**2)]
-    parts = [(area * by_area, x, y, squares / 12) for area, x, y, squares in pieces] + [(18.0, 60, 20, 0.0)]
-    told = (2, (33.333, 33.333), 31.269), (3, scene.centre, scene.radius_of_gyration)
-    for count, centre, radius in told:
-        mass, x, y, own = np.array(parts[:count]).T
-        cx, cy = (mass @ x) / mass.sum(), (mass @ y) / mass.sum()
-        assert (cx, cy) == pytest.approx(centre, abs=5e-4)
-        rho = math.sqrt(mass @ (own + (x - cx) ** 2 + (y - cy) ** 2) / mass.sum())
-        assert rho == pytest.approx(radius, abs=5e-4)
+    pieces = [(80 * 40, 40, 20, (80**2 + 40**2) / 12), (40 * 40, 20, 60, (40**2 + 40**2) / 12)]
+    pieces.append((-math.pi * 5**2, 20, 60, 5**2 / 2))
+    parts = [(area * by_area, x, y, square) for area, x, y, square in pieces] + [(18.0, 60, 20, 0.0)]
+    mass, x, y, own = np.array(parts).T
+    cx, cy = (mass @ x) / mass.sum(), (mass @ y) / mass.sum()
+    assert scene.centre == pytest.approx((cx, cy), rel=1e-14)
+    rho = math.sqrt(mass @ (own + (x - cx) ** 2 + (y - cy) ** 2) / mass.sum())
+    assert scene.radius_of_gyration == pytest.approx(rho, rel=1e-14)
+    assert f"({cx:.3f}, {cy:.3f}) mm, and its radius of gyration is {rho:.3f} mm" in example
 
 
 @pytest.mark.parametrize(
@@ -520,5 +579,5 @@ def test_vertices_in_the_wrong_order_hide_nothing() -> None:
     rest = ["gravity.tilt", 'tolerance."throw.sped"', "throw.speed"]
     tree["part"]["vertices"].reverse()
     assert sorted(keys(tree)) == sorted(["part.vertices", *rest])
-    tree["part"]["vertices"] = l_shaped()["part"]["vertices"]
+    tree["part"]["vertices"][:2] = tree["part"]["vertices"][1::-1]  # the boundary crosses itself
     assert sorted(keys(tree)) == sorted(["part.vertices", *rest])

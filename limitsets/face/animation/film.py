@@ -365,7 +365,7 @@ def cut(
             [at + share * leg.seconds / pace.unit for at, (leg, share) in zip(clock, cuts, strict=True)]
         ),
         poses=np.concatenate([leg.pose(share) for leg, share in cuts])[:, None, :],
-        outlines=(about_centre(scene),),
+        outlines=(about_centre(scene, hull=False),),
         labels=(labels_of(scene),),
         arm=np.concatenate([leg.arm(share) for leg, share in cuts]),
         surface=(scene.surface_height, scene.arm_length if end is None else end),

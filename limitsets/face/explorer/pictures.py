@@ -88,7 +88,7 @@ class PartPicture:
             (*(scene.value(f"part.mass.points[{k}].{axis}") for axis in "xy"), _short(point["mass"]))
             for k, point in enumerate(scene.text["part"]["mass"].get("points", ()))
         ]
-        self.canvas.put("outline", scene.vertices.tolist())
+        self.canvas.put("outline", scene.outline.tolist())
         self.canvas.put("sides", [(label.x + cx, label.y + cy, label.word) for label in labels_of(scene)])
         self.canvas.put("centre of mass", [(cx, cy)])
         self.canvas.put("added masses", masses)

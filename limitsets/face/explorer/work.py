@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from limitsets.base import LimitsetsError, SceneError
-from limitsets.feeder.geometry import convex_polygon
-from limitsets.feeder.geometry.polygon import above_side, plate_with_points
+from limitsets.feeder.geometry import convex_polygon, plate_with_points
+from limitsets.feeder.geometry.polygon import above_side
 from limitsets.feeder.scene import Scene, load
 from limitsets.feeder.scene.units import written
 

@@ -29,11 +29,12 @@ if TYPE_CHECKING:
     from limitsets.face.plot.parameter_regions import regions
     from limitsets.face.plot.parts import flight, part
     from limitsets.face.plot.policies import policy
+    from limitsets.face.plot.tipping import resting_sides
 
 __all__ = [
     "assembly", "atlas", "atlas_surface", "audit", "basins", "bifurcation", "counterexample", "design", "feeding",
     "fit_residuals", "flight", "limit_set", "map", "margin_curve", "morse", "noise_arrivals", "noise_density",
-    "noise_levels", "part", "policy", "regions", "robust_design", "tolerance_box", "tornado", "tray",
+    "noise_levels", "part", "policy", "regions", "resting_sides", "robust_design", "tolerance_box", "tornado", "tray",
 ]  # fmt: skip
 
 _FILES = {
@@ -49,6 +50,7 @@ _FILES = {
     "parameter_regions": ("regions",),
     "parts": ("flight", "part"),
     "policies": ("policy",),
+    "tipping": ("resting_sides",),
 }
 
 

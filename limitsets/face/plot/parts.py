@@ -9,12 +9,21 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Polygon
+from matplotlib.patches import Circle, Patch, Polygon
 
 from limitsets.base import AnswerError, arguments_checked
 from limitsets.base.arrays import Array
 from limitsets.face.plot import style
-from limitsets.face.plot.throwing import Motion, Throw, angle_on_side, motion, outline, throws_of, turned
+from limitsets.face.plot.throwing import (
+    Motion,
+    Throw,
+    about_centre,
+    angle_on_side,
+    motion,
+    outline,
+    throws_of,
+    turned,
+)
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.scene import Scene, Sketch
 from limitsets.feeder.thrower import trace
@@ -25,6 +34,7 @@ MASS: dict[str, Any] = {"marker": "D", "ms": 8, "color": style.FLIP, "ls": ""}
 FOOT: dict[str, Any] = {"color": style.JOG, "lw": 1.3, "ls": (0, (4, 2))}
 OUTLINE: dict[str, Any] = {"facecolor": "#e8eef4", "edgecolor": style.INK, "lw": 1.8}
 SOLID: dict[str, Any] = {"facecolor": "#d9d9d9", "hatch": "////", "edgecolor": "#9a9a9a", "lw": 0}
+HULL: dict[str, Any] = {"color": style.INK, "lw": 1.2, "ls": (0, (4, 3))}
 TIPS: dict[str, Any] = {"color": style.FLIP, "lw": 3.0, "ls": (0, (1.5, 1))}
 
 MIDDLE: dict[str, Any] = {"ha": "center", "va": "center"}
@@ -64,7 +74,7 @@ def part(scene: Scene) -> Figure:
     axes.set(aspect="equal", xlim=ends, ylim=(-0.28 * size, float(corners[:, 1].max()) + 0.15 * size))
     axes.fill_between(ends, 0.0, -0.035 * size, gid="arm", **SOLID)
     axes.axhline(0.0, color=style.INK, lw=2.0, zorder=1)
-    axes.add_patch(Polygon(corners, closed=True, zorder=2, gid="part", **OUTLINE))
+    plate = _plate(axes, scene)
     resting = scene.sides.rests.tolist()
     _sides(axes, scene, corners, resting)
     _centre(axes, scene, size)
@@ -75,9 +85,32 @@ def part(scene: Scene) -> Figure:
         style.key("centre of mass", **CENTRE),
         style.key("a along side 0 from its left end, d above it", **FOOT),
         style.key("mass added", **MASS) if masses else None,
+        style.key("convex hull, on which it rests", **HULL) if plate else None,
         None if all(resting) else style.key("the part cannot rest on this side", **TIPS),
     ]
     return style.finished(figure, f"{scene.name}: the part, lying on side 0", handles)
+
+
+def _plate(axes: Axes, scene: Scene) -> bool:
+    """Draw the outline with its holes, and the hull where it is another polygon; say whether it is."""
+
+    def placed(points: Any) -> Array:
+        about = np.asarray(points, dtype=np.float64) - np.asarray(scene.centre)
+        return turned(about, angle_on_side(scene, 0)) + _centre_at(scene)
+
+    axes.add_patch(Polygon(placed(scene.outline), closed=True, zorder=2, gid="part", **OUTLINE))
+    for hole in scene.holes:
+        look: dict[str, Any] = {"zorder": 2.5, "gid": "hole"} | OUTLINE | {"facecolor": "white", "lw": 1.2}
+        if hole.centre is None:
+            axes.add_patch(Polygon(placed(hole.vertices), closed=True, **look))
+        else:
+            axes.add_patch(Circle(tuple(placed([hole.centre])[0]), 0.5 * float(hole.diameter), **look))
+    notched = len(scene.outline) > len(scene.vertices)
+    if notched:
+        axes.add_patch(
+            Polygon(placed(scene.vertices), closed=True, fill=False, zorder=1.5, gid="hull", **HULL)
+        )
+    return notched
 
 
 def refused_part(sketch: Sketch, why: str) -> Figure:
@@ -242,9 +275,9 @@ def flight(scene: Scene, x: float, side: int) -> Figure:
     if not throws:
         raise _not_thrown(scene, x, side)
     throw, moves = throws[0], motion(scene, throws[0])
-    air = _placed(scene, side, moves.flight(np.linspace(0.0, 1.0, SHOWN + 2)))
+    air = _placed(scene, moves.flight(np.linspace(0.0, 1.0, SHOWN + 2)))
     stops = [0.0, 1.0] if moves.turning.drawn else np.linspace(0.0, 1.0, SHOWN + 1)
-    rolled = _placed(scene, side, moves.turning.pose(np.array(stops)))
+    rolled = _placed(scene, moves.turning.pose(np.array(stops)))
     everything = np.concatenate([*air, *rolled])
     lo, hi = float(everything[:, 0].min()) - 1.0, float(everything[:, 0].max()) + 1.0
     bottom, top = min(0.0, scene.surface_height), float(everything[:, 1].max())
@@ -297,10 +330,10 @@ def _canvas(width: float, height: float) -> tuple[Figure, list[Axes]]:
     return style.canvas(9.0, 2 * max(1.6, 8.2 * height / width) + 1.9, 2, 1, sharex=True, sharey=True)
 
 
-def _placed(scene: Scene, side: int, poses: Array) -> list[Array]:
-    """Outlines in some poses; the left end of the side of the throw comes first."""
-    shape, start = outline(scene, side), angle_on_side(scene, side)
-    return [np.array([x, y]) + turned(shape, angle - start) for x, y, angle in poses.tolist()]
+def _placed(scene: Scene, poses: Array) -> list[Array]:
+    """Outlines in some poses."""
+    shape = about_centre(scene, hull=False)
+    return [np.array([x, y]) + turned(shape, angle) for x, y, angle in poses.tolist()]
 
 
 def _arm(axes: Axes, scene: Scene, lo: float, hi: float) -> None:

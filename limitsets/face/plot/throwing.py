@@ -26,9 +26,9 @@ from limitsets.systems.maps import codes
 # A pose is the centre of mass (x, y) and the angle by which the part has turned from the frame of the scene's vertices.
 
 
-def about_centre(scene: Scene) -> Array:
-    """Vertices about the centre of mass, in the frame in which the scene gives them; shape (n, 2)."""
-    about: Array = scene.vertices - np.asarray(scene.centre)
+def about_centre(scene: Scene, *, hull: bool = True) -> Array:
+    """Vertices of the hull, or of the part itself, about the centre of mass, as the scene gives them; shape (n, 2)."""
+    about: Array = (scene.vertices if hull else scene.outline) - np.asarray(scene.centre)
     return about
 
 

@@ -8,16 +8,21 @@ Sides are counted in flip order: with vertices ``P0 .. P(n-1)`` counterclockwise
 edge P(n-1)-P0, side 2 the edge P(n-2)-P(n-1), and so on: a flip about the left vertex takes side i to side i + 1.
 """
 
+from limitsets.feeder.geometry.mass import Hole, Mass, largest_radius, mass_of, plate_with_points
+from limitsets.feeder.geometry.outline import (
+    checked_holes,
+    cross,
+    hull_corners,
+    hull_polygon,
+    outline_polygon,
+)
 from limitsets.feeder.geometry.polygon import (
-    Mass,
     OnSide,
     RestingSides,
     convex_polygon,
     heights_inside,
     is_convex,
     is_triangle,
-    mass_of,
-    plate_with_points,
     require_inside,
     require_rest,
     rest_of,
@@ -28,14 +33,21 @@ from limitsets.feeder.geometry.polygon import (
 )
 
 __all__ = [
+    "Hole",
     "Mass",
     "OnSide",
     "RestingSides",
+    "checked_holes",
     "convex_polygon",
+    "cross",
     "heights_inside",
+    "hull_corners",
+    "hull_polygon",
     "is_convex",
     "is_triangle",
+    "largest_radius",
     "mass_of",
+    "outline_polygon",
     "plate_with_points",
     "require_inside",
     "require_rest",

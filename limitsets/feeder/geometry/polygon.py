@@ -1,4 +1,4 @@
-"""The shape of a part: its convex polygon, its mass, and the sides it can rest on.
+"""The shape of a part: its convex polygon, and the sides it can rest on.
 
 Coordinates enter only as differences from a vertex of the part, so that where the origin lies costs no digits.
 """
@@ -6,11 +6,9 @@ Coordinates enter only as differences from a vertex of the part, so that where t
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import partial, reduce
-from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -22,7 +20,7 @@ Scalar: TypeAlias = Any
 """A float, or anything with ``+ - * /``: an mpmath number, a ball of python-flint, an interval."""
 Vector: TypeAlias = tuple[Scalar, Scalar]
 
-_FLAT = 1e-12
+FLAT = 1e-12
 """Sine of the smallest corner: below it rounding decides on which side of an edge a vertex lies."""
 _MOST_VERTICES = 1000
 
@@ -136,7 +134,7 @@ def is_triangle(lengths: Sequence[Scalar]) -> Any:
     (np.True_, np.False_)
     """
     c, b, a = np.sort(np.array(lengths, dtype=np.float64), axis=0)
-    return c - (a - b) > _FLAT * a
+    return c - (a - b) > FLAT * a
 
 
 def convex_polygon(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
@@ -163,6 +161,20 @@ def convex_polygon(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
     >>> convex_polygon([(0, 0), (2, 0), (2, 1), (0, 1)]).shape
     (4, 2)
     """
+    points = checked_points(vertices)
+    sine, _, rounds = turning(points)
+    _refuse_shape(sine, int(rounds))
+    return points
+
+
+def checked_points(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Check that vertices are a table of finite numbers, and that no two are the same.
+
+    Raises
+    ------
+    GeometryError
+        With what is wrong.
+    """
     points = np.asarray(vertices, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2 or not 3 <= len(points) <= _MOST_VERTICES:
         shape = "x".join(str(extent) for extent in points.shape)
@@ -183,8 +195,6 @@ def convex_polygon(vertices: npt.ArrayLike) -> npt.NDArray[np.float64]:
             "vertices that all differ",
             f"it repeats vertex {first}; leave one of them out (the last vertex is joined to the first by itself)",
         )
-    sine, rounds = _turning(points)
-    _refuse_shape(sine, int(rounds))
     return points
 
 
@@ -196,18 +206,18 @@ def is_convex(points: npt.NDArray[np.float64]) -> Any:
     >>> is_convex(np.array([[(0, 0), (2, 0), (2, 1)], [(0, 0), (2, 1), (2, 0)]], dtype=float))
     array([ True, False])
     """
-    sine, rounds = _turning(points)
-    return ~_repeated(points).any(axis=(-2, -1)) & (sine > _FLAT).all(axis=-1) & (rounds == 1)
+    sine, _, rounds = turning(points)
+    return ~_repeated(points).any(axis=(-2, -1)) & (sine > FLAT).all(axis=-1) & (rounds == 1)
 
 
-def _turning(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Return the sine of the turn at each vertex, and how often the boundary turns round."""
+def turning(points: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], ...]:
+    """Return sine and cosine of the turn at each vertex, and how often the boundary turns round."""
     edges = np.roll(points, -1, axis=-2) - points
     unit = edges / np.hypot(edges[..., 0], edges[..., 1])[..., None]
     before = np.roll(unit, 1, axis=-2)
     sine = before[..., 0] * unit[..., 1] - before[..., 1] * unit[..., 0]
-    turns = np.arctan2(sine, (before * unit).sum(axis=-1))
-    return sine, np.rint(turns.sum(axis=-1) / (2 * math.pi))
+    cosine = (before * unit).sum(axis=-1)
+    return sine, cosine, np.rint(np.arctan2(sine, cosine).sum(axis=-1) / (2 * math.pi))
 
 
 def _repeated(points: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
@@ -215,12 +225,12 @@ def _repeated(points: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
     relative = points - points[..., :1, :]
     size = np.abs(relative).max(axis=(-2, -1))
     gap = np.abs(relative[..., :, None, :] - relative[..., None, :, :]).max(axis=-1)
-    return np.triu(gap <= _FLAT * size[..., None, None], k=1)
+    return np.triu(gap <= FLAT * size[..., None, None], k=1)
 
 
 def _refuse_shape(sine: npt.NDArray[np.float64], rounds: int) -> None:
     """Refuse what is not convex and counterclockwise; the boundary of such a part turns left, once around."""
-    flat = np.flatnonzero(np.abs(sine) <= _FLAT)
+    flat = np.flatnonzero(np.abs(sine) <= FLAT)
     left = int((sine > 0).sum())
     if len(flat):
         raise GeometryError(
@@ -298,122 +308,6 @@ def require_inside(vertices: npt.NDArray[np.float64], point: Sequence[float], th
             "a point of the part",
             f"it lies outside, {-height:.6g} [length] beyond side {side}",
         )
-
-
-# ----------------------------------------------------------------
-# Mass, centre of mass and radius of gyration of a plate with point masses on it.
-
-
-@dataclass(frozen=True)
-class Mass:
-    """What the throw needs to know of a part's mass.
-
-    Parameters
-    ----------
-    mass : scalar
-        Total mass [unit of density times length squared].
-    centre : pair of scalars
-        Centre of mass in the frame of the vertices [length].
-    radius_of_gyration : scalar
-        About the centre of mass [length].
-    """
-
-    mass: Scalar
-    centre: Vector
-    radius_of_gyration: Scalar
-
-
-def mass_of(
-    vertices: Sequence[Vector],
-    density: Scalar,
-    points: Sequence[tuple[Scalar, Scalar, Scalar]] = (),
-    sqrt: Callable[[Scalar], Scalar] = math.sqrt,
-) -> Mass:
-    """Add up a convex plate and point masses, without any check.
-
-    Parameters
-    ----------
-    vertices : sequence of pairs
-        Counterclockwise [length].
-    density : scalar
-        Mass per area of the plate.
-    points : sequence of (x, y, mass)
-        In the frame of the vertices.
-    sqrt : callable
-        Square root for these scalars.
-
-    Returns
-    -------
-    Mass
-
-    Notes
-    -----
-    The plate is a fan of triangles at the first vertex.  Each triangle has area (u x v)/2, its centre at (u + v)/3 and
-    the polar moment m (u^2 + v^2 + (u - v)^2)/36 about that centre.  All summands are positive: nothing cancels.
-
-    Examples
-    --------
-    >>> mass_of([(0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (0.0, 2.0)], 1.0).centre
-    (1.5, 1.0)
-    """
-    origin_x, origin_y = vertices[0]
-    arms = [(x - origin_x, y - origin_y) for x, y in vertices[1:]]
-    pieces: list[tuple[Scalar, Scalar, Scalar, Scalar]] = []
-    for (ux, uy), (vx, vy) in pairwise(arms):
-        mass = density * (ux * vy - uy * vx) / 2
-        across_x, across_y = ux - vx, uy - vy
-        squares = ux * ux + uy * uy + vx * vx + vy * vy + across_x * across_x + across_y * across_y
-        pieces.append((mass, (ux + vx) / 3, (uy + vy) / 3, mass * squares / 36))
-    pieces += [(mass, x - origin_x, y - origin_y, 0 * mass) for x, y, mass in points]
-    total = _sum([mass for mass, _, _, _ in pieces])
-    x = _sum([mass * px for mass, px, _, _ in pieces]) / total
-    y = _sum([mass * py for mass, _, py, _ in pieces]) / total
-    moment = _sum([own + mass * ((px - x) * (px - x) + (py - y) * (py - y)) for mass, px, py, own in pieces])
-    return Mass(total, (x + origin_x, y + origin_y), sqrt(moment / total))
-
-
-_sum = partial(reduce, operator.add)
-
-
-def plate_with_points(
-    vertices: npt.NDArray[np.float64],
-    density: float,
-    points: Sequence[tuple[float, float, float]] = (),
-) -> Mass:
-    """Check and add up a plate and the point masses on it.
-
-    Parameters
-    ----------
-    vertices : ndarray, shape (n, 2)
-        A checked polygon [length].
-    density : float
-        Mass per area [mass/length^2].
-    points : sequence of (x, y, mass)
-        Point masses inside the part or on its boundary.
-
-    Returns
-    -------
-    Mass
-
-    Raises
-    ------
-    GeometryError
-        A density or mass that is not above 0, or a point outside the part.
-
-    Examples
-    --------
-    >>> lead = plate_with_points(np.array([(0, 0), (6, 0), (0, 6)]), 1.0, [(5.0, 0.5, 9.0)])
-    >>> lead.mass, lead.centre
-    (27.0, (3.0, 1.5))
-    """
-    if not 0 < density < math.inf:
-        raise GeometryError("the density of the plate", density, "a mass per area above 0", "correct it")
-    for index, (x, y, mass) in enumerate(points):
-        if not 0 < mass < math.inf:
-            raise GeometryError(f"the mass of point {index}", mass, "a mass above 0", "correct it")
-        require_inside(vertices, (x, y), f"point mass {index}")
-    corners: list[Vector] = [(x, y) for x, y in np.asarray(vertices, dtype=np.float64).tolist()]
-    return mass_of(corners, density, points)
 
 
 # ----------------------------------------------------------------

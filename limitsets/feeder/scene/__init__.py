@@ -7,7 +7,7 @@ what to do.  Lengths stay in the scene's own unit, that of the arm's length.
 """
 
 from limitsets.feeder.scene.arrays import ThrowStack, repeated, throw_stack
-from limitsets.feeder.scene.checking import doubts, examined, new_scene
+from limitsets.feeder.scene.checking import doubts, examined
 from limitsets.feeder.scene.facts import NOT_TIPPING, TIPPING, Deviation, Effects, Scatter, World
 from limitsets.feeder.scene.laid import LaidLike, laid_goal, laid_goals, read_laid
 from limitsets.feeder.scene.left_out import WITHOUT_SCATTER, Model
@@ -15,6 +15,7 @@ from limitsets.feeder.scene.numbers import Numbers
 from limitsets.feeder.scene.quantities import NAMES, deviation
 from limitsets.feeder.scene.reading import Sketch, dump, load, load_to_analyse, scenes, sketch
 from limitsets.feeder.scene.scene import Scene, in_unit_of, in_units_of, require_rests, unit_of
+from limitsets.feeder.scene.starting import new_scene
 from limitsets.feeder.scene.surroundings import (
     BeyondSensor,
     Cavity,

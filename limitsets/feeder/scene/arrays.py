@@ -16,9 +16,18 @@ import numpy as np
 import numpy.typing as npt
 
 from limitsets.base import SceneError
-from limitsets.feeder.geometry import Mass, OnSide, heights_inside, is_convex, is_triangle, triangle_of
+from limitsets.feeder.geometry import (
+    Hole,
+    Mass,
+    OnSide,
+    heights_inside,
+    is_convex,
+    is_triangle,
+    largest_radius,
+    triangle_of,
+)
 from limitsets.feeder.geometry.polygon import Scalar, Vector
-from limitsets.feeder.scene.numbers import SIGNED, SIGNED_POINT, Unchecked
+from limitsets.feeder.scene.numbers import ROUNDING, SIGNED, SIGNED_POINT, Unchecked, corners_of
 from limitsets.feeder.scene.quantities import LEAST, replaced
 from limitsets.feeder.scene.scene import Scene, resting_places
 from limitsets.feeder.scene.surroundings import Cavity, Tray, heights_over_sides
@@ -91,7 +100,12 @@ def throw_stack(scene: Scene, values: Mapping[str, npt.ArrayLike]) -> ThrowStack
     count = max(each.size for each in arrays.values()) if arrays else 1
     with np.errstate(all="ignore"):  # where there is no such scene; those points are flagged
         reader = _Arrays(tree, scene.unit, arrays, count)
+        reader.corners = corners_of(scene.text["part"])
         numbers = reader.numbers(scene.goal, scene.cavity, scene.tray)
+    shaped = scene.holes or len(scene.outline) > len(scene.vertices)
+    if shaped and any("vertices" in name for name in arrays):
+        rows = zip(*arrays.values(), strict=True)
+        reader.require([_is_scene(scene, dict(zip(arrays, row, strict=True))) for row in rows])
     possible = reader.possible
 
     def kept(array: Array, present: Any) -> Array:
@@ -102,6 +116,15 @@ def throw_stack(scene: Scene, values: Mapping[str, npt.ArrayLike]) -> ThrowStack
     params = repeated(own, count)._replace(**fields)
     lo, hi = resting_places(params.a, params.arm_length[:, None])
     return ThrowStack(params, lo, hi, params.a.copy(), possible)
+
+
+def _is_scene(scene: Scene, values: Mapping[str, Any]) -> bool:
+    """Whether a scene has such values: outlines that cross themselves or a hole have too many ways to do so."""
+    try:
+        scene.with_values(values)
+    except SceneError:
+        return False
+    return True
 
 
 def repeated(params: Any, count: int) -> Any:
@@ -138,6 +161,12 @@ def _one_by_one(function: Callable[..., float], entries: int) -> Callable[..., A
     return lambda *numbers: np.asarray(apply(*numbers), dtype=np.float64)
 
 
+def _stacked(points: Sequence[Vector]) -> Array:
+    """Put points with entries of shape (...) into an array of shape (..., n, 2)."""
+    flat = np.broadcast_arrays(*(entry for point in points for entry in point))
+    return np.stack(flat, axis=-1).reshape(*np.shape(flat[0]), len(points), 2)
+
+
 class _Arrays(Unchecked):
     """The numbers of one scene, some of them arrays."""
 
@@ -170,10 +199,10 @@ class _Arrays(Unchecked):
         self.require(is_triangle(given))
         return triangle_of(given, np.sqrt, lambda three: list(np.sort(np.array(three), axis=0)))
 
-    def polygon(self, vertices: list[Vector]) -> Sequence[Vector]:
-        """Return the vertices of a convex polygon."""
-        flat = np.broadcast_arrays(*(entry for vertex in vertices for entry in vertex))
-        points = np.stack(flat, axis=-1).reshape(*np.shape(flat[0]), len(vertices), 2)
+    def polygon(self, outline: Sequence[Vector]) -> Sequence[Vector]:
+        """Return the corners of the convex hull of an outline."""
+        vertices = super().polygon(outline)
+        points = _stacked(vertices)
         self.require((np.ptp(points, axis=-2).max(axis=-1) >= LEAST) & is_convex(points))
         return vertices
 
@@ -183,11 +212,13 @@ class _Arrays(Unchecked):
         self._require_inside(vertices, centre.in_frame(vertices, np.sqrt))
         return centre
 
-    def plate(self, vertices: Sequence[Vector], density: Scalar, points: list[Any]) -> Mass:
-        """Add up a plate and the point masses on it."""
+    def plate(
+        self, outline: Sequence[Vector], holes: tuple[Hole, ...], density: Scalar, points: list[Any]
+    ) -> Mass:
+        """Add up a plate with holes and the point masses on it."""
         for x, y, _ in points:
-            self._require_inside(vertices, (x, y))
-        return super().plate(vertices, density, points)
+            self._require_inside([outline[corner] for corner in self.corners], (x, y))
+        return super().plate(outline, holes, density, points)
 
     def _require_inside(self, vertices: Sequence[Vector], point: Vector) -> None:
         heights, slack = heights_inside(vertices, point, np.sqrt)
@@ -205,6 +236,10 @@ class _Arrays(Unchecked):
         self.require(((d > 0) & (a > 0) & (a < length) & on_arm).all(axis=-1))
         if "gravity" in self.tree:
             self.require(self.gravity > 0)
+        vertices, centre, _, radius, *_ = self.shape
+        if isinstance(centre, OnSide):
+            middle = _stacked([centre.in_frame(vertices, np.sqrt)])[..., 0, :]
+            self.require(radius <= largest_radius(_stacked(vertices), middle) * (1 + ROUNDING))
         kappa = self.kappa
         if "speed" in self.tree["throw"]:
             self.require((kappa >= LEAST) & (kappa <= 1 / LEAST))

@@ -1,11 +1,9 @@
-"""All that is wrong with a scene, and what is improbable, at once; and a scene to start from."""
+"""All that is wrong with a scene, and what is improbable, at once."""
 
 from __future__ import annotations
 
 import copy
-import json
 import math
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -13,14 +11,14 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from limitsets.base import SceneError, TipsError
-from limitsets.feeder.geometry.polygon import mass_of
+from limitsets.feeder.geometry import mass_of
 from limitsets.feeder.scene.facts import TIPPING, Scatter
 from limitsets.feeder.scene.numbers import hull_of
 from limitsets.feeder.scene.quantities import Words, at, find, key_words
-from limitsets.feeder.scene.reading import can_name, load, replace_file, structure_of
+from limitsets.feeder.scene.reading import structure_of
 from limitsets.feeder.scene.scene import Scene, turns
-from limitsets.feeder.scene.schema import ByName, Key, Section, Several, schema
-from limitsets.feeder.scene.units import UNITS, convert, density_dimension, exact_factor, parse
+from limitsets.feeder.scene.starting import example_at
+from limitsets.feeder.scene.units import convert, density_dimension, exact_factor, parse
 from limitsets.feeder.scene.validation import Tree, plain, refusals, respelled
 
 # ----------------------------------------------------------------
@@ -101,7 +99,7 @@ def _rows(scene: Scene) -> Iterator[Row]:
         said = "{} times the way from the centre of mass to the farthest vertex"
         yield key, radius, 0.02, 1.0, said, "0.2 to 0.7 times"
     else:
-        yield from _rows_of_plate(part["mass"], (scene.vertices * metre).tolist(), size * metre)
+        yield from _rows_of_plate(scene, part["mass"], size)
     if scene.gravity is not None:
         (key,), said = text["gravity"], "gravity in the plane of the motion is {} m/s^2"
         yield f"gravity.{key}", scene.gravity * metre, 0.3, 11.0, said, "0.5 to 9.81 m/s^2"
@@ -150,9 +148,9 @@ def _in_words(scene: Scene, word: str, turned: float) -> float:
     return math.degrees(math.sqrt(scene.gravity / kappa))
 
 
-def _rows_of_plate(mass: Mapping[str, Any], vertices: list[Any], size: float) -> Iterator[Row]:
-    """Give what is measured of a plate with point masses; vertices and size in metres."""
-    text, thickness = mass["plate_density"], 1.0
+def _rows_of_plate(scene: Scene, mass: Mapping[str, Any], size: float) -> Iterator[Row]:
+    """Give what is measured of a plate with point masses; `size` is the part's longest side."""
+    text, thickness, metre = mass["plate_density"], 1.0, float(exact_factor(scene.unit, "m"))
     volume = density_dimension(text) == "mass per volume"
     unit = "kg/m^3" if volume else "kg/m^2"
     density = convert(parse(text, density_dimension(text)), unit)
@@ -163,171 +161,12 @@ def _rows_of_plate(mass: Mapping[str, Any], vertices: list[Any], size: float) ->
             convert(parse(mass["plate_thickness"], "length"), "m"),
             "{} times the part's longest side",
         )
-        yield "part.mass.plate_thickness", thickness / size, 0.0, 0.5, said, "below 0.2 times"
-    plate = mass_of(vertices, density * thickness).mass
+        yield "part.mass.plate_thickness", thickness / (size * metre), 0.0, 0.5, said, "below 0.2 times"
+    plate = mass_of(scene.outline.tolist(), density * thickness * metre**2, holes=scene.holes).mass
     said = f"{{}} times the plate, which weighs {1000.0 * plate:.3g} g"
     for k, point in enumerate(mass.get("points", ())):
         share = convert(parse(point["mass"], "mass"), "kg") / plate
         yield f"part.mass.points[{k}].mass", share, 0.0, 30.0, said, "up to a few times it"
-
-
-# ----------------------------------------------------------------
-# A scene to start from: every key that a scene may have, with what it means, in the words of the schema.
-
-
-# The scene that it is, as it stands, under another name.
-LIKE = "paper-designed"
-
-# Tables below the first level with a heading of their own.
-HEADED = ("part.mass",)
-
-WIDTH = 100
-
-# Lengths and accelerations of that scene, as its text has them.
-_LENGTHS = re.compile(r'"([+-]?[0-9.]+) in(/s\^2)?"')
-
-HEAD = """\
-# A scene of limitsets: a part, the arm that throws it, and what is asked of them.
-#
-# A quantity is text, a decimal number and a unit: "5.75 in", "146 mm", "158 deg/s".
-# Lines that begin with "#" and a key are optional: take the sign away, and set the value.
-# limitsets check {file}     says what is wrong with it
-# limitsets analyse {file}   says where the throws lead
-"""
-
-
-def starting_text(name: str, file: str, unit: str = "in") -> str:
-    """Write the scene as TOML, its lengths in a unit; it loads as it is.
-
-    Examples
-    --------
-    >>> load(starting_text("mine", "mine.toml")).name
-    'mine'
-    """
-    given = load(LIKE).as_dict() | {"name": name}
-    lines: list[str] = []
-    for word, key in schema(with_effects=True).keys.items():
-        if isinstance(key.of, Section):
-            lines += _table(word, key.of, given.get(word))
-        elif isinstance(key.of, ByName):
-            lines += [f"# {key.says}", f"# [{word}]"]
-            lines += [*(f"# {_word(name)} = {_toml(value)}" for name, value in key.example.items()), ""]
-        else:
-            lines += [*_line(word, given[word], key), ""]
-    body = (
-        _LENGTHS.sub(lambda length: _in_unit(length, unit), "\n".join(lines))
-        if unit != "in"
-        else "\n".join(lines)
-    )
-    return HEAD.format(file=file) + "\n" + body.rstrip("\n") + "\n"
-
-
-def _in_unit(length: re.Match[str], unit: str) -> str:
-    """Convert a quantity in inches, to 10 digits."""
-    value = convert(parse(f"{length[1]} in", "length"), unit)
-    return f'"{value:.10g} {unit}{length[2] or ""}"'
-
-
-def new_scene(file: str | Path, unit: str = "in") -> Path:
-    """Write a scene to start from, with comments.
-
-    Parameters
-    ----------
-    file : str or Path
-        Where to: a name that ends in .toml, of a file that is not there yet.
-    unit : str
-        The unit of its lengths.
-
-    Raises
-    ------
-    SceneError
-        It is there, cannot be written, or is no such name; or an unknown unit.
-    """
-    path = Path(file)
-    if path.suffix != ".toml":
-        raise SceneError("the new scene", str(file), "a name that ends in .toml", f"name it {path.name}.toml")
-    if unit not in UNITS["length"]:
-        raise SceneError("the unit of the new scene", unit, ", ".join(UNITS["length"]), "name one of them")
-    if path.exists():
-        raise SceneError("the new scene", str(file), "a file that is not there", "name another one")
-    name = path.stem if can_name(path.stem) else "mine"
-    replace_file(path, starting_text(name, path.name, unit))
-    return path
-
-
-def example_at(path: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], Any]:
-    """Give the example of a key, and the key; of a number in a list those of the list.
-
-    Examples
-    --------
-    >>> example_at(("goal", "flip_order", 1))
-    (('goal', 'flip_order'), [0, 1, 2])
-    """
-    section = schema(with_effects=path[0] == "effects")
-    for depth, word in enumerate(path, 1):
-        if isinstance(word, str):
-            key, end = section.keys[word], depth
-            inner = _inner(key)
-            if inner is None:
-                break
-            section = inner
-    return path[:end], _example(key)
-
-
-def _table(path: str, table: Section, given: Mapping[str, Any] | None) -> Iterator[str]:
-    """Write a table under its heading, all of it commented out where it is not given."""
-    off = "" if given is not None else "# "
-    yield f"# {table.says}"
-    yield f"{off}[{path}]"
-    below, texts = [], given or {}
-    for word, key in table.keys.items():
-        inner, on = _inner(key), word in texts
-        if inner is not None and f"{path}.{word}" in HEADED:
-            below.append((f"{path}.{word}", inner, texts.get(word)))
-            continue
-        yield from _line(word, texts[word] if on else _example(key), key, on=on)
-        if inner is not None:
-            yield from (f"#     {name}: {each.says}" for name, each in inner.keys.items())
-    yield ""
-    for each in below:
-        yield from _table(*each)
-
-
-def _line(word: str, value: Any, key: Key, *, on: bool = True) -> list[str]:
-    """Write a key with what it means behind it; above it where the line would be long."""
-    line = ("" if on else "# ") + f"{word} = {_toml(value)}"
-    whole = f"{line}  # {key.says}"
-    return [whole] if len(whole) <= WIDTH else [f"#     {key.says}:", line]
-
-
-def _inner(key: Key) -> Section | None:
-    """Give the table that a key stands for, or each entry of its list."""
-    of = key.of.of if isinstance(key.of, Several) else key.of
-    return of if isinstance(of, Section) else None
-
-
-def _example(key: Key) -> Any:
-    """Give the example of a key: its own, or one made of those of its table."""
-    inner = _inner(key)
-    if inner is None:
-        return key.example
-    made = {word: _example(each) for word, each in inner.keys.items()}
-    for instead in ("side" if "beyond" in made else "", "speed" if "name" in made else ""):
-        made.pop(instead, None)  # one of two ways to say it
-    return [made] if isinstance(key.of, Several) else made
-
-
-def _word(key: str) -> str:
-    return key if key.replace("_", "").replace("-", "").isalnum() else json.dumps(key)
-
-
-def _toml(value: Any) -> str:
-    """Write a value in one line of TOML."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_word(key)} = {_toml(each)}" for key, each in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
 
 
 # ----------------------------------------------------------------

@@ -322,7 +322,7 @@ def sketch(source: str | Path | Mapping[str, Any]) -> Sketch | None:
         structure, file = structure_of(source)
         tree = plain(structure, file)
         numbers = Unchecked(tree, _unit_of(tree))
-        vertices = numbers.vertices(numbers.lengths())
+        vertices = numbers.outline(numbers.lengths())
         corners = np.array(vertices, dtype=float)
     except refused:
         return None

@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from limitsets.base import AnswerError, Column, SceneError, Table, Tabled, facts
-from limitsets.feeder.geometry import RestingSides
+from limitsets.feeder.geometry import Hole, RestingSides
 from limitsets.feeder.goals import Goal
 from limitsets.feeder.scene.facts import WITHOUT_EDGE, Deviation, Effects, World
+from limitsets.feeder.scene.numbers import corners_of
 from limitsets.feeder.scene.quantities import (
     NOISE_ONLY,
     base_unit,
@@ -67,7 +68,12 @@ class Scene(Tabled):
     unit : str
         Unit of all lengths here, that of the arm's length in the file: ``"in"``.
     vertices : ndarray, shape (n, 2)
-        The part, counterclockwise [length]; a triangle given by its sides lies on side 0, from the origin.
+        The part's convex hull, which carries its throws, counterclockwise [length]; a triangle given by its sides lies
+        on side 0, from the origin.
+    outline : ndarray, shape (m, 2)
+        The part itself, a plate with notches perhaps; `vertices` are among its vertices [length].
+    holes : tuple of Hole
+        In the plate [length].
     centre : tuple of float
         Centre of mass in the frame of `vertices` [length].
     radius_of_gyration : float
@@ -107,6 +113,8 @@ class Scene(Tabled):
     name: str
     unit: str
     vertices: npt.NDArray[np.float64]
+    outline: npt.NDArray[np.float64]
+    holes: tuple[Hole, ...]
     centre: tuple[float, float]
     radius_of_gyration: float
     sides: RestingSides
@@ -322,6 +330,7 @@ class Scene(Tabled):
         24.0
         """
         made = Scene.of(replaced(self.text, self.unit, self.file, values), self.file)
+        self._require_sides(made)
         speed = values.get("throw.speed")
         most_turns = turns(made.arm_length, made.kappa)
         if not values.keys() & {"throw.speed", "throw.kappa"} and "kappa" in made.text["throw"]:
@@ -337,6 +346,17 @@ class Scene(Tabled):
             key="throw.speed",
             file=self.file,
         )
+
+    def _require_sides(self, made: Scene) -> None:
+        """Refuse values that change which vertices are corners of the hull: its sides would bear other numbers."""
+        before, after = corners_of(self.text["part"]), corners_of(made.text["part"])
+        if tuple(before) != tuple(after):
+            remedy = "sides are edges of the hull: write it as a scene of its own"
+            allowed = f"an outline whose hull has the corners {', '.join(map(str, before))}"
+            corners = f"one with the corners {', '.join(map(str, after))}"
+            raise SceneError(
+                "the hull of the part", corners, allowed, remedy, key="part.vertices", file=self.file
+            )
 
     def _warn_of_gravity(self, made: Scene) -> None:
         """Say that another gravity changes no throw where it is given by kappa."""

@@ -174,6 +174,26 @@ MASS = Section(
         "points": Key(Several(POINT), "point masses on the plate"),
     },
 )
+PLACE = Section(
+    "A place in the frame of the vertices.",
+    {
+        "x": Key(LENGTH, "from the origin of the vertices", "30 mm", needed=True),
+        "y": Key(LENGTH, "likewise", "20 mm", needed=True),
+    },
+)
+HOLE = Section(
+    "A hole in a plate: a circle, or a polygon.",
+    {
+        "center": Key(PLACE, "of a circle"),
+        "diameter": Key(LENGTH, "of a circle", "8 mm"),
+        "vertices": Key(
+            Several(Several(LENGTH, 2, 2)),
+            "instead: [x, y] of each corner of a polygon, counterclockwise",
+            [["20 mm", "10 mm"], ["30 mm", "10 mm"], ["30 mm", "16 mm"]],
+        ),
+    },
+    Either("the hole", ("diameter", "vertices"), "center and diameter, or vertices"),
+)
 PART = Section(
     "Shape and mass of the part.",
     {
@@ -184,9 +204,10 @@ PART = Section(
         ),
         "vertices": Key(
             Several(Several(LENGTH, 2, 2)),
-            "instead of sides: [x, y] of each corner, counterclockwise, convex",
+            "instead of sides: [x, y] of each corner, counterclockwise; a plate may be concave",
             [["0 in", "0 in"], ["5 in", "0 in"], ["6 in", "3 in"], ["1 in", "4 in"]],
         ),
+        "holes": Key(Several(HOLE), "holes in a plate"),
         "mass": Key(MASS, needed=True),
     },
     Either("the shape", ("sides", "vertices"), "sides = [three lengths] or vertices = [[x, y], ...]"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import difflib
 import math
+import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple, TypeAlias
 
@@ -17,6 +18,8 @@ Tree: TypeAlias = dict[str, Any]
 """A scene as TOML holds it: tables, lists, text, switches and numbers."""
 
 _DEEPEST = 8
+
+_VERTEX = re.compile(r"part\.(holes\[\d+\]\.)?vertices\[\d+\]")
 
 
 def plain(tree: object, file: str | None) -> Tree:
@@ -56,7 +59,7 @@ def _plain(value: object, key: str, depth: int, file: str | None) -> Any:
 def _joined(key: str, word: object) -> str:
     if isinstance(word, int):
         # a vertex is a pair; its coordinates bear the names that quantities give them
-        coordinate = key.startswith("part.vertices[") and word < 2
+        coordinate = _VERTEX.fullmatch(key) is not None and word < 2
         return f"{key}.{'xy'[word]}" if coordinate else f"{key}[{word}]"
     text = str(shown(word))
     text = f'"{text}"' if "." in text else text  # the name of a quantity
@@ -208,9 +211,11 @@ def _contradictions(tree: Tree, file: str | None) -> Iterator[SceneError]:
         remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
         allowed = "acceleration or tilt in [gravity]"
         yield SceneError("gravity", "missing", allowed, remedy, key="throw.speed", file=file)
-    mass = tree["part"].get("mass") if isinstance(tree.get("part"), dict) else None
+    part = tree["part"] if isinstance(tree.get("part"), dict) else {}
+    mass, holes = part.get("mass"), part.get("holes")
     if isinstance(mass, dict):
         yield from _contradictions_of_mass(mass, file)
+        yield from _contradictions_of_holes(holes if isinstance(holes, list) else [], mass, file)
 
 
 def _contradictions_of_mass(mass: Tree, file: str | None) -> Iterator[SceneError]:
@@ -228,6 +233,23 @@ def _contradictions_of_mass(mass: Tree, file: str | None) -> Iterator[SceneError
         yield SceneError("the mass", shown(words), allowed, "add what is missing", key="part.mass", file=file)
     elif made:
         yield from _contradictions_of_plate(mass["plate_density"], mass.get("plate_thickness"), file)
+
+
+def _contradictions_of_holes(holes: list[Any], mass: Tree, file: str | None) -> Iterator[SceneError]:
+    """Refuse a circle without its centre or a polygon with one, and holes in a part whose mass is measured."""
+    for k, hole in enumerate(each for each in holes if isinstance(each, dict)):
+        if ("diameter" in hole) != ("center" in hole):
+            said = "diameter without center" if "diameter" in hole else "center without diameter"
+            allowed, remedy = (
+                "center and diameter of a circle, or vertices",
+                "give the two of them, or vertices alone",
+            )
+            yield SceneError("the hole", said, allowed, remedy, key=f"part.holes[{k}]", file=file)
+    if holes and "center" in mass:
+        remedy = "center and radius_of_gyration that are measured have them already: leave the holes out"
+        yield SceneError(
+            "holes", "beside a measured mass", "holes in a plate", remedy, key="part.holes", file=file
+        )
 
 
 def _contradictions_of_plate(density: object, thickness: object, file: str | None) -> Iterator[SceneError]:

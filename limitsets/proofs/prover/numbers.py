@@ -12,6 +12,7 @@ Source: Moore, Interval Analysis, 1966; Griewank and Walther, Evaluating Derivat
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -141,6 +142,7 @@ def square_root(x: RationalInterval) -> RationalInterval:
     return RationalInterval(Fraction(below, scale), Fraction(above, scale))
 
 
+@functools.cache
 def pi() -> RationalInterval:
     """pi, by Machin's formula."""
 

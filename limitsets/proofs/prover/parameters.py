@@ -18,8 +18,8 @@ import numpy as np
 
 from limitsets.base import AnswerError
 from limitsets.base.arrays import Mask
-from limitsets.feeder.geometry import side_ends
-from limitsets.feeder.geometry.polygon import above_side
+from limitsets.feeder.geometry import cross, side_ends
+from limitsets.feeder.geometry.polygon import Vector, above_side
 from limitsets.feeder.scene import Numbers, Scene
 from limitsets.feeder.scene.quantities import base_unit, find, text_at, texts
 from limitsets.feeder.scene.units import exact_factor, parse, share_of_pi
@@ -315,7 +315,7 @@ class _Spans(Numbers):
         noise: Mapping[str, str] | None = None,
         instead: Mapping[str, RationalInterval | Jet] | None = None,
     ) -> None:
-        super().__init__(tree, root, sine)
+        super().__init__(tree, root, sine, pi())
         self.unit, self.noise, self.instead = unit, noise or {}, instead or {}
 
     def number(self, name: str) -> Any:
@@ -365,6 +365,20 @@ class _Spans(Numbers):
         if share is not None:
             return pi() * RationalInterval.of(share * number)
         return RationalInterval.of(number * exact_factor(quantity.unit, base_unit(dimension, self.unit)))
+
+    def polygon(self, outline: Sequence[Vector]) -> Sequence[Vector]:
+        """Return the corners of the convex hull, throughout a tolerance the same; else the part is refused."""
+        hull = super().polygon(outline)
+        exact = not any(isinstance(text, list) for pair in self.tree["part"]["vertices"] for text in pair)
+        inner = () if exact or self.instead else sorted(set(range(len(outline))) - set(self.corners))
+        for vertex in inner:
+            for left, right in zip(hull, [*hull[1:], hull[0]], strict=True):
+                if cross(left, right, outline[vertex]).lo < 0:
+                    allowed = "one with the same convex hull, throughout the tolerance"
+                    raise AnswerError(
+                        "the part", f"perhaps with a corner at vertex {vertex}", allowed, NARROWER
+                    )
+        return hull
 
     def deviation(self, name: str) -> tuple[RationalInterval, RationalInterval]:
         """Return the noise of a quantity as a share of it, and in its own dimension; one of the two is 0."""
@@ -423,7 +437,7 @@ class _Spans(Numbers):
         ]
         return sides, about(centre[1], steep[1], offsets, radius)
 
-    def outline(
+    def seen_from_sides(
         self,
     ) -> tuple[list[RationalInterval], list[list[RationalInterval]], list[list[RationalInterval]]]:
         """Return the exterior angles, and where the vertices are: p and q of `thrower.motion.Outline`."""
@@ -435,6 +449,25 @@ class _Spans(Numbers):
             p.append([along - side[0] for along, _, _ in at])
             q.append([above - side[1] for _, above, _ in at])
         return [side[4] for side in sides], p, q
+
+
+def body_of(scene: Scene, tolerance: Mapping[str, str]) -> list[tuple[RationalInterval, ...]]:
+    """Enclose (a, d, length) of every side of a scene's part, throughout a tolerance.
+
+    Raises
+    ------
+    AnswerError
+        A quantity that the scene does not give, or a tolerance in which the part may be none.
+    """
+    tree = whole(scene, tolerance).tree()
+    try:
+        return _Spans(scene.unit, tree).narrow_body()[0]
+    except (ZeroDivisionError, ValueError):
+        raise NO_PART from None
+
+
+# Of a length that may be nothing, sides that do not meet, a flat corner.
+NO_PART = AnswerError("the part", "of no convex shape", "one, throughout the tolerance", NARROWER)
 
 
 def _require_rest(
@@ -507,14 +540,9 @@ def parameter_box(
     try:
         sides, radius = reader.narrow_body()
         full = simulated(scene)
-        angles, p, q = reader.outline() if full is not None else ([], [], [])
-    except (
-        ZeroDivisionError,
-        ValueError,
-    ):  # a length that may be nothing, sides that do not meet, a flat corner
-        raise AnswerError(
-            "the part", "of no convex shape", "one, throughout the tolerance", NARROWER
-        ) from None
+        angles, p, q = reader.seen_from_sides() if full is not None else ([], [], [])
+    except (ZeroDivisionError, ValueError):
+        raise NO_PART from None
     _require_rest(sides, scene.sides.rests.tolist(), kappa, radius)
     scalars = [kappa, reader.number("arm.surface_height"), reader.number("arm.length"), radius]
     ends = [span.outward() for span in scalars]
