@@ -77,7 +77,8 @@ def runs(rows, states, x, side):
 def test_the_files_can_be_run_by_a_controller(capfd):
     out = prints(capfd, "feedback", SCENE, *FEW, "--csv", "table.csv", "-o", "out")
     assert "written to out" in out
-    assert names_in("out") == {"feedback.json", "policy.csv", "policy.png"}
+    controllers = {"controller.csv", "controller.h", "controller.st"}
+    assert names_in("out") == {"feedback.json", "policy.csv", "policy.png"} | controllers
     assert Path("out/policy.png").stat().st_size > 10_000
     text = Path("table.csv").read_text(encoding="utf-8")
     assert text == Path("out/policy.csv").read_text(encoding="utf-8")

@@ -86,7 +86,8 @@ def feedback(
     certificate : FILE
         Write the policy's certificate, NAME.proof.zip.
     out : DIR
-        Write feedback.json, policy.csv and a figure there.
+        Write feedback.json, policy.csv, a figure, and the tables of a controller there: controller.csv, .h (C) and .st
+        (structured text).
     """
     from limitsets.proofs.policies import places, policy_chances
     from limitsets.proofs.policies.simulation import simulate
@@ -127,7 +128,7 @@ def feedback(
     solved = synthesis.found.policy is not None
     if run.out is not None:
         drawn = [("policy", ls.plot.policy(synthesis))] if solved else []
-        rows = {"policy.csv": synthesis.table().csv()} if solved else {}
+        rows = {"policy.csv": synthesis.table().csv(), **synthesis.controller().files()} if solved else {}
         run.write(drawn, {"feedback.json": record, **rows})
     return Answer(
         record,

@@ -21,6 +21,7 @@ from limitsets.base import (
 from limitsets.base.arrays import Arrays
 from limitsets.feeder.scene import BeyondSensor, Model, Scene, Sensor, exact_text, load
 from limitsets.proofs.policies.board import Board, Progress, Starts, board_of
+from limitsets.proofs.policies.controller import Controller, controller_of
 from limitsets.proofs.policies.policy import NONE, NOT_DECIDED, SOLVED, Found, Policy, search
 from limitsets.proofs.prover.certificate import Saved, brackets, in_certificate, pack
 from limitsets.proofs.prover.cover import targets
@@ -193,6 +194,24 @@ class Synthesis(Board, Saved):
         return replace(
             self, found=replace(self.found, verdict=NOT_DECIDED, throws=-1, policy=None, reason=reason)
         )
+
+    def controller(self) -> Controller:
+        """Give the policy as complete tables for a controller; AnswerError where there is none."""
+        scene, (x, side) = self.scene, self.goal
+        assert scene.feedback is not None  # there is a policy
+        given = (
+            f"throw {k}, {each.name}: {each.quantity} = {each.text}"
+            for k, each in enumerate(scene.feedback.throws)
+        )
+        wanted = {"stop": "known to lie", "catch": "to be caught"}[self.mode]
+        about = (
+            f"Policy of the scene {scene.name}: the part is {wanted} on side {side}",
+            f"at x = {x:.9g} {scene.unit} or beyond,",
+            f"after {self.found.throws} throws at most, from {self.starts_are}.",
+            f"The sensor is asked: {self.question}",
+            *given,
+        )
+        return controller_of(self.require_policy(), about)
 
     def beliefs(self) -> list[dict[int, list[tuple[float, float]]]]:
         """Give per state of the policy where the part may lie: intervals by side [length]."""
