@@ -239,14 +239,6 @@ def test_an_end_that_the_throws_do_not_set_is_that_of_the_part():
     assert not radius.bounded
 
 
-def test_the_largest_radius_of_gyration_is_that_of_all_mass_in_the_vertices():
-    given = aimed_at()
-    corners, centre = np.array(given.vertices), np.array(given.centre)
-    shares = np.linalg.solve(np.vstack([corners.T, np.ones(3)]), np.append(centre, 1.0))
-    square = float(shares @ ((corners - centre) ** 2).sum(axis=1))
-    assert searching.largest_radius(given) == pytest.approx(np.sqrt(square))
-
-
 def test_the_scene_is_written_in_the_units_of_the_file():
     throws = filmed(15, speed=0.0)[1]
     given = ls.load("paper-designed").with_values({ALONG: "107.33 mm", "throw.speed": "26.3 rpm"})

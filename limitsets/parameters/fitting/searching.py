@@ -11,6 +11,7 @@ import numpy as np
 
 from limitsets.base import DataError
 from limitsets.base.arrays import Array, Ints
+from limitsets.feeder.geometry import largest_radius
 from limitsets.feeder.scene import Scene
 from limitsets.parameters.fitting.likelihood import SCATTERS, Likelihood, Rows, assigned
 
@@ -430,20 +431,16 @@ def _best_radius(own: Likelihood, at: Array) -> Array:
     if RADIUS not in own.names:
         return at
     k = own.names.index(RADIUS)
-    most = largest_radius(own.scene)
+    most = _most(own.scene)
     radii = np.append(min(own.scene.value(RADIUS), most), RADII * most)
     tries = np.repeat(at[None], radii.size, axis=0)
     tries[:, k] = (radii - own.centre[k]) / own.scale[k]
     return np.asarray(tries[int(np.argmax(own(tries)))])
 
 
-def largest_radius(scene: Scene) -> float:
-    """Return the largest radius of gyration about the centre of mass: all mass in vertices, far out, in balance."""
-    from scipy.optimize import linprog
-
-    arms = scene.vertices - np.array(scene.centre)
-    shares = np.vstack([arms.T, np.ones(len(arms))])
-    return math.sqrt(max(-float(linprog(-(arms**2).sum(axis=1), A_eq=shares, b_eq=[0.0, 0.0, 1.0]).fun), 0.0))
+def _most(scene: Scene) -> float:
+    """Give the largest radius of gyration that the part can have about its centre of mass."""
+    return float(largest_radius(scene.vertices, scene.centre))
 
 
 def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
@@ -453,7 +450,7 @@ def _limits(own: Likelihood, best: Maximum, k: int, way: float) -> float:
         return abs(float(best.at[k])) if way < 0 else 1e4
     if own.names[k] == RADIUS:
         scene = own.scene.with_values(dict(zip(own.names[:k], values.tolist(), strict=False)))
-        return float((values[k] if way < 0 else max(largest_radius(scene) - values[k], 0.0)) / own.scale[k])
+        return float((values[k] if way < 0 else max(_most(scene) - values[k], 0.0)) / own.scale[k])
     return 1e4
 
 
