@@ -179,11 +179,28 @@ def test_starts_that_leave_count_against_staying():
     assert ls.analyse({**from_far().as_dict(), "goal": {"stays_on_arm": True}}).goal.holds is False
 
 
+@pytest.mark.parametrize("name", ["paper-designed", "paper-initial", "paper-quadrilateral"])
+def test_every_x_that_is_proposed_holds_and_is_no_empty_promise(name):
+    analysis = ls.analyse(name)
+    assert analysis.choices
+    for side, lo, hi in analysis.choices:
+        off = 1e-6 * (hi - lo)
+        for x, holds, vacuous in (
+            (lo - off, False, False),
+            (lo + off, True, False),
+            (hi - off, True, False),
+            (hi + off, True, True),
+        ):
+            goal = {"oriented_beyond": {"x": f"{x!r} in", "side": side}}
+            outcome = ls.analyse(ls.load(name).as_dict() | {"goal": goal}).goal
+            assert (outcome.holds, outcome.vacuous) == (holds, vacuous), (side, x)
+
+
 # ---------------------------------------------------------------- JSON
 
 WORDS = {
     "scene", "units", "cells", "critical_points", "attractors", "basins", "cycles", "goal", "other_vertex_first",
-    "goal_vacuous", "effects", "spurious", "spurious_count", "second_pass", "timings", "accuracy", "starts", "advice",
+    "goal_vacuous", "choices", "effects", "spurious", "spurious_count", "second_pass", "timings", "accuracy", "starts", "advice",
 }  # fmt: skip
 
 

@@ -89,6 +89,8 @@ def _lines(analysis: Analysis) -> Iterator[str]:
         threshold = analysis.goal.threshold
         if analysis.goal.holds is False and threshold is not None and math.isfinite(threshold):
             yield analysis.goal.goal.explained(threshold, unit)
+    yield from pages.choice_of(analysis)
+    if analysis.goal is not None:
         yield f"next: {pages.next_command(analysis)}"
     if accuracy is not None and accuracy.reached is not None:
         yield f"error of the ends: {accuracy.reached:.2g} {unit} ({accuracy.how})"

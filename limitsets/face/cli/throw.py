@@ -144,10 +144,7 @@ def plot(
     out : FILE
         File (.png, .svg, .pdf), ./NAME-KIND.FORMAT by default.
     """
-    if run.out is not None and run.out.suffix.lower() not in ([f".{form}"] if form else FORMATS):
-        endings = f".{form}" if form else ", ".join(FORMATS)
-        remedy = "leave one out" if form else "rename it"
-        raise LimitsetsError("the figure's file", str(run.out), f"a name that ends in {endings}", remedy)
+    figure_file(run.out, form, "")  # refuses another ending before anything is computed
     if (x is None) != (side is None) or (x is not None and kind is not Picture.FLIGHT):
         value = "half given" if kind is Picture.FLIGHT else "given"
         raise LimitsetsError("the throw to draw", value, "--x and --side, for a flight", "give both or none")
@@ -158,11 +155,22 @@ def plot(
         analysis = ls.analyse(scene, cells, progress=run.tell)
         throw = None if x is None or side is None else (position(analysis.scene, x), side)
         name, drawn = analysis.scene.name, report.writing.figure(analysis, str(kind), throw)
-    file = run.out or Path(f"{name}-{kind}.{form or Form.PNG}")
+    file = figure_file(run.out, form, f"{name}-{kind}")
     with saved(file) as draft:
         drawn.savefig(draft, dpi=report.writing.DPI)
     notes = [] if wrong is None else [str(wrong)]
     return Answer({"figure": str(file)}, lambda: [f"figure: {file}"], code=2 if wrong else 0, notes=notes)
+
+
+def figure_file(out: Path | None, form: Form | None, stem: str) -> Path:
+    """Give the file of one figure: that of --out, whose ending has to fit --format, or the stem with its ending."""
+    if out is None:
+        return Path(f"{stem}.{form or Form.PNG}")
+    if out.suffix.lower() not in ([f".{form}"] if form else FORMATS):
+        endings = f".{form}" if form else ", ".join(FORMATS)
+        remedy = "leave one out" if form else "rename it"
+        raise LimitsetsError("the figure's file", str(out), f"a name that ends in {endings}", remedy)
+    return out
 
 
 def _part(scene: str) -> tuple[str, Figure, LimitsetsError | None]:

@@ -39,6 +39,9 @@ TIPS: dict[str, Any] = {"color": style.FLIP, "lw": 3.0, "ls": (0, (1.5, 1))}
 
 MIDDLE: dict[str, Any] = {"ha": "center", "va": "center"}
 
+# Sides with a name.
+NAMED = 12
+
 # Distance of a side's name from the side [points].
 CLEAR = 4
 
@@ -178,7 +181,7 @@ def _centre_at(scene: Scene) -> Array:
 def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> None:
     """Write name and length of each side outside its middle; mark sides on which the part cannot rest."""
     count = len(corners)
-    for side in range(count):
+    for side in _named(scene):
         # the first vertex of the outline is the left end of side 0
         left, right = (corners[k] for k in side_ends(count, side))
         outward = _outward(left, right)
@@ -193,8 +196,15 @@ def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> Non
             how["arrowprops"] = {"arrowstyle": "-", "color": style.INK, "lw": 0.7}
         middle = tuple((0.5 * (left + right)).tolist())
         style.note(axes, words, middle, tuple(shift.tolist()), zorder=6, gid="side", **how)
-        if not resting[side]:
-            axes.plot(*np.stack([left, right], axis=-1), zorder=4, gid="no rest", **TIPS)
+    for side in np.flatnonzero(~np.array(resting)).tolist():
+        left, right = (corners[k] for k in side_ends(count, side))
+        axes.plot(*np.stack([left, right], axis=-1), zorder=4, gid="no rest", **TIPS)
+
+
+def _named(scene: Scene) -> list[int]:
+    """Say which sides are named: all, but of many, the chords of an arc, the longest alone."""
+    longest = np.argsort(-scene.sides.length, kind="stable")[:NAMED]
+    return sorted(longest.tolist())
 
 
 def _centre(axes: Axes, scene: Scene, size: float) -> None:

@@ -53,16 +53,22 @@ def resting_sides(answer: Stability) -> Figure:
     drawn = sorted(stable, key=lambda each: each.side)
     across = min(len(drawn), ACROSS)
     down = math.ceil(len(drawn) / across)
-    figure, panels = style.canvas(2.9 * max(across, 2) + 0.4, 2.9 * down + 1.1, down, across)
     size = max(math.dist((0.0, 0.0), corner) for corner in about_centre(scene).tolist())
+    tall = 0.25 * size + max(0.5 * sum(side.d) for side in drawn) + size
+    figure, panels = style.canvas(
+        2.9 * max(across, 2) + 0.4, 2.9 * down * tall / (2.6 * size) + 1.4, down, across
+    )
     for axes, side in zip(panels, drawn, strict=False):
         _panel(axes, scene, side, size)
+        axes.set(aspect="equal", xlim=(-1.3 * size, 1.3 * size), ylim=(-0.25 * size, tall - 0.25 * size))
     for axes in panels[len(drawn) :]:
         axes.remove()
     handles = [
         style.key("centre of mass", **CENTRE),
         style.key("to the ends of the side: tips over where one of them is upright", **CONE),
-        None if all(each.rests for each in drawn) else style.key("the part does not rest on this side", **TIPS),
+        None
+        if all(each.rests for each in drawn)
+        else style.key("the part does not rest on this side", **TIPS),
     ]
     title = f"{scene.name}: how far the ground can lean before the part tips over"
     return style.finished(figure, title, handles)
@@ -72,7 +78,6 @@ def _panel(axes: Axes, scene: Scene, side: SideStability, size: float) -> None:
     """Draw the part on a side; x runs from below the centre of mass, y from the ground."""
     a, d = 0.5 * sum(side.a), 0.5 * sum(side.d)
     shape = turned(about_centre(scene, hull=False), angle_on_side(scene, side.side)) + np.array([0.0, d])
-    axes.set(aspect="equal", xlim=(-1.35 * size, 1.35 * size), ylim=(-0.5 * size, 2.1 * size))
     axes.set_axis_off()
     axes.fill_between([-1.3 * size, 1.3 * size], 0.0, -0.07 * size, **SOLID)
     axes.axhline(0.0, color=style.INK, lw=1.6, zorder=1)

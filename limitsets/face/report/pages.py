@@ -331,6 +331,31 @@ def void_of(outcome: GoalOutcome, unit: str, spread: str | None) -> str:
     return f"{thrown}{who}: {', '.join(ends)}, before x = {goal.x:g} {unit}" if ends else ""
 
 
+def choice_of(analysis: Analysis) -> list[str]:
+    """Say which X a goal could ask for; empty if the goal asks of every start, or holds and is no empty promise.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> scene = ls.load("paper-designed").as_dict() | {"goal": {"oriented_beyond": {"x": "24 in", "side": 2}}}
+    >>> choice_of(ls.analyse(scene, 512))[0][:41]
+    'choose X between 19.753 and 23.383 in for'
+    """
+    outcome, unit = analysis.goal, analysis.scene.unit
+    if outcome is not None and (outcome.goal.from_anywhere or not isinstance(outcome.goal, OrientedBeyond)):
+        return []
+    if not analysis.attractors or (outcome is not None and outcome.holds and not outcome.vacuous):
+        return []
+    wanted = None if outcome is None else outcome.goal.side
+    choices = sorted(analysis.choices, key=lambda choice: (choice[0] != wanted, choice[1] - choice[2]))
+    lines = [
+        f"choose X between {rounded(lo, '.3f', up=True)} and {rounded(hi, '.3f', up=False)} {unit} for side {side}:"
+        f" every limit set gets beyond X, and parts beyond X lie on side {side} alone (sampled, not proved)"
+        for side, lo, hi in choices
+    ]
+    return lines or ["no X is right: of no side do all limit sets get farther than on the others"]
+
+
 # ----------------------------------------------------------------
 # The pages: an answer in the words of someone who builds a feeder.
 
@@ -368,6 +393,7 @@ def environment() -> Environment:
         "table": table,
         "verdict_of": verdict_of,
         "void_of": void_of,
+        "choice_of": choice_of,
     }
     return templates
 

@@ -135,6 +135,26 @@ class GoalOutcome:
         return max(self.reach) <= self.goal.x
 
 
+def choices_of(extents: Sequence[Extents], sides: int) -> list[tuple[int, float, float]]:
+    """Give the X beyond which parts lie on one side alone, and which every limit set gets to: side, from, to.
+
+    Examples
+    --------
+    >>> choices_of([{0: [(8.0, 12.0)], 1: [(9.0, 20.0)]}, {1: [(10.0, 17.0)]}], 2)
+    [(1, 12.0, 17.0)]
+    """
+    farthest = [
+        {side: max(hi for _, hi in parts) for side, parts in each.items() if parts} for each in extents
+    ]
+    choices = []
+    for side in range(sides if farthest else 0):
+        least = max((hi for each in farthest for other, hi in each.items() if other != side), default=0.0)
+        most = min(each.get(side, -math.inf) for each in farthest)
+        if least < most:
+            choices.append((side, least, most))
+    return choices
+
+
 def _may_leave(graph: TransitionGraph) -> float:
     """Share of the starts from which some path leaves the arm."""
     leads_out = reach(graph.ranges, graph.components(), graph.ranges.exits) != 0

@@ -38,6 +38,7 @@ from limitsets.parameters.analysis.checks import (
     GoalOutcome,
     Starts,
     against_starts,
+    choices_of,
     goal_outcome,
     other_vertex_first,
 )
@@ -158,6 +159,11 @@ class Analysis(Tabled):
         return tuple("end points" if limit.converged else "cells" for limit in self.limit_sets)
 
     @property
+    def choices(self) -> list[tuple[int, float, float]]:
+        """For which X of a goal `oriented_beyond` a side is right, and every limit set gets beyond X: side, from, to."""
+        return choices_of(self.extents, len(self.scene.sides))
+
+    @property
     def advice(self) -> tuple[str, ...]:
         """What cells have not settled, and what to do."""
         said = (self.basins.advice, None if self.starts is None else self.starts.advice)
@@ -240,6 +246,7 @@ class Analysis(Tabled):
             if goal is None
             else {"kind": goal.goal.kind, **picked(goal, "holds", "threshold", "how")},
             goal_vacuous=None if goal is None else goal.vacuous,
+            choices=[dict(zip(("side", "lo", "hi"), each, strict=True)) for each in self.choices],
             effects=self.choice,
             other_vertex_first=_ordered(self.other_vertex_first),
             spurious=[

@@ -96,7 +96,9 @@ class Stability(Tabled):
             )
             for each in self.sides
         ]
-        return (Table(columns, rows, f"How stable {self.scene.name} lies on its sides", "proved for its outline"),)
+        return (
+            Table(columns, rows, f"How stable {self.scene.name} lies on its sides", "proved for its outline"),
+        )
 
     def to_json(self) -> list[dict[str, Any]]:
         """Give an object for each side, as JSON has it."""
@@ -143,7 +145,7 @@ def stability(source: Scene | str, *, tolerance: Mapping[str, str] | None = None
     --------
     >>> first = stability("paper-designed").sides[0]
     >>> [round(end, 3) for end in first.left], first.over_left
-    ([56.463, 56.463], 1)
+    ([47.378, 47.378], 1)
     """
     scene = load(source)
     enclosed, sides = body_of(scene, tolerance or {}), []
