@@ -73,7 +73,7 @@ clean:  ## remove .venv, caches and what was built
 	rm -rf .venv build dist docs/api .benchmarks .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.venv/run.stamp: extras := [atlas,engine,explore]
+.venv/run.stamp: extras := [atlas,drawing,engine,explore]
 .venv/dev.stamp: extras := [dev]
 .venv/bench.stamp: extras := [dev,bench]
 .venv/run.stamp .venv/dev.stamp .venv/bench.stamp: pyproject.toml constraints.txt $(PY)

@@ -110,6 +110,7 @@ _PUBLIC = {
     "auditing": "proofs.auditing",
     "cells": "systems.cells",
     "cli": "face.cli",
+    "drawing": "feeder.drawing",
     "engine": "feeder.engine",
     "errors": "base.errors",
     "explorer": "face.explorer",

@@ -140,10 +140,10 @@ def read_polygon(
     return outline, corners
 
 
-Ends = Sequence[tuple[Fraction, Fraction]]  # least and largest x, least and largest y of a vertex
+VertexEnds = Sequence[tuple[Fraction, Fraction]]  # least and largest x, least and largest y of a vertex
 
 
-def hull_of(places: Sequence[Ends]) -> list[int]:
+def hull_of(places: Sequence[VertexEnds]) -> list[int]:
     """Find the corners of the convex hull, ascending: no other vertex lies beyond one of its sides, exactly.
 
     Their candidates are those of the middles.  The cross product is affine in each coordinate, so its least value for

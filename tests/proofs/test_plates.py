@@ -89,7 +89,7 @@ def test_a_vertex_that_a_tolerance_may_move_out_of_the_hull_is_refused_by_both()
     with pytest.raises(AnswerError, match="perhaps with a corner at vertex 1"):
         ls.certify(bracket(), ["invariant"], tolerance={"part.vertices[1].y": "0.1 mm"})
     raw = bracket() | MODEL
-    raw["part"]["vertices"][1][1] = ["-0.1 mm", "0.1 mm"]
+    raw["part"]["vertices"][1][1] = ["-1e-9 mm", "0.1 mm"]
     with pytest.raises(
         checker.file.BadFileError, match="vertex 1 of the part may lie beyond its convex hull"
     ):

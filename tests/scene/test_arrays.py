@@ -136,6 +136,12 @@ def test_numbers_that_no_scene_holds_are_flagged(value):
     assert np.isfinite(found.params.radius_of_gyration).all()
 
 
+def test_a_radius_of_gyration_ends_with_all_mass_in_the_corners():
+    """3.19666 in is that of the paper's part (tests/scene/test_refusals.py computes it by the shares of its corners)."""
+    stack = throw_stack(ls.load("paper-designed"), {"part.mass.radius_of_gyration": [3.1966, 3.1967]})
+    assert stack.possible.tolist() == [True, False]
+
+
 def test_an_arm_that_ends_before_the_goal_is_no_scene():
     found = throw_stack(ls.load("paper-designed"), {"arm.length": [20.0, 20.5]})
     assert found.possible.tolist() == [False, True]

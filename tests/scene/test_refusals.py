@@ -206,6 +206,18 @@ def test_refuses(changes: dict[str, Any], key: str, words: str, whole: dict[str,
     refused(whole, changes, key, words)
 
 
+def test_a_radius_of_gyration_that_no_part_of_this_outline_has(whole: dict[str, Any]) -> None:
+    """Of a triangle the shares of the three corners follow from the centre of mass; all mass in them is the most."""
+    scene = load(whole)
+    away = scene.vertices - np.array(scene.centre)
+    shares = np.linalg.solve(np.vstack([scene.vertices.T, np.ones(3)]), [*scene.centre, 1.0])
+    largest = math.sqrt(shares @ (away**2).sum(axis=1))
+    whole["part"]["mass"]["radius_of_gyration"] = f"{largest * (1 - 1e-12)!r} in"
+    assert load(whole).radius_of_gyration == pytest.approx(largest)
+    changes = {"part/mass/radius_of_gyration": f"{largest * (1 + 1e-6)!r} in"}
+    refused(whole, changes, "part.mass.radius_of_gyration", f"at most {largest:.6g} in")
+
+
 def paths(node: Any) -> Iterator[str]:
     """List the place of each entry of a tree."""
     for key, inner in node.items() if isinstance(node, dict) else enumerate(node):

@@ -1,4 +1,4 @@
-"""Commands about scenes and this installation: `scenes`, `new`, `check`, `doctor`, `explore`."""
+"""Commands about scenes and this installation: `scenes`, `check`, `doctor`, `explore`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import limitsets as ls
-from limitsets.base import Column, LimitsetsError, Table, picked, proposed
+from limitsets.base import Column, LimitsetsError, Table, picked
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command, limits
 from limitsets.face.cli.subjects import MapOfFile, domain_of, of_map_alone, of_scene_alone, subject
 
@@ -48,27 +48,6 @@ def scenes(run: Run) -> Answer:
     rows = [[record[word] for word in SCENE_COLUMNS] for record in records]
     listing = Table(list(SCENE_COLUMNS.values()), rows, "Built-in scenes")
     return Answer(records, lambda: [listing], lambda: listing)
-
-
-# ---------------------------------------------------------------- `limitsets new`: a scene to start from
-
-
-@command(out=False, csv=False)
-def new(run: Run, file: Path, *, unit: str = "in") -> Answer:
-    """Write a scene to start from: every key that a scene may have, with what it means.
-
-    Parameters
-    ----------
-    file : FILE.toml
-        The file to write; it must not be there.
-    unit : UNIT
-        Of its lengths: mm, cm, m, in, ...
-    """
-    from limitsets.feeder.scene import new_scene
-
-    written = new_scene(file, unit)
-    next_words = f"next: edit it, then {proposed('check', written)} and {proposed('analyse', written)}"
-    return Answer({"scene": str(written)}, lambda: [f"scene: {written}", next_words])
 
 
 # ----------------------------------------------------------------

@@ -346,7 +346,7 @@ def choice_of(analysis: Analysis) -> list[str]:
         return []
     if not analysis.attractors or (outcome is not None and outcome.holds and not outcome.vacuous):
         return []
-    wanted = None if outcome is None else outcome.goal.side
+    wanted = outcome.goal.side if outcome is not None and isinstance(outcome.goal, OrientedBeyond) else None
     choices = sorted(analysis.choices, key=lambda choice: (choice[0] != wanted, choice[1] - choice[2]))
     lines = [
         f"choose X between {rounded(lo, '.3f', up=True)} and {rounded(hi, '.3f', up=False)} {unit} for side {side}:"

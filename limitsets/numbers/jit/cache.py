@@ -37,6 +37,7 @@ KERNEL_FREE = (
     "base/",
     "checker/",
     "systems/resilience/",
+    "feeder/drawing/",
     "feeder/engine/",
     "feeder/goals/",
     "feeder/scattering.py",

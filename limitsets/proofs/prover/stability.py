@@ -76,13 +76,13 @@ class Stability(Tabled):
         columns = (
             "side",
             Column("length", unit, ".6g", ends=True),
-            Column("centre of mass from the left end", unit, ".6g", ends=True),
-            Column("above the side", unit, ".6g", ends=True),
+            Column("centre of mass along", unit, ".6g", ends=True),
+            Column("above", unit, ".6g", ends=True),
             "rests",
-            Column("stays, leaning left, up to", "deg", _down),
-            "then onto side",
-            Column("leaning right, up to", "deg", _down),
-            "then onto",
+            Column("tips left beyond", "deg", _down),
+            "left onto side",
+            Column("tips right beyond", "deg", _down),
+            "right onto side",
         )
         rows = [
             (
@@ -164,7 +164,9 @@ def stability(source: Scene | str, *, tolerance: Mapping[str, str] | None = None
             SideStability(
                 side,
                 rests,
-                *(each.outward() for each in (length, a, d)),
+                length.outward(),
+                a.outward(),
+                d.outward(),
                 left=((pi() / 2 - angle(d, a)) * degrees).outward(),
                 right=((pi() / 2 - angle(d, right)) * degrees).outward(),
                 over_left=(side + 1) % count,
