@@ -49,6 +49,10 @@ def test_a_tolerance_widens_the_angles_by_what_it_moves_the_foot() -> None:
     assert float(ends[0]) == pytest.approx(wide.left[0], rel=1e-12)
     assert float(ends[1]) == pytest.approx(wide.left[1], rel=1e-12)
     assert wide.left[0] < plain.left[0] <= plain.left[1] < wide.left[1]
+    high = stability("paper-designed", tolerance={"part.mass.center.above": "0.05 in"}).sides[2]
+    heights = [0.7082490 + 0.05, 0.7082490 - 0.05]
+    lifts = [float(mpmath.hypot(4.2255778, height) - height) for height in heights]
+    assert high.lift_left == pytest.approx(lifts, rel=1e-9)  # the higher the centre of mass, the less it rises
     with pytest.raises(AnswerError, match="the foot of the centre of mass on side 0"):
         stability("paper-designed", tolerance={"part.mass.center.along": "4.3 in"})
 

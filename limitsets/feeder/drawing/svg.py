@@ -136,23 +136,23 @@ class _Walk:
                 self.element(
                     inner, matrix, words.get(_LABEL, layer), chosen or bool(names & self.wanted), depth + 1
                 )
-        elif tag == "use" and words.get("href", words.get(_LINK)) in self.by_id:
-            shift = np.array(
-                [[1.0, 0.0, _user_units(words, "x")], [0.0, 1.0, _user_units(words, "y")], [0.0, 0.0, 1.0]]
-            )
-            self.element(
-                self.by_id[words.get("href", words.get(_LINK, ""))], matrix @ shift, layer, chosen, depth + 1
-            )
+        elif tag == "use" and (link := words.get("href", words.get(_LINK))) in self.by_id:
+            shift = np.eye(3)
+            shift[:2, 2] = _user_units(words, "x"), _user_units(words, "y")
+            self.element(self.by_id[link], matrix @ shift, layer, chosen, depth + 1)
         elif chosen:
-            if tag not in _SHAPES or words.get("clip-path", words.get("mask", "none")) != "none":
-                self.left_out[tag if tag not in _SHAPES else "clip-path or mask"] += 1
-            if tag in _SHAPES:
-                drawn = (
-                    _round(words, layer)
-                    if tag in ("circle", "ellipse")
-                    else self._path(_data(tag, words), layer)
-                )
-                self.curves += [curve.mapped(matrix[:2, :2], matrix[:2, 2]) for curve in drawn]
+            self._shape(tag, words, matrix, layer)
+
+    def _shape(self, tag: str, words: Mapping[str, str], matrix: Array, layer: str) -> None:
+        """Keep the lines of a shape, and count what is no shape, or cut off by another one."""
+        if tag not in _SHAPES:
+            self.left_out[tag] += 1
+            return
+        if words.get("clip-path", words.get("mask", "none")) != "none":
+            self.left_out["clip-path or mask"] += 1
+        round_one = tag in ("circle", "ellipse")
+        drawn = _round(words, layer) if round_one else self._path(_data(tag, words), layer)
+        self.curves += [curve.mapped(matrix[:2, :2], matrix[:2, 2]) for curve in drawn]
 
     def _path(self, data: str, layer: str) -> Iterator[Curve]:
         """Give the lines of a path."""

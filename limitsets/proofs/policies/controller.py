@@ -144,7 +144,7 @@ def controller_of(policy: Policy, about: Sequence[str] = ()) -> Controller:
     Parameters
     ----------
     policy : Policy
-        What was found.
+        The answer of a search.
     about : sequence of str
         What it is of, for the head of the files.
 
