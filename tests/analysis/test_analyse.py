@@ -200,7 +200,8 @@ def test_every_x_that_is_proposed_holds_and_is_no_empty_promise(name):
 
 WORDS = {
     "scene", "units", "cells", "critical_points", "attractors", "basins", "cycles", "goal", "other_vertex_first",
-    "goal_vacuous", "choices", "effects", "spurious", "spurious_count", "second_pass", "timings", "accuracy", "starts", "advice",
+    "goal_vacuous", "choices", "effects", "spurious", "spurious_count", "second_pass", "timings", "accuracy", "starts",
+    "advice",
 }  # fmt: skip
 
 

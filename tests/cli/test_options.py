@@ -37,6 +37,7 @@ NO_FIGURE = {
     "doctor",
     "animate",
     "explore",
+    "film",
 }
 
 

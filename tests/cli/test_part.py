@@ -1,13 +1,15 @@
 """`limitsets part`, and `limitsets new --from` a drawing."""
 
+import re
 import tomllib
 from pathlib import Path
 
 import pytest
 
 import limitsets as ls
+from limitsets.face import report
 from limitsets.feeder.scene.checking import examined
-from tests.cli.command import both, documented, json_of, names_in, prints, refusal
+from tests.cli.command import DOCS, both, documented, json_of, names_in, prints, refusal
 from tests.plates import bracket
 
 SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="50mm" viewBox="0 0 80 50">
@@ -52,6 +54,29 @@ def test_a_drawing_becomes_a_scene_and_a_picture(capfd):
     before = Path("own.toml").read_bytes()
     refusal(capfd, "new own.toml --from plate.svg")
     assert Path("own.toml").read_bytes() == before
+
+
+def test_the_tutorial_s_commands_say_what_it_says(capfd):
+    """The page's drawing, commands and goal, but for the report, the margin and the films, which other tests have."""
+    pytest.importorskip("svgelements")
+    page = (DOCS / "my_drawing.md").read_text(encoding="utf-8")
+    drawing, proposed = re.findall(r"```text\n(.*?)```", page, re.S)
+    Path("plate.svg").write_text(drawing, encoding="utf-8")
+    commands = dict(re.findall(r"^limitsets ((\w+) .*)$", page, re.M)[::-1])
+    commands = {name: line for line, name in commands.items()}
+    assert "an outline with 4 vertices and 1 hole, 90 x 40 mm, 2746.06 mm^2" in page
+    assert "an outline with 4 vertices and 1 hole, 90 x 40 mm, 2746.06 mm^2" in prints(capfd, commands["new"])
+    assert "11.80" in prints(capfd, commands["part"])
+    analysis = ls.analyse("plate.toml", 512)
+    assert report.pages.choice_of(analysis) == [proposed.strip()]
+    text = Path("plate.toml").read_text(encoding="utf-8")
+    goal = re.findall(r"```toml\n(.*?)```", page, re.S)[0]
+    Path("plate.toml").write_text(text.replace("# [goal]\n", goal, 1), encoding="utf-8")
+    assert "goal: PROVED\n" in prints(capfd, commands["certify"])
+    laid = {0: [("60 mm", "300 mm")]}
+    (claim,) = ls.certify("plate.toml", ["goal"], tolerance={"throw.speed": "5.2 %"}, laid=laid).claims
+    assert claim.verdict == "proved"
+    assert "up to 5.2 % and 16.6 mm" in page
 
 
 def test_a_drawing_in_pixels_needs_its_unit(capfd):

@@ -137,7 +137,7 @@ def test_numbers_that_no_scene_holds_are_flagged(value):
 
 
 def test_a_radius_of_gyration_ends_with_all_mass_in_the_corners():
-    """3.19666 in is that of the paper's part (tests/scene/test_refusals.py computes it by the shares of its corners)."""
+    """3.19666 in is that of the paper's part: tests/scene/test_refusals.py has the closed form."""
     stack = throw_stack(ls.load("paper-designed"), {"part.mass.radius_of_gyration": [3.1966, 3.1967]})
     assert stack.possible.tolist() == [True, False]
 

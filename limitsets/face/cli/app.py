@@ -61,7 +61,20 @@ def limitsets(
     """
 
 
-for file in (scenes, part, analyse, throw, certify, average, absorption, margin, design, cell, feedback, film):
+for file in (
+    scenes,
+    part,
+    analyse,
+    throw,
+    certify,
+    average,
+    absorption,
+    margin,
+    design,
+    cell,
+    feedback,
+    film,
+):
     for command in COMMANDS[file.__name__]:
         # click would cut the summary where a line ends
         app.command(short_help=(command.__doc__ or "").partition("\n")[0])(command)

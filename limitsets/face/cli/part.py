@@ -42,8 +42,8 @@ def new(
     from_ : DRAWING
         A plate as a DXF or SVG file: its outline and holes become the part.
     unit : UNIT
-        Of its lengths: mm, cm, m, in, ...; default in, with --from that of the drawing. A drawing that states none is in
-        this unit.
+        Of its lengths: mm, cm, m, in, ...; default in, with --from that of the drawing. A drawing that states none is
+        in this unit.
     material : NAME
         With --from: of the plate, for its density: steel, aluminium, brass, ...
     density : DENSITY

@@ -39,8 +39,8 @@ TIPS: dict[str, Any] = {"color": style.FLIP, "lw": 3.0, "ls": (0, (1.5, 1))}
 
 MIDDLE: dict[str, Any] = {"ha": "center", "va": "center"}
 
-# Sides with a name.
-NAMED = 12
+# Of a part with more sides only those have names that are longer than this share of the longest.
+NAMED, LONG = 12, 0.1
 
 # Distance of a side's name from the side [points].
 CLEAR = 4
@@ -88,7 +88,7 @@ def part(scene: Scene) -> Figure:
         style.key("centre of mass", **CENTRE),
         style.key("a along side 0 from its left end, d above it", **FOOT),
         style.key("mass added", **MASS) if masses else None,
-        style.key("convex hull, on which it rests", **HULL) if plate else None,
+        style.key("convex hull: its sides", **HULL) if plate else None,
         None if all(resting) else style.key("the part cannot rest on this side", **TIPS),
     ]
     return style.finished(figure, f"{scene.name}: the part, lying on side 0", handles)
@@ -202,9 +202,10 @@ def _sides(axes: Axes, scene: Scene, corners: Array, resting: list[bool]) -> Non
 
 
 def _named(scene: Scene) -> list[int]:
-    """Say which sides are named: all, but of many, the chords of an arc, the longest alone."""
-    longest = np.argsort(-scene.sides.length, kind="stable")[:NAMED]
-    return sorted(longest.tolist())
+    """Say which sides are named: all, but of many, the chords of an arc among them, the long ones alone."""
+    lengths = scene.sides.length
+    short = LONG * lengths.max() if len(lengths) > NAMED else 0.0
+    return np.flatnonzero(lengths >= short).tolist()
 
 
 def _centre(axes: Axes, scene: Scene, size: float) -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from limitsets.proofs.prover.stability import SideStability, Stability
 
 MOST = 12
-"""Sides that are drawn: of a part with more, those on which it lies most stably."""
+"""Sides that are drawn: of a part with more, those on which it rests, the most stable ones."""
 ACROSS = 4
 CONE: dict[str, Any] = {"color": style.JOG, "lw": 1.2, "ls": (0, (4, 2))}
 
@@ -38,8 +38,9 @@ def resting_sides(answer: Stability) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        A panel for each side, at most 12: the part, its centre of mass, lines from there to both ends of the side with
-        their angles, proved ones rounded down.  A side on which the part does not rest is dashed.
+        A panel for each side, of more than 12 for those on which the part rests: the part, its centre of mass, lines
+        from there to both ends of the side with their angles, proved ones rounded down.  A side on which the part does
+        not rest is dashed.
 
     Examples
     --------
@@ -49,7 +50,9 @@ def resting_sides(answer: Stability) -> Figure:
     3
     """
     scene = answer.scene
-    stable = sorted(answer.sides, key=lambda each: min(each.left[0], each.right[0]), reverse=True)[:MOST]
+    few = len(answer.sides) <= MOST
+    resting = [each for each in answer.sides if few or each.rests]
+    stable = sorted(resting, key=lambda each: min(each.left[0], each.right[0]), reverse=True)[:MOST]
     drawn = sorted(stable, key=lambda each: each.side)
     across = min(len(drawn), ACROSS)
     down = math.ceil(len(drawn) / across)

@@ -160,7 +160,7 @@ class Analysis(Tabled):
 
     @property
     def choices(self) -> list[tuple[int, float, float]]:
-        """For which X of a goal `oriented_beyond` a side is right, and every limit set gets beyond X: side, from, to."""
+        """For which X of a goal `oriented_beyond` a side is right, and all limit sets get there: side, from, to."""
         return choices_of(self.extents, len(self.scene.sides))
 
     @property

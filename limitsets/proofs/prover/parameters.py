@@ -463,11 +463,12 @@ def body_of(scene: Scene, tolerance: Mapping[str, str]) -> list[tuple[RationalIn
     try:
         return _Spans(scene.unit, tree).narrow_body()[0]
     except (ZeroDivisionError, ValueError):
-        raise NO_PART from None
+        raise _no_part() from None
 
 
-# Of a length that may be nothing, sides that do not meet, a flat corner.
-NO_PART = AnswerError("the part", "of no convex shape", "one, throughout the tolerance", NARROWER)
+def _no_part() -> AnswerError:
+    """Refuse a length that may be nothing, sides that do not meet, a flat corner."""
+    return AnswerError("the part", "of no convex shape", "one, throughout the tolerance", NARROWER)
 
 
 def _require_rest(
@@ -542,7 +543,7 @@ def parameter_box(
         full = simulated(scene)
         angles, p, q = reader.seen_from_sides() if full is not None else ([], [], [])
     except (ZeroDivisionError, ValueError):
-        raise NO_PART from None
+        raise _no_part() from None
     _require_rest(sides, scene.sides.rests.tolist(), kappa, radius)
     scalars = [kappa, reader.number("arm.surface_height"), reader.number("arm.length"), radius]
     ends = [span.outward() for span in scalars]
