@@ -158,3 +158,28 @@ def test_a_vertex_beside_the_hull_by_less_than_a_double_tells() -> None:
     beyond = replaced(bracket(), "mm", None, {"part.vertices[1].y": text})
     with pytest.raises(SceneError, match="vertex 1 is 'almost on the line"):
         ls.load(beyond)
+
+
+def test_a_triangle_by_its_sides_may_have_holes_in_the_frame_of_side_0() -> None:
+    """A triangle of 60, 80 and 100 mm with its right angle at (0, 0), bored through at (20, 20): masses by hand."""
+    raw = bracket() | MODEL
+    hole = {"center": {"x": "20 mm", "y": "20 mm"}, "diameter": "20 mm"}
+    mass = {"plate_density": "1 kg/m^2"}
+    raw["part"] = {"sides": ["60 mm", "80 mm", "100 mm"], "holes": [hole], "mass": mass}
+    arb = flint.arb
+    area, disc = arb(2400), arb.pi() * 100
+    x, y = ((area * middle - disc * 20) / (area - disc) for middle in (arb(20), arb(80) / 3))
+    # about the corner with the right angle: b h (b^2 + h^2)/12; of the disc r^2/2 + 20^2 + 20^2
+    second = arb(60 * 80 * (60**2 + 80**2)) / 12 - disc * (50 + 800)
+    rho2 = second / (area - disc) - x**2 - y**2
+    box, checked = parameter_box(ls.load(raw)), checker.scene.read_scene(raw, None)
+    for value, lo, hi in (
+        (x, box.lo.a[0], box.hi.a[0]),
+        (y, box.lo.d[0], box.hi.d[0]),
+        (rho2.sqrt(), box.lo.radius_of_gyration, box.hi.radius_of_gyration),
+    ):
+        assert value >= lo
+        assert value <= hi
+        assert hi - lo < 1e-12 * hi
+    assert checked.sides[0].a.overlaps(x)
+    assert checked.sides[0].rho2.overlaps(rho2)

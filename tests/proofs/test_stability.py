@@ -52,7 +52,9 @@ def test_a_tolerance_widens_the_angles_by_what_it_moves_the_foot() -> None:
     high = stability("paper-designed", tolerance={"part.mass.center.above": "0.05 in"}).sides[2]
     heights = [0.7082490 + 0.05, 0.7082490 - 0.05]
     lifts = [float(mpmath.hypot(4.2255778, height) - height) for height in heights]
-    assert high.lift_left == pytest.approx(lifts, rel=1e-9)  # the higher the centre of mass, the less it rises
+    assert high.lift_left == pytest.approx(
+        lifts, rel=1e-9
+    )  # the higher the centre of mass, the less it rises
     with pytest.raises(AnswerError, match="the foot of the centre of mass on side 0"):
         stability("paper-designed", tolerance={"part.mass.center.along": "4.3 in"})
 
@@ -71,6 +73,8 @@ def test_a_side_on_which_the_part_does_not_rest_tips_by_itself() -> None:
     (chamfer,) = (each for each in answer.sides if not each.rests)
     assert min(chamfer.left[1], chamfer.right[1]) < 0.0 < max(chamfer.left[0], chamfer.right[0])
     assert [row[4] for row in answer.table().rows] == resting
-    (panel,) = (axes for axes in ls.plot.resting_sides(answer).axes if axes.get_title() == f"side {chamfer.side}")
+    (panel,) = (
+        axes for axes in ls.plot.resting_sides(answer).axes if axes.get_title() == f"side {chamfer.side}"
+    )
     assert sorted(text.get_text() for text in panel.texts) == ["", "tips"]
     assert any(line.get_gid() == "no rest" for line in panel.lines)
