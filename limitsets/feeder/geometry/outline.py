@@ -83,6 +83,8 @@ def outline_polygon(vertices: npt.ArrayLike) -> Array:
     points = checked_points(vertices)
     count = len(points)
     sine, cosine, rounds = turning(points)
+    if (sine > FLAT).all() and rounds == 1:  # convex
+        return points
     back = np.flatnonzero((np.abs(sine) <= FLAT) & (cosine < 0))
     apart = (np.arange(count)[:, None] - np.arange(count)) % count
     meet = _crossing(points, points) & (apart > 1) & (apart < count - 1)

@@ -381,7 +381,7 @@ class Floats(Numbers):
         vertices.flags.writeable = outline.flags.writeable = False
         x, y = centre.in_frame(pairs) if isinstance(centre, OnSide) else centre
         if isinstance(centre, OnSide):
-            self._require_possible(radius, float(largest_radius(vertices, (x, y))))
+            self._require_possible(radius, _largest(tuple(pairs), (x, y)))
         return Body(vertices, (x, y), radius, sides, outline, holes)
 
     def _require_possible(self, radius: float, largest: float) -> None:
@@ -399,6 +399,11 @@ class Floats(Numbers):
         allowed = f"gravity/speed^2 from {LEAST:g} to {1 / LEAST:g} {self.resolver.unit}"
         self.resolver.require(good, "throw.speed", "this angular speed", allowed)
         return ratio
+
+
+@functools.lru_cache(maxsize=64)  # in a search mostly of the same part
+def _largest(vertices: tuple[Vector, ...], centre: Vector) -> float:
+    return float(largest_radius(vertices, centre))
 
 
 def _pairs(vertices: Array) -> list[Vector]:
