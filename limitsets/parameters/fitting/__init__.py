@@ -4,9 +4,12 @@
 
 `throws` reads the film.  `likelihood` says what each throw was, how likely the film is, and what to film next.
 `searching` finds the most likely machine and how far it may be from the true one.  `misfit` tests the model itself and
-looks for a misreading of the film.  `fit_result` says whether the goal's margin is large enough.
+looks for a misreading of the film.  `fit_result` says whether the goal's margin is large enough.  `filmed` makes the
+file of throws from the table of a tracker: `tracks` reads it, `poses` says where the part is, `rests`
+where it lies still.
 """
 
+from limitsets.parameters.fitting.filmed import Film, throws_of_film
 from limitsets.parameters.fitting.fit_result import Enough, Fit, Fitted, Scatter, enough
 from limitsets.parameters.fitting.fitting_run import Bootstrap, bootstrap, fit, simulated_throws
 from limitsets.parameters.fitting.throws import Throws, read_throws
@@ -14,6 +17,7 @@ from limitsets.parameters.fitting.throws import Throws, read_throws
 __all__ = [
     "Bootstrap",
     "Enough",
+    "Film",
     "Fit",
     "Fitted",
     "Scatter",
@@ -23,4 +27,5 @@ __all__ = [
     "fit",
     "read_throws",
     "simulated_throws",
+    "throws_of_film",
 ]

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from limitsets.base import DataError
 from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.feeder.scene import Scene
-from limitsets.parameters.fitting.tracks import CENTRE, Points, Tracks
-from limitsets.parameters.fitting.view import View
+from limitsets.parameters.fitting.tracks import CENTRE, Points, Tracks, View, refuse
 
 # The quarter of all normal numbers that are nearest to 0 lie within this, in standard deviations.
 _QUARTER = 0.3186
@@ -26,7 +24,7 @@ _SCALE_OFF = 0.05
 # The change of the scale over a film from which places are not believed: it moves them by as much.
 _PERSPECTIVE = 0.03
 
-NO_ROW, FEW, FAR = "no row in the table", "fewer than two points", "points exchanged or far off"
+NO_ROW, FEW, FAR = "no row in the table", "too few points seen", "points exchanged or far off"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +42,7 @@ class Poses:
     off : ndarray of complex, shape (n, k)
         Where points were seen less where the pose has them; nan where they were not [length].
     noise : float
-        Standard deviation of one coordinate of one point from frame to frame [length].
+        Standard deviation of one coordinate of one point from frame to frame, flights counted in [length].
     scale, scale_error : float
         Size of the part in the film over that in the scene; nan for a marker, which has none.
     left_out : dict of str to ndarray of int
@@ -108,106 +106,120 @@ def poses_of(tracks: Tracks, scene: Scene, view: View, marker: tuple[complex, fl
         Points that the part does not have, another part, another scale, a camera that looks at an angle.
     """
     missing = np.setdiff1d(np.arange(tracks.frames[0], tracks.frames[-1] + 1), tracks.frames)
+    places, names = view(tracks.at), [name for name in tracks.names if name != CENTRE]
+    nowhere = np.full(len(places), complex(math.nan, math.nan))
+    centre = places[:, tracks.names.index(CENTRE)] if CENTRE in tracks.names else nowhere
     if tracks.angle is not None:
-        return _of_marker(tracks, scene, view, marker, missing)
-    vertices = scene.outline @ np.array([1.0, 1j])
-    names = [name for name in tracks.names if name != CENTRE]
-    numbers = [int(name[1:]) for name in names]
-    if len(numbers) < 2 or max(numbers) >= len(vertices):
-        given = ", ".join(tracks.names)
-        allowed = f"two or more of this part's vertices, P0 to P{len(vertices) - 1}"
-        remedy = "count them as the scene does; the centre of mass alone shows no side"
-        raise DataError("the points", given, allowed, remedy, file=tracks.file)
-    places = view(tracks.at)
-    seen = places[:, [tracks.names.index(name) for name in names]]
-    centre = places[:, tracks.names.index(CENTRE)] if CENTRE in tracks.names else np.full(len(seen), np.nan)
-    enough = np.isfinite(seen).sum(axis=1) >= 2
-    if not enough.any():
-        remedy = "lower the likelihood, or track more points"
-        raise DataError("the frames", "none with two points", "some", remedy, file=tracks.file)
-    left_out = {NO_ROW: missing, FEW: tracks.frames[~enough]}
-    frames, seen, centre = tracks.frames[enough], seen[enough], centre[enough]
-    used, body = np.isfinite(seen), vertices[numbers]
-    middles = [np.where(used, each, 0).sum(axis=1) / used.sum(axis=1) for each in (body[None], seen)]
-    own = np.where(used, body - middles[0][:, None], 0)
-    there = np.where(used, seen - middles[1][:, None], 0)
-    size = size_of(scene)
-    fit, spread = (own.conj() * there).sum(axis=1), (abs(own) ** 2).sum(axis=1)
-    turn = fit / np.maximum(abs(fit), FINEST * spread)  # of points that coincide there is no turn: far off
-    scales = abs(fit) / spread
-    _require_shape(own, there, used, tracks.file)
-    _require_one_scale(scales, middles[1].real, tracks.file)
-    scale = float(np.median(scales))
-    parts = np.stack([seen.real, seen.imag], axis=2).reshape(len(seen), -1)
-    noise = float(np.median(noise_of(frames, parts)))
-    off = np.where(used, there - scale * turn[:, None] * own, np.nan)
-    size_off = np.sqrt(np.nansum(abs(off) ** 2, axis=1) / (2 * used.sum(axis=1) - 3))
-    near = size_off <= np.median(size_off) + SIXFOLD * noise + FINEST * size
-    left_out[FAR] = frames[~near]
-    error = 1.2533 * float(np.std(scales[near])) / math.sqrt(max(int(near.sum()), 1))  # of a median
-    at = middles[1] - turn * middles[0]
-    return Poses(frames[near], at[near], turn[near], centre[near], off[near], noise, scale, error, left_out)
-
-
-def _of_marker(
-    tracks: Tracks, scene: Scene, view: View, marker: tuple[complex, float], missing: Ints
-) -> Poses:
-    assert tracks.angle is not None
-    spots = tracks.at[:, 0]
-    seen: Mask = np.isfinite(spots) & np.isfinite(tracks.angle)
-    frames, spots, angle = tracks.frames[seen], spots[seen], tracks.angle[seen]
-    here = view(spots)
-    # the direction by a second point on the axis: a camera that looks at an angle turns directions, too
-    axis = view(spots + np.exp(1j * angle)) - here
-    spot, turned = marker
-    turn = axis / abs(axis) * np.exp(-1j * turned)
-    parts = np.stack([here.real, here.imag], axis=1)
-    noise = float(np.median(noise_of(frames, parts))) if len(frames) else 0.0
-    left_out = {NO_ROW: missing, FEW: tracks.frames[~seen]}
-    nothing = np.full(len(frames), complex(math.nan, math.nan))
-    return Poses(
-        frames, here - turn * spot, turn, nothing, nothing[:, None], noise, math.nan, math.nan, left_out
+        spots, angle, (spot, turned) = tracks.at[:, 0], tracks.angle, marker
+        marked = np.isfinite(spots) & np.isfinite(angle)
+        # the direction by a second point on the axis: a camera that looks at an angle turns directions, too
+        axis = view(spots + np.exp(1j * angle))[marked] - places[marked, 0]
+        turn = axis / abs(axis) * np.exp(-1j * turned)
+        left_out, at = {NO_ROW: missing, FEW: tracks.frames[~marked]}, places[marked, 0] - turn * spot
+        parts = np.stack([at.real, at.imag], axis=1)
+        noise = float(np.median(noise_of(tracks.frames[marked], parts)))
+        lost = nowhere[marked]
+        return Poses(
+            tracks.frames[marked], at, turn, lost, lost[:, None], noise, math.nan, math.nan, left_out
+        )
+    vertices, numbers = scene.outline @ np.array([1.0, 1j]), [int(name[1:]) for name in names]
+    refuse(
+        len(numbers) < 2 or max(numbers) >= len(vertices),
+        "the points",
+        ", ".join(tracks.names),
+        f"two or more of this part's vertices, P0 to P{len(vertices) - 1}",
+        "count them as the scene does; the centre of mass alone shows no side",
+        file=tracks.file,
     )
+    seen = places[:, [tracks.names.index(name) for name in names]]
+    enough = np.isfinite(seen).sum(axis=1) >= 2
+    refuse(
+        not enough.any(),
+        "the frames",
+        "none with two points",
+        "some",
+        "lower the likelihood, or track more points",
+        file=tracks.file,
+    )
+    frames, seen, body = tracks.frames[enough], seen[enough], vertices[numbers]
+    used, size = np.isfinite(seen), size_of(scene)
+    middles = [np.where(used, each, 0).sum(axis=1) / used.sum(axis=1) for each in (body[None], seen)]
+    own, there = (np.where(used, e - m[:, None], 0) for e, m in zip((body, seen), middles, strict=True))
+    noise = float(np.median(noise_of(frames, np.hstack([seen.real, seen.imag]))))
+    _require_shape(own, there, used, noise / size, tracks.file)
+    fit, spread = (own.conj() * there).sum(axis=1), (abs(own) ** 2).sum(axis=1)
+    scales, turn = abs(fit) / spread, fit / np.maximum(abs(fit), np.finfo(float).tiny)
+    scale = _one_scale(scales, middles[1].real, tracks.file)
+    off = np.where(used, there - scale * turn[:, None] * own, np.nan)
+    misfit = np.sqrt(np.nansum(abs(off) ** 2, axis=1) / (2 * used.sum(axis=1) - 3))
+    near = misfit <= np.median(misfit) + SIXFOLD * noise + FINEST * size
+    error = 1.2533 * float(np.std(scales[near])) / math.sqrt(near.sum())  # of a median
+    left_out = {NO_ROW: missing, FEW: tracks.frames[~enough], FAR: frames[~near]}
+    at, turn = (middles[1] - turn * middles[0])[near], turn[near]
+    return Poses(frames[near], at, turn, centre[enough][near], off[near], noise, scale, error, left_out)
 
 
-def _require_shape(own: Points, there: Points, used: Mask, file: str) -> None:
+def _require_shape(own: Points, there: Points, used: Mask, noise: float, file: str) -> None:
     """Refuse points that lie to each other as those of another part, or of this one in a mirror."""
     several = used.sum(axis=1) >= 3
     if not several.any():
         return  # two points lie as any other two
     own, there = own[several], there[several]
-    sizes = np.sqrt((abs(own) ** 2).sum(axis=1) * (abs(there) ** 2).sum(axis=1))
-    like = abs((own.conj() * there).sum(axis=1)) / np.maximum(sizes, np.finfo(float).tiny)
-    mirror = abs((own * there).sum(axis=1)) / np.maximum(sizes, np.finfo(float).tiny)
-    off, off_in_mirror = (float(np.median(np.sqrt(np.maximum(1.0 - each**2, 0.0)))) for each in (like, mirror))
-    if off <= _OTHER_SHAPE:
-        return
-    if off_in_mirror <= _OTHER_SHAPE:
-        allowed = "points in the order of the scene's vertices, counterclockwise"
-        remedy = "where y points up say y-up; where the camera stands behind and the arm goes to the left, mirrored"
-        raise DataError("the order of the points", "that of a mirror", allowed, remedy, file=file)
-    allowed = f"the scene's part, up to {100 * _OTHER_SHAPE:g} %"
-    remedy = "take the scene of this part, and names of points as it counts its vertices"
-    raise DataError("the shape of the points", f"{100 * off:.0f} % off", allowed, remedy, file=file)
+    sizes = (abs(own) ** 2).sum(axis=1) * np.maximum((abs(there) ** 2).sum(axis=1), np.finfo(float).tiny)
+    # the share of the shape that turning and scaling one onto the other leave over
+    off, off_in_mirror = (
+        float(np.median(np.sqrt(np.maximum(1.0 - abs((each * there).sum(axis=1)) ** 2 / sizes, 0.0))))
+        for each in (own.conj(), own)
+    )
+    refuse(
+        off_in_mirror <= _OTHER_SHAPE < off,
+        "the order of the points",
+        "that of a mirror",
+        "points in the order of the scene's vertices, counterclockwise",
+        "where y points up say y-up; where the camera stands behind and the arm goes to the left, mirrored",
+        file=file,
+    )
+    refuse(
+        off > _OTHER_SHAPE and noise > 0.5 * _OTHER_SHAPE,
+        "the noise of the points",
+        f"{100 * noise:.0f} % of the part's size from frame to frame",
+        f"up to {50 * _OTHER_SHAPE:g} %, or any shape fits",
+        "film from nearer, or leave out frames that the tracker is not sure of",
+        file=file,
+    )
+    refuse(
+        off > _OTHER_SHAPE,
+        "the shape of the points",
+        f"{100 * off:.0f} % off",
+        f"the scene's part, up to {100 * _OTHER_SHAPE:g} %",
+        "take the scene of this part, and names of points as it counts its vertices",
+        file=file,
+    )
 
 
-def _require_one_scale(scales: Array, x: Array, file: str) -> None:
-    """Refuse a scale that is not the scene's, or that changes along the arm."""
+def _one_scale(scales: Array, x: Array, file: str) -> float:
+    """Give the scale; refuse one that is not the scene's, or that changes along the arm."""
     scale = float(np.median(scales))
     usual = abs(scales - scale) < 0.5 * scale  # points exchanged show any
-    x, scales = x[usual], scales[usual]
-    if x.size > 2 and np.ptp(x) > 0.0:
-        line = np.polynomial.Polynomial.fit(x, scales, 1)
-        slope = line.convert().coef[1] if len(line.convert().coef) > 1 else 0.0
-        span = float(np.diff(np.quantile(x, [0.05, 0.95]))[0])
-        change = slope * span / scale
-        rest = float(np.std(scales - line(x))) / (float(np.std(x)) * math.sqrt(x.size))
-        if abs(change) > _PERSPECTIVE and abs(slope) > SIXFOLD * rest:
-            remedy = "the camera looks at an angle (perspective): give corners, four pixels with their places"
-            allowed = f"one scale, up to {100 * _PERSPECTIVE:g} %"
-            given = f"{100 * change:+.1f} % from one end of the film's places to the other"
-            raise DataError("the change of the scale", given, allowed, remedy, file=file)
-    if abs(scale - 1.0) > _SCALE_OFF:
-        allowed = f"within {100 * _SCALE_OFF:g} % of the scene's"
-        remedy = f"correct the scale: length, origin and along make it {scale:.4g} times what it is in the scene"
-        raise DataError("the size of the part in the film", f"{scale:.4g} times", allowed, remedy, file=file)
+    x, scales = x[usual] - x[usual].mean(), scales[usual]
+    spread = max(float((x**2).sum()), np.finfo(float).tiny)
+    slope = float((x * scales).sum()) / spread
+    error = float(np.std(scales - scales.mean() - slope * x)) / math.sqrt(spread)
+    change = slope * float(np.diff(np.quantile(x, [0.05, 0.95]))[0]) / scale
+    refuse(
+        abs(change) > _PERSPECTIVE and abs(slope) > SIXFOLD * error,
+        "the change of the scale",
+        f"{100 * change:+.1f} % from one end of the film's places to the other",
+        f"up to {100 * _PERSPECTIVE:g} %",
+        "the camera looks at an angle (perspective): give corners, four pixels with their places",
+        file=file,
+    )
+    refuse(
+        abs(scale - 1.0) > _SCALE_OFF,
+        "the size of the part in the film",
+        f"{scale:.4g} times",
+        f"within {100 * _SCALE_OFF:g} % of that in the scene",
+        "correct the scale: length, origin and along; or it is another part",
+        file=file,
+    )
+    return scale

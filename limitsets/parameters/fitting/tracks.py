@@ -1,12 +1,13 @@
-"""Tables that trackers write: where marked points of the part, or one marker on it, are in each frame of a film."""
+"""Tables that trackers write: where points of the part, or one marker on it, are in each frame of a film."""
 
 from __future__ import annotations
 
 import csv
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -14,21 +15,29 @@ from numpy.typing import NDArray
 
 from limitsets.base import DataError, shown
 from limitsets.base.arrays import Array, Ints
-from limitsets.feeder.scene.units import UNITS
+from limitsets.feeder.scene import Scene
+from limitsets.feeder.scene.units import UNITS, convert, exact_factor, parse
+from limitsets.parameters.fitting.throws import length_of
 
 Points = NDArray[np.complex128]
 """Places in a plane: x + iy."""
+Pair = tuple[float, float]
+Place = tuple[float | str, float | str]
 
 CENTRE = "com"
 
-Row = tuple[int, list[str]]
-
 _HEAD = "columns frame (or time [s]), id, x, y, angle [deg] or [rad], or the three head rows of DeepLabCut"
+_NAMES = (
+    f"vertices of the part, P0, P1, ..., as the scene counts them, {CENTRE}, or one marker with its angle"
+)
 _POINT = re.compile(r"P\d+|com")
 _TITLE = re.compile(r"\s*([\w .-]*?)\s*(?:\[\s*([^\]]*?)\s*\])?\s*")
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?")
+_LARGEST = 1e12
 # A longer film is a mistake: numbers of frames that are times in microseconds, or the like.
 _MOST_FRAMES = 5_000_000
+# Corners nearer to a line than this share of their extent fix no plane: clicks on a picture are no better.
+_ON_A_LINE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +69,29 @@ class Tracks:
     angle: Array | None
     unit: str
     unread: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where a table has what: the first row after the head, the column of each number of each point, that of its id.
+
+    `turn` is the unit of angles in rad, 0 for points.
+    """
+
+    first: int
+    columns: dict[str, dict[str, int]]
+    unread: tuple[str, ...]
+    id_at: int | None = None
+    unit: str = "px"
+    turn: float = 0.0
+
+
+def refuse(
+    wrong: bool, thing: str, value: object, allowed: str, remedy: str, *, file: str, key: str | None = None
+) -> None:
+    """Raise the error of a film if something is wrong with it."""
+    if wrong:
+        raise DataError(thing, value, allowed, remedy, key=key, file=file)
 
 
 def read_tracks(file: str | Path, *, likelihood: float = 0.9) -> Tracks:
@@ -95,171 +127,275 @@ def read_tracks(file: str | Path, *, likelihood: float = 0.9) -> Tracks:
     """
     name = str(file).encode("utf-8", "backslashreplace").decode()  # what no terminal can print
     try:
-        text = Path(file).read_text(encoding="utf-8-sig")
+        # line by line: the number of a line is what an editor shows, and no tracker breaks a cell in two
+        numbered = list(enumerate(Path(file).read_text(encoding="utf-8-sig").splitlines(), 1))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        remedy = f"it could not be opened: {reason}"
-        raise DataError("the file", name, "a CSV file in UTF-8", remedy, file=name) from None
-    # read line by line: the number of a line is what an editor shows, and no tracker breaks a cell in two
-    lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if not line.lstrip().startswith("#")]
-    lines = [(k, line) for k, line in lines if line.strip(" \t,;")]
-    if not lines:
-        raise DataError("the file", "empty", _HEAD, "give the table of a tracker", file=name)
+        raise DataError(
+            "the file", name, "a CSV file in UTF-8", f"it could not be opened: {reason}", file=name
+        ) from None
+    lines = [(k, line) for k, line in numbered if line.strip(" \t,;") and not line.lstrip().startswith("#")]
+    refuse(not lines, "the file", "empty", _HEAD, "give the table of a tracker", file=name)
     separator = next((each for each in ";\t," if each in lines[0][1]), ",")
-    cells = csv.reader((line for _, line in lines), delimiter=separator)
-    rows = [(k, row) for (k, _), row in zip(lines, cells, strict=True)]
-    table = _Table(name, rows, separator == ";", likelihood)
-    return table.of_deeplabcut() if rows[0][1][0].strip().lower() == "scorer" else table.long()
+    cells = [
+        [cell.strip() for cell in row] for row in csv.reader((line for _, line in lines), delimiter=separator)
+    ]
+    layout = (_deeplabcut if cells[0][0].lower() == "scorer" else _long)(cells, name)
 
-
-@dataclass(frozen=True)
-class _Table:
-    """The rows of a file, with the numbers of their lines, and how its cells are read."""
-
-    file: str
-    rows: list[Row]
-    commas: bool
-    likelihood: float
-
-    def number(self, row: Row, column: int, head: str) -> float:
+    def number(k: int, column: int, head: str) -> float:
         """Read a cell; one that is empty or nan, or that is not there, holds no number."""
-        text = row[1][column].strip() if column < len(row[1]) else ""
-        if text.lower() in ("", "nan"):
+        text = cells[k][column] if column < len(cells[k]) else ""
+        plain = text.replace(",", ".") if separator == ";" else text
+        if plain.lower() in ("", "nan"):
             return math.nan
-        plain = text.replace(",", ".") if self.commas else text
-        if not _NUMBER.fullmatch(plain):
-            key = f"row {row[0]}, column {head}"
-            remedy = "correct it, or leave the cell empty where nothing was seen"
-            raise DataError("the number", shown(text), "a decimal number", remedy, key=key, file=self.file)
+        if not _NUMBER.fullmatch(plain) or abs(float(plain)) > _LARGEST:
+            raise DataError(
+                "the number",
+                shown(text),
+                f"a decimal number up to {_LARGEST:g}",
+                "correct it; leave cells of what was not seen empty",
+                key=f"row {lines[k][0]}, column {head}",
+                file=name,
+            )
         return float(plain)
 
-    def frame(self, row: Row, column: int) -> int:
-        value = self.number(row, column, "frame")
-        if not value.is_integer():
-            key = f"row {row[0]}, column frame"
-            allowed = "a whole number in every row"
-            raise DataError("the frame", value, allowed, "number the frames", key=key, file=self.file)
-        return int(value)
-
-    def of_deeplabcut(self) -> Tracks:
-        """Read what DeepLabCut writes: a row for each frame, and three columns for each point."""
-        words = [row[1][0].strip().lower() for row in self.rows[:3]]
-        if words != ["scorer", "bodyparts", "coords"]:
-            allowed, remedy = "scorer, bodyparts, coords", "export the film of one part, not of several"
-            raise DataError("the head rows", ", ".join(words), allowed, remedy, key="row 1", file=self.file)
-        parts, kinds = ([cell.strip() for cell in row[1]] for row in self.rows[1:3])
-        columns = {pair: k for k, pair in enumerate(zip(parts, kinds, strict=False)) if k}
-        names = [part for part in dict.fromkeys(parts[1:]) if _POINT.fullmatch(part)]
-        if not names:
-            raise _no_point(parts[1:], self.file, f"row {self.rows[1][0]}")
-        for pair in ((part, kind) for part in names for kind in ("x", "y")):
-            if pair not in columns:
-                missing, key = " ".join(pair), f"row {self.rows[2][0]}"
-                allowed = "x, y and likelihood of each point"
-                raise DataError("the column", f"{missing} missing", allowed, "add it", key=key, file=self.file)
-        seen: dict[tuple[int, str], tuple[complex, float]] = {}
-        for row in self.rows[3:]:
-            frame = self.frame(row, 0)
-            for part in names:
-                x, y = (self.number(row, columns[part, kind], f"{part} {kind}") for kind in "xy")
-                sure = columns.get((part, "likelihood"))
-                unsure = sure is not None and self.number(row, sure, f"{part} likelihood") < self.likelihood
-                self.add(seen, row, (frame, part), (math.nan if unsure else complex(x, y), math.nan))
-        unread = tuple(part for part in dict.fromkeys(parts[1:]) if part not in names)
-        return self.gathered(seen, tuple(names), "px", unread)
-
-    def long(self) -> Tracks:
-        """Read a table with a row for each point, or for the marker, and frame."""
-        heads = [match.groups() if (match := _TITLE.fullmatch(cell)) else (cell, None) for cell in self.rows[0][1]]
-        place = {name.lower(): k for k, (name, _) in enumerate(heads)}
-        units = {name.lower(): unit for name, unit in heads}
-        key = f"row {self.rows[0][0]}"
-        for name in ("time" if "time" in place and "frame" not in place else "frame", "id", "x", "y"):
-            if name not in place:
-                raise DataError("the column", f"{name} missing", _HEAD, "add it", key=key, file=self.file)
-        unit = units["x"] or "px"
-        if units["y"] != units["x"] or unit not in ("px", *UNITS["length"]):
-            allowed = f"px or one of {', '.join(UNITS['length'])}, the same for both"
-            given, remedy = f"{units['x']} of x, {units['y']} of y", 'write "x [mm]", "y [mm]"'
-            raise DataError("the unit", given, allowed, remedy, key=key, file=self.file)
-        body = self.rows[1:]
-        ids = [row[1][place["id"]].strip() if place["id"] < len(row[1]) else "" for row in body]
-        names = [each for each in dict.fromkeys(ids) if _POINT.fullmatch(each)]
-        turn = 0.0
-        if not names:
-            if len(set(ids)) != 1 or "angle" not in place:
-                raise _no_point(ids, self.file, "column id")
-            names = ids[:1]
-            turn = {"deg": math.pi / 180.0, "rad": 1.0}.get(units["angle"] or "", 0.0)
-            if not turn:
+    seen: dict[tuple[float, str], tuple[complex, float]] = {}
+    for k in range(layout.first, len(cells)):
+        refuse(
+            any(cells[k][len(cells[0]) :]),
+            "the number of cells",
+            len(cells[k]),
+            f"{len(cells[0])}, one for each column",
+            "correct the row; decimals have a comma only where semicolons separate columns",
+            key=f"row {lines[k][0]}",
+            file=name,
+        )
+        here = cells[k] + [""] * (0 if layout.id_at is None else layout.id_at + 1 - len(cells[k]))
+        for point in layout.columns if layout.id_at is None else [here[layout.id_at]]:
+            if point not in layout.columns:
+                continue
+            columns = layout.columns[point]
+            value = {kind: number(k, column, f"{kind} of {point}") for kind, column in columns.items()}
+            frame = value["time"] if "time" in value else value["frame"]
+            if not math.isfinite(frame) or not ("time" in value or frame.is_integer()):
                 raise DataError(
-                    "the unit", units["angle"], "deg or rad", 'write "angle [deg]"', key=key, file=self.file
+                    "the frame",
+                    frame,
+                    "a whole number, or a time, in every row",
+                    "number the frames",
+                    key=f"row {lines[k][0]}, column frame",
+                    file=name,
                 )
-        frames = self.frames(body, place)
-        seen: dict[tuple[int, str], tuple[complex, float]] = {}
-        for row, frame, name in zip(body, frames, ids, strict=True):
-            if name in names:
-                x, y = self.number(row, place["x"], "x"), self.number(row, place["y"], "y")
-                angle = turn * self.number(row, place["angle"], "angle") if turn else math.nan
-                unsure = "likelihood" in place and (
-                    self.number(row, place["likelihood"], "likelihood") < self.likelihood
+            if (frame, point) in seen:
+                raise DataError(
+                    "the point",
+                    f"{point} twice in frame {frame:g}",
+                    "each once in a frame",
+                    "leave one out",
+                    key=f"row {lines[k][0]}",
+                    file=name,
                 )
-                self.add(seen, row, (frame, name), (math.nan if unsure else complex(x, y), angle))
-        known = ("frame", "time", "id", "x", "y", "likelihood", *(["angle"] if turn else []))
-        others = [name for name in place if name not in known]
-        unread = (*others, *(each for each in dict.fromkeys(ids) if each not in names))
-        return self.gathered(seen, tuple(names), unit, unread, marker=turn > 0.0)
-
-    def frames(self, body: list[Row], place: dict[str, int]) -> list[int]:
-        """Number the frames of rows; of times, the frame is how many of the usual steps have passed."""
-        if "frame" in place:
-            return [self.frame(row, place["frame"]) for row in body]
-        times = np.array([self.number(row, place["time"], "time") for row in body])
-        if not np.isfinite(times).all():
-            row = body[int(np.argmin(np.isfinite(times)))][0]
-            key = f"row {row}, column time"
-            raise DataError("the time", "empty", "a number in every row", "add it", key=key, file=self.file)
-        steps = np.diff(np.unique(times))
-        step = float(np.median(steps)) if steps.size else 1.0
-        numbers: list[int] = np.rint((times - times.min()) / step).astype(np.int64).tolist()
-        return numbers
-
-    def add(
-        self,
-        seen: dict[tuple[int, str], tuple[complex, float]],
-        row: Row,
-        which: tuple[int, str],
-        what: tuple[complex, float],
-    ) -> None:
-        if which in seen:
-            key, twice = f"row {row[0]}", f"{which[1]} twice in frame {which[0]}"
-            raise DataError("the point", twice, "each once in a frame", "leave one out", key=key, file=self.file)
-        seen[which] = what
-
-    def gathered(
-        self,
-        seen: dict[tuple[int, str], tuple[complex, float]],
-        names: tuple[str, ...],
-        unit: str,
-        unread: Sequence[str],
-        *,
-        marker: bool = False,
-    ) -> Tracks:
-        numbers = np.unique(np.array([frame for frame, _ in seen], dtype=np.int64))
-        if not numbers.size or numbers[-1] - numbers[0] > _MOST_FRAMES:
-            span = f"{numbers[0]} to {numbers[-1]}" if numbers.size else "none"
-            allowed = f"numbers of frames within {_MOST_FRAMES}"
-            raise DataError("the frames", span, allowed, "number the frames from 0", file=self.file)
-        line = {int(frame): k for k, frame in enumerate(numbers)}
-        at = np.full((numbers.size, len(names)), complex(math.nan, math.nan))
-        angle = np.full(numbers.size, math.nan)
-        for (frame, name), (spot, turned) in seen.items():
-            at[line[frame], names.index(name)] = spot
-            angle[line[frame]] = turned
-        return Tracks(self.file, numbers, names, at, angle if marker else None, unit, tuple(unread))
+            unsure = "likelihood" in value and not value["likelihood"] >= likelihood
+            spot = math.nan if unsure else complex(value["x"], value["y"])
+            seen[frame, point] = spot, layout.turn * value.get("angle", math.nan)
+    times, which = np.unique([frame for frame, _ in seen], return_inverse=True)
+    # of times, the number of a frame is how many of the usual steps have passed
+    if seen and "time" in next(iter(layout.columns.values())):
+        times = np.rint((times - times[0]) / (np.median(np.diff(times)) if times.size > 1 else 1.0))
+    refuse(
+        not seen or np.ptp(times) > _MOST_FRAMES or (np.diff(times) == 0).any(),
+        "the frames",
+        f"{times[0]:g} to {times[-1]:g}" if seen else "none",
+        f"numbers of frames within {_MOST_FRAMES}, or times with one step",
+        "number the frames from 0",
+        file=name,
+    )
+    names = tuple(layout.columns)
+    at, angle = np.full((times.size, len(names)), complex(math.nan, math.nan)), np.full(times.size, math.nan)
+    for ((_, point), (spot, turned)), k in zip(seen.items(), which.tolist(), strict=True):
+        at[k, names.index(point)], angle[k] = spot, turned
+    turns = angle if layout.turn else None
+    return Tracks(name, times.astype(np.int64), names, at, turns, layout.unit, layout.unread)
 
 
-def _no_point(names: Sequence[str], file: str, key: str) -> DataError:
-    given = shown(", ".join(dict.fromkeys(names)) or "none")
-    allowed = f"points of the part, P0, P1, ... as the scene counts its vertices, {CENTRE}, or one marker with angle"
-    return DataError("the names of points", given, allowed, "rename them in the table", key=key, file=file)
+def _deeplabcut(cells: list[list[str]], name: str) -> _Layout:
+    """Read the head of DeepLabCut: a row for each frame, three columns for each point."""
+    words = [row[0].lower() for row in cells[:3]]
+    refuse(
+        words != ["scorer", "bodyparts", "coords"],
+        "the head rows",
+        ", ".join(words),
+        "scorer, bodyparts, coords",
+        "export the film of one part, not of several",
+        file=name,
+    )
+    columns: dict[str, dict[str, int]] = {}
+    for k, (part, kind) in enumerate(zip(cells[1], cells[2], strict=False)):
+        if k:
+            columns.setdefault(part, {"frame": 0})[kind] = k
+    known = {part: own for part, own in columns.items() if _POINT.fullmatch(part)}
+    refuse(
+        not known,
+        "the names of points",
+        shown(", ".join(columns) or "none"),
+        _NAMES,
+        "rename them in the table",
+        file=name,
+    )
+    for part, kind in ((part, kind) for part in known for kind in "xy" if kind not in known[part]):
+        allowed = "x, y and likelihood of each point"
+        raise DataError("the column", f"{part} {kind} missing", allowed, "add it", file=name)
+    return _Layout(3, known, tuple(part for part in columns if part not in known))
+
+
+def _long(cells: list[list[str]], name: str) -> _Layout:
+    """Read the head of a table with a row for each point, or for the marker, and frame."""
+    heads = [match.groups() if (match := _TITLE.fullmatch(cell)) else (cell, None) for cell in cells[0]]
+    place, units = (
+        {each.lower(): k for k, (each, _) in enumerate(heads)},
+        {each.lower(): u for each, u in heads},
+    )
+    twice = ", ".join(each for each in place if [head.lower() for head, _ in heads].count(each) > 1)
+    refuse(bool(twice), "the column", twice, "each column once", "leave one out", key="the head", file=name)
+    clock = "time" if "time" in place and "frame" not in place else "frame"
+    for each in (clock, "id", "x", "y"):
+        refuse(each not in place, "the column", f"{each} missing", _HEAD, "add it", key="the head", file=name)
+    unit = units["x"] or "px"
+    refuse(
+        units["y"] != units["x"] or unit not in ("px", *UNITS["length"]),
+        "the unit",
+        f"{units['x']} of x, {units['y']} of y",
+        f"px or one of {', '.join(UNITS['length'])}",
+        'the same for both: write "x [mm]", "y [mm]"',
+        key="the head",
+        file=name,
+    )
+    ids = list(dict.fromkeys(row[place["id"]] for row in cells[1:] if place["id"] < len(row)))
+    names, turn = [each for each in ids if _POINT.fullmatch(each)], 0.0
+    if not names:
+        refuse(
+            len(ids) != 1 or "angle" not in place,
+            "the names of points",
+            shown(", ".join(ids) or "none"),
+            _NAMES,
+            "rename them in column id",
+            file=name,
+        )
+        names, turn = ids, {"deg": math.pi / 180.0, "rad": 1.0}.get(units["angle"] or "", 0.0)
+        refuse(
+            not turn,
+            "the unit",
+            units["angle"],
+            "deg or rad",
+            'write "angle [deg]"',
+            key="the head",
+            file=name,
+        )
+    kinds = (clock, "x", "y", "likelihood", *(["angle"] if turn else []))
+    own = {kind: place[kind] for kind in kinds if kind in place}
+    others = [each for each in place if each not in (*kinds, "id")]
+    unread = (*others, *(each for each in ids if each not in names))
+    return _Layout(1, dict.fromkeys(names, own), unread, place["id"], unit, turn)
+
+
+# ----------------------------------------------------------------
+# How the camera sees the plane of motion: from numbers of the table to places from the joint.
+
+
+View = Callable[[Points], Points]
+
+
+def view_of(
+    tracks: Tracks,
+    scene: Scene,
+    *,
+    origin: Pair | None,
+    along: Pair | None,
+    length: float | str | None,
+    corners: Sequence[tuple[Pair, Place]] | None,
+    y_up: bool,
+    mirrored: bool,
+) -> View:
+    """Give the function from x + iy of the table to x + iy of the plane, x along the arm from the joint, y up.
+
+    Raises
+    ------
+    DataError
+        A scale that is missing or given twice, points that are one, corners on a line.
+    """
+    file, pixels = tracks.file, tracks.unit == "px"
+    scales = [("a unit", not pixels), ("corners", corners is not None), ("a length", length is not None)]
+    given = [word for word, there in scales if there]
+    refuse(
+        len(given) > 1 or (corners is not None and mirrored),
+        "the scale",
+        " and ".join(given + ["mirrored"] * mirrored),
+        "one of unit, corners, length",
+        "leave one out",
+        file=file,
+    )
+    refuse(
+        not given or (length is not None and (origin is None or along is None)),
+        "the scale of x and y in pixels",
+        "missing",
+        "origin (the joint), along (a point of the arm's line) and length (between these two)",
+        "give all three, or corners; or x and y with a unit of length in the head",
+        file=file,
+    )
+    factor = 1.0 if pixels else float(exact_factor(tracks.unit, scene.unit))
+    flat = _homography(corners, scene, file) if corners else lambda z: factor * (z if y_up else z.conj())
+    # the joint is 0 in tables of lengths and in places of corners
+    start = 0j if origin is None else flat(np.array([complex(*origin)]))[0]
+    end = start + 1.0 if along is None else flat(np.array([complex(*along)]))[0]
+    refuse(
+        start == end,
+        "along",
+        "the origin itself",
+        "a point of the arm's line away from the joint",
+        "name another point",
+        file=file,
+    )
+    size = (
+        1.0
+        if length is None
+        else length_of(length, scene, "the length from origin to along") / abs(end - start)
+    )
+    turn = size * abs(end - start) / (end - start)
+    return lambda z: np.asarray(((flat(z) - start) * turn).conj() if mirrored else (flat(z) - start) * turn)
+
+
+def pair_of(place: Place, scene: Scene) -> complex:
+    """Read two lengths: texts with a unit, or numbers in the scene's unit."""
+    x, y = (convert(parse(v, "length"), scene.unit) if isinstance(v, str) else float(v) for v in place)
+    return complex(x, y)
+
+
+def _homography(corners: Sequence[tuple[Pair, Place]], scene: Scene, file: str) -> View:
+    """Find the projective map that takes pixels to places: the null vector of two equations for each corner."""
+    refuse(len(corners) != 4, "the number of corners", len(corners), "four", "give four", file=file)
+    pixels = np.array([complex(*pixel) for pixel, _ in corners])
+    places = np.array([pair_of(place, scene) for _, place in corners])
+    for each in (pixels, places):
+        areas = [abs(((b - a).conjugate() * (c - a)).imag) for a, b, c in combinations(each, 3)]
+        refuse(
+            min(areas) <= _ON_A_LINE * abs(each[:, None] - each).max() ** 2,
+            "the corners",
+            "three on a line",
+            "four corners",
+            "name others",
+            file=file,
+        )
+    # numbers of the size of 1, or squares of pixels drown the rest
+    middle, shrunk = pixels.mean(), 1.0 / abs(pixels - pixels.mean()).max()
+    p = (pixels - middle) * shrunk
+    head = np.stack([p.real, p.imag, np.ones(4)], axis=1)
+    none = np.zeros_like(head)
+    rows = [[head, none, -places.real[:, None] * head], [none, head, -places.imag[:, None] * head]]
+    matrix = np.linalg.svd(np.block(rows))[2][-1].reshape(3, 3)
+
+    def flat(points: Points) -> Points:
+        q = (points - middle) * shrunk  # nan over a number would warn
+        x, y, w = (row[0] * q.real + row[1] * q.imag + row[2] for row in matrix)
+        return np.asarray(x / w + 1j * (y / w))
+
+    return flat
