@@ -143,7 +143,7 @@ def test_analyse(capfd):
 
 def test_analyse_in_words(capfd):
     out = prints(capfd, "analyse paper-initial -o here --cells 2048")
-    assert "18.995 to 19.976, 20.434 to 21.554" in out
+    assert "18.994 to 19.976, 20.434 to 21.555" in out
     assert "goal oriented_beyond: does not hold (sampled, not proved)" in out
     assert f"report: {Path('here') / 'report.md'}" in out
 

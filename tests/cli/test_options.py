@@ -240,7 +240,6 @@ IN_ITS_TEXT = ("effects", "basins", "starts", "goal", "units")
         ("scenes", ""),
         ("throw", "paper-designed --x 8 --side 2"),
         ("plot", "paper-designed part"),
-        ("new", "new.toml"),
     ],
 )
 def test_the_keys_are_those_of_the_page(capfd, section, words):

@@ -120,7 +120,15 @@ def poses_of(tracks: Tracks, scene: Scene, view: View, marker: tuple[complex, fl
         noise = float(np.median(noise_of(tracks.frames[marked], parts)))
         lost = nowhere[marked]
         return Poses(
-            tracks.frames[marked], at, turn, lost, lost[:, None], noise, math.nan, math.nan, left_out
+            tracks.frames[marked],
+            at,
+            turn,
+            centre=lost,
+            off=lost[:, None],
+            noise=noise,
+            scale=math.nan,
+            scale_error=math.nan,
+            left_out=left_out,
         )
     vertices, numbers = scene.outline @ np.array([1.0, 1j]), [int(name[1:]) for name in names]
     refuse(
@@ -156,7 +164,17 @@ def poses_of(tracks: Tracks, scene: Scene, view: View, marker: tuple[complex, fl
     error = 1.2533 * float(np.std(scales[near])) / math.sqrt(near.sum())  # of a median
     left_out = {NO_ROW: missing, FEW: tracks.frames[~enough], FAR: frames[~near]}
     at, turn = (middles[1] - turn * middles[0])[near], turn[near]
-    return Poses(frames[near], at, turn, centre[enough][near], off[near], noise, scale, error, left_out)
+    return Poses(
+        frames[near],
+        at,
+        turn,
+        centre=centre[enough][near],
+        off=off[near],
+        noise=noise,
+        scale=scale,
+        scale_error=error,
+        left_out=left_out,
+    )
 
 
 def _require_shape(own: Points, there: Points, used: Mask, noise: float, file: str) -> None:

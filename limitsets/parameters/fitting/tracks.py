@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -125,79 +125,21 @@ def read_tracks(file: str | Path, *, likelihood: float = 0.9) -> Tracks:
     >>> tracks.names, tracks.at[0].tolist(), tracks.unit
     (('P0', 'P1'), [(100.5+200j), (150+200j)], 'px')
     """
-    name = str(file).encode("utf-8", "backslashreplace").decode()  # what no terminal can print
-    try:
-        # line by line: the number of a line is what an editor shows, and no tracker breaks a cell in two
-        numbered = list(enumerate(Path(file).read_text(encoding="utf-8-sig").splitlines(), 1))
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise DataError(
-            "the file", name, "a CSV file in UTF-8", f"it could not be opened: {reason}", file=name
-        ) from None
-    lines = [(k, line) for k, line in numbered if line.strip(" \t,;") and not line.lstrip().startswith("#")]
-    refuse(not lines, "the file", "empty", _HEAD, "give the table of a tracker", file=name)
-    separator = next((each for each in ";\t," if each in lines[0][1]), ",")
-    cells = [
-        [cell.strip() for cell in row] for row in csv.reader((line for _, line in lines), delimiter=separator)
-    ]
-    layout = (_deeplabcut if cells[0][0].lower() == "scorer" else _long)(cells, name)
-
-    def number(k: int, column: int, head: str) -> float:
-        """Read a cell; one that is empty or nan, or that is not there, holds no number."""
-        text = cells[k][column] if column < len(cells[k]) else ""
-        plain = text.replace(",", ".") if separator == ";" else text
-        if plain.lower() in ("", "nan"):
-            return math.nan
-        if not _NUMBER.fullmatch(plain) or abs(float(plain)) > _LARGEST:
-            raise DataError(
-                "the number",
-                shown(text),
-                f"a decimal number up to {_LARGEST:g}",
-                "correct it; leave cells of what was not seen empty",
-                key=f"row {lines[k][0]}, column {head}",
-                file=name,
-            )
-        return float(plain)
-
+    table = _Table.of(Path(file), str(file).encode("utf-8", "backslashreplace").decode())
+    layout = (_deeplabcut if table.cells[0][0].lower() == "scorer" else _long)(table.cells, table.file)
     seen: dict[tuple[float, str], tuple[complex, float]] = {}
-    for k in range(layout.first, len(cells)):
-        refuse(
-            any(cells[k][len(cells[0]) :]),
-            "the number of cells",
-            len(cells[k]),
-            f"{len(cells[0])}, one for each column",
-            "correct the row; decimals have a comma only where semicolons separate columns",
-            key=f"row {lines[k][0]}",
-            file=name,
-        )
-        here = cells[k] + [""] * (0 if layout.id_at is None else layout.id_at + 1 - len(cells[k]))
-        for point in layout.columns if layout.id_at is None else [here[layout.id_at]]:
-            if point not in layout.columns:
-                continue
-            columns = layout.columns[point]
-            value = {kind: number(k, column, f"{kind} of {point}") for kind, column in columns.items()}
-            frame = value["time"] if "time" in value else value["frame"]
-            if not math.isfinite(frame) or not ("time" in value or frame.is_integer()):
-                raise DataError(
-                    "the frame",
-                    frame,
-                    "a whole number, or a time, in every row",
-                    "number the frames",
-                    key=f"row {lines[k][0]}, column frame",
-                    file=name,
-                )
-            if (frame, point) in seen:
-                raise DataError(
-                    "the point",
-                    f"{point} twice in frame {frame:g}",
-                    "each once in a frame",
-                    "leave one out",
-                    key=f"row {lines[k][0]}",
-                    file=name,
-                )
-            unsure = "likelihood" in value and not value["likelihood"] >= likelihood
-            spot = math.nan if unsure else complex(value["x"], value["y"])
-            seen[frame, point] = spot, layout.turn * value.get("angle", math.nan)
+    for k in range(layout.first, len(table.cells)):
+        for frame, point, spot, angle in table.readings(k, layout, likelihood):
+            refuse(
+                (frame, point) in seen,
+                "the point",
+                f"{point} twice in frame {frame:g}",
+                "each once in a frame",
+                "leave one out",
+                key=f"row {table.rows[k]}",
+                file=table.file,
+            )
+            seen[frame, point] = spot, angle
     times, which = np.unique([frame for frame, _ in seen], return_inverse=True)
     # of times, the number of a frame is how many of the usual steps have passed
     if seen and "time" in next(iter(layout.columns.values())):
@@ -208,14 +150,100 @@ def read_tracks(file: str | Path, *, likelihood: float = 0.9) -> Tracks:
         f"{times[0]:g} to {times[-1]:g}" if seen else "none",
         f"numbers of frames within {_MOST_FRAMES}, or times with one step",
         "number the frames from 0",
-        file=name,
+        file=table.file,
     )
     names = tuple(layout.columns)
-    at, angle = np.full((times.size, len(names)), complex(math.nan, math.nan)), np.full(times.size, math.nan)
+    at, angles = np.full((times.size, len(names)), complex(math.nan, math.nan)), np.full(times.size, math.nan)
     for ((_, point), (spot, turned)), k in zip(seen.items(), which.tolist(), strict=True):
-        at[k, names.index(point)], angle[k] = spot, turned
-    turns = angle if layout.turn else None
-    return Tracks(name, times.astype(np.int64), names, at, turns, layout.unit, layout.unread)
+        at[k, names.index(point)], angles[k] = spot, turned
+    return Tracks(
+        table.file,
+        times.astype(np.int64),
+        names,
+        at=at,
+        angle=angles if layout.turn else None,
+        unit=layout.unit,
+        unread=layout.unread,
+    )
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The cells of a table with the numbers of their rows in the file."""
+
+    file: str
+    rows: list[int]
+    cells: list[list[str]]
+    separator: str
+
+    @classmethod
+    def of(cls, path: Path, name: str) -> _Table:
+        """Read a file; `name` is what a terminal can print of its name."""
+        try:
+            # line by line: the number of a line is what an editor shows, and no tracker breaks a cell in two
+            numbered = list(enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1))
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            allowed, remedy = "a CSV file in UTF-8", f"it could not be opened: {reason}"
+            raise DataError("the file", name, allowed, remedy, file=name) from None
+        lines = [
+            (k, line) for k, line in numbered if line.strip(" \t,;") and not line.lstrip().startswith("#")
+        ]
+        refuse(not lines, "the file", "empty", _HEAD, "give the table of a tracker", file=name)
+        separator = next((each for each in ";\t," if each in lines[0][1]), ",")
+        split = csv.reader((line for _, line in lines), delimiter=separator)
+        return cls(name, [k for k, _ in lines], [[cell.strip() for cell in row] for row in split], separator)
+
+    def number(self, k: int, column: int, head: str) -> float:
+        """Read a cell; one that is empty or nan, or that is not there, holds no number."""
+        text = self.cells[k][column] if column < len(self.cells[k]) else ""
+        plain = text.replace(",", ".") if self.separator == ";" else text
+        if plain.lower() in ("", "nan"):
+            return math.nan
+        refuse(
+            not _NUMBER.fullmatch(plain) or abs(float(plain)) > _LARGEST,
+            "the number",
+            shown(text),
+            f"a decimal number up to {_LARGEST:g}",
+            "correct it; leave cells of what was not seen empty",
+            key=f"row {self.rows[k]}, column {head}",
+            file=self.file,
+        )
+        return float(plain)
+
+    def readings(
+        self, k: int, layout: _Layout, likelihood: float
+    ) -> Iterator[tuple[float, str, complex, float]]:
+        """Yield the points that a row holds: frame, name, x + iy and angle [rad]; nan of what was not seen surely."""
+        width, row = len(self.cells[0]), self.cells[k]
+        refuse(
+            any(row[width:]),
+            "the number of cells",
+            len(row),
+            f"{width}, one for each column",
+            "correct the row; decimals have a comma only where semicolons separate columns",
+            key=f"row {self.rows[k]}",
+            file=self.file,
+        )
+        points = list(layout.columns)
+        if layout.id_at is not None:
+            points = [name for name in row[layout.id_at : layout.id_at + 1] if name in layout.columns]
+        for point in points:
+            columns = layout.columns[point]
+            value = {kind: self.number(k, column, f"{kind} of {point}") for kind, column in columns.items()}
+            frame = value["time"] if "time" in value else value["frame"]
+            refuse(
+                not math.isfinite(frame) or not ("time" in value or frame.is_integer()),
+                "the frame",
+                frame,
+                "a whole number, or a time, in every row",
+                "number the frames",
+                key=f"row {self.rows[k]}, column frame",
+                file=self.file,
+            )
+            unsure = "likelihood" in value and not value["likelihood"] >= likelihood
+            spot = math.nan if unsure else complex(value["x"], value["y"])
+            yield frame, point, spot, layout.turn * value.get("angle", math.nan)
 
 
 def _deeplabcut(cells: list[list[str]], name: str) -> _Layout:
@@ -273,29 +301,28 @@ def _long(cells: list[list[str]], name: str) -> _Layout:
     ids = list(dict.fromkeys(row[place["id"]] for row in cells[1:] if place["id"] < len(row)))
     names, turn = [each for each in ids if _POINT.fullmatch(each)], 0.0
     if not names:
-        refuse(
-            len(ids) != 1 or "angle" not in place,
-            "the names of points",
-            shown(", ".join(ids) or "none"),
-            _NAMES,
-            "rename them in column id",
-            file=name,
-        )
-        names, turn = ids, {"deg": math.pi / 180.0, "rad": 1.0}.get(units["angle"] or "", 0.0)
-        refuse(
-            not turn,
-            "the unit",
-            units["angle"],
-            "deg or rad",
-            'write "angle [deg]"',
-            key="the head",
-            file=name,
-        )
+        names, turn = ids, _turn_of_marker(ids, units, name)
     kinds = (clock, "x", "y", "likelihood", *(["angle"] if turn else []))
     own = {kind: place[kind] for kind in kinds if kind in place}
     others = [each for each in place if each not in (*kinds, "id")]
     unread = (*others, *(each for each in ids if each not in names))
     return _Layout(1, dict.fromkeys(names, own), unread, place["id"], unit, turn)
+
+
+def _turn_of_marker(ids: list[str], units: dict[str, str | None], name: str) -> float:
+    """Give the unit of a marker's angle in rad; refuse a table of several, or of one without an angle."""
+    refuse(
+        len(ids) != 1 or "angle" not in units,
+        "the names of points",
+        shown(", ".join(ids) or "none"),
+        _NAMES,
+        "rename them in column id",
+        file=name,
+    )
+    turn = {"deg": math.pi / 180.0, "rad": 1.0}.get(units["angle"] or "", 0.0)
+    remedy = 'write "angle [deg]"'
+    refuse(not turn, "the unit", units["angle"], "deg or rad", remedy, key="the head", file=name)
+    return turn
 
 
 # ----------------------------------------------------------------
