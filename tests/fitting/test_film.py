@@ -378,11 +378,22 @@ def test_the_command_writes_what_the_fit_takes(truth, table, tmp_path, capfd):
     text = prints(capfd, *words, "-o", str(out))
     assert len(read_throws(out, ls.load(SCENE))) >= 16
     assert "left out, points exchanged or far off: frames" in text
-    assert f"throws: {out}\nnext: limitsets fit {SCENE} {out}" in text
+    picture = out.with_suffix(".png")
+    assert f"throws: {out}\npicture: {picture}\nnext: limitsets fit {SCENE} {out}" in text
+    assert picture.read_bytes().startswith(b"\x89PNG")
     record = json_of(capfd, *words)
     assert set(record) == documented("film")
     assert record["throws"][0] == {"before": 0, "after": 1, "run": "tracks 1"}
     assert "add -o throws.csv" in prints(capfd, *words)
+
+
+def test_the_figure_has_every_rest_throw_and_span_of_frames(truth, table):
+    answer = read(table(in_table("DeepLabCut", truth)[0]), truth[1])
+    (axes,) = ls.plot.film_rests(answer).axes
+    drawn = Counter(line.get_gid() for line in axes.lines)
+    spans = sum(map(len, answer.left_out.values()))
+    assert drawn == {"rest": len(answer.seen.rests), "throw": len(answer.throws), "left out": spans}
+    assert [text.get_text() for text in axes.texts] == [str(rest.side) for rest in answer.seen.rests]
 
 
 def test_the_command_takes_corners_and_a_marker(truth, table, capfd):

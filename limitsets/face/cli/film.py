@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import limitsets as ls
 from limitsets.base import LimitsetsError, Table, proposed
+from limitsets.face import report
 from limitsets.face.cli.arguments import named, number
 from limitsets.face.cli.commands import Answer, Run, Scene, Words, command
 from limitsets.face.cli.output import saved
@@ -81,7 +83,7 @@ def film(
     centre
         Write places of the points com, not of left corners.
     out : FILE.csv
-        Write the throws, as limitsets fit reads them.
+        Write the throws, as limitsets fit reads them, and a picture of the rests beside them, FILE.png.
     """
     from limitsets.parameters.fitting import throws_of_film
 
@@ -102,9 +104,12 @@ def film(
         period=period,
         centre=centre,
     )
-    if run.out is not None:
+    picture = None if run.out is None else run.out.with_suffix(".png")
+    if run.out is not None and picture is not None:
         with saved(run.out) as draft:
             answer.save(draft)
+        with saved(picture) as draft:
+            ls.plot.film_rests(answer).savefig(draft, dpi=report.writing.DPI)
 
     def words() -> Iterator[str | Table]:
         throws, about = answer.tables()
@@ -113,9 +118,11 @@ def film(
         yield from answer.lines()
         if run.out is not None:
             yield f"throws: {run.out}"
+            yield f"picture: {picture}"
         yield f"next: {'' if run.out else 'add -o throws.csv to this command, then '}" + proposed(
             "fit", scene, run.out or "throws.csv"
         )
 
-    record = answer.to_json() | {"file_of_throws": None if run.out is None else str(run.out)}
+    files = {"file_of_throws": run.out, "picture": picture}
+    record = answer.to_json() | {word: None if file is None else str(file) for word, file in files.items()}
     return Answer(record, words, answer.table)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from limitsets.face.plot.designs import design, robust_design
     from limitsets.face.plot.fed_parts import assembly, feeding
     from limitsets.face.plot.filled_trays import tray
+    from limitsets.face.plot.films import film_rests
     from limitsets.face.plot.limit_sets import limit_set, map  # noqa: A004 - its public name
     from limitsets.face.plot.margins import audit, counterexample, margin_curve, tolerance_box, tornado
     from limitsets.face.plot.noise import fit_residuals, noise_arrivals, noise_density, noise_levels
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "assembly", "atlas", "atlas_surface", "audit", "basins", "bifurcation", "counterexample", "design", "feeding",
-    "fit_residuals", "flight", "limit_set", "map", "margin_curve", "morse", "noise_arrivals", "noise_density",
+    "film_rests", "fit_residuals", "flight", "limit_set", "map", "margin_curve", "morse", "noise_arrivals", "noise_density",
     "noise_levels", "part", "policy", "regions", "resting_sides", "robust_design", "tolerance_box", "tornado", "tray",
 ]  # fmt: skip
 
@@ -44,6 +45,7 @@ _FILES = {
     "designs": ("design", "robust_design"),
     "fed_parts": ("assembly", "feeding"),
     "filled_trays": ("tray",),
+    "films": ("film_rests",),
     "limit_sets": ("limit_set", "map"),
     "margins": ("audit", "counterexample", "margin_curve", "tolerance_box", "tornado"),
     "noise": ("fit_residuals", "noise_arrivals", "noise_density", "noise_levels"),

@@ -31,7 +31,7 @@ _HOVERS = 0.1
 _MOST_READINGS = 100
 # A rest's own spread counts beside that of all rests, which counts as so many frames.
 _SHARED = 10
-# In terms of what a throw takes in the middle of all: a shorter gap holds no throw, a longer one perhaps two.
+# In terms of the median of what throws take: a shorter gap holds no throw, a longer one perhaps two.
 _NO_THROW, _TWO_THROWS = 0.5, 2.0
 # The variance of a median over that of a mean.
 _MEDIAN = 0.5 * math.pi
@@ -81,7 +81,7 @@ class Rests:
     thrown : list of bool
         For each but the last: whether one throw led to the next.
     flight : float
-        Frames that a throw takes, from the last at rest to the first, in the middle of all; nan where none is seen.
+        Frames that a throw takes, from the last at rest to the first: the median; nan where none is seen.
     noise : float
         Standard deviation of a coordinate of a point from frame to frame, at rest [length].
     jumps : ndarray of int
@@ -192,7 +192,7 @@ def _joined(
     """Join stretches that are one rest, and say which rests follow each other by one throw.
 
     Where the arm's period is known, it counts the throws between two landings.  Else a throw takes about as long as
-    those in the middle of all: within a much shorter gap there was none, and a part that lies where it lay is one rest;
+    the median of all: within a much shorter gap there was none, and a part that lies where it lay is one rest;
     within a much longer one there may have been two, or somebody took the part.  In a gap in between there was one if
     the part was seen to move or lies elsewhere; if neither, nobody knows, and the run ends.
     """
@@ -234,7 +234,7 @@ def _require_on_arm(tilts: Array, above: Array, scene: Scene, size: float, file:
     refuse(
         degrees > math.degrees(_LIES),
         "the arm's line",
-        f"turned by {degrees:.0f} deg to the nearest side in the middle of all rests",
+        f"turned by {degrees:.0f} deg to the nearest side in the median of all rests",
         f"sides along it, up to {math.degrees(_LIES):g} deg",
         "exchange origin (the joint) and along, or correct them; where y points up say y-up, where the arm goes to the"
         " left mirrored",
@@ -243,7 +243,7 @@ def _require_on_arm(tilts: Array, above: Array, scene: Scene, size: float, file:
     refuse(
         abs(height) > _HOVERS * size,
         "the origin or the arm's line",
-        f"{abs(height):.4g} {scene.unit} {'above' if height > 0 else 'below'} the arm in the middle of all rests",
+        f"{abs(height):.4g} {scene.unit} {'above' if height > 0 else 'below'} the arm in the median of all rests",
         f"a part at rest on the arm, within {_HOVERS * size:.3g} {scene.unit}",
         "correct origin and along, or the arm.surface_height of the scene",
         file=file,
