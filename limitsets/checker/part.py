@@ -118,8 +118,8 @@ def read_polygon(
     if "sides" in keys:
         three = rows(keys["sides"], "part.sides", 3, 3)
         base, left, right = (read(q, f"part.sides[{i}]") for i, q in enumerate(three))
-        x = (base**2 + left**2 - right**2) / (2 * base)
-        y2 = left**2 - x**2
+        x = (base * base + left * left - right * right) / (2 * base)
+        y2 = left * left - x * x
         positive = all(bool(q > 0) for q in (base, left, right, y2))
         require(positive, "the sides form no triangle")
         outline, corners = [(ZERO, ZERO), (base, ZERO), (x, y2.sqrt())], [0, 1, 2]
@@ -140,14 +140,14 @@ def read_polygon(
     return outline, corners
 
 
-VertexEnds = Sequence[tuple[Fraction, Fraction]]  # least and largest x, least and largest y of a vertex
+Span = tuple[Fraction, Fraction]
+VertexEnds = Sequence[Span]  # least and largest x, least and largest y of a vertex
 
 
 def hull_of(places: Sequence[VertexEnds]) -> list[int]:
     """Find the corners of the convex hull, ascending: no other vertex lies beyond one of its sides, exactly.
 
-    Their candidates are those of the middles.  The cross product is affine in each coordinate, so its least value for
-    all coordinates between their ends is that at one of the corners of the box.
+    Their candidates are those of the middles.
     """
     middles = [tuple((lo + hi) / 2 for lo, hi in place) for place in places]
     order = sorted(range(len(places)), key=lambda k: middles[k])
@@ -164,10 +164,28 @@ def hull_of(places: Sequence[VertexEnds]) -> list[int]:
     require(corners == sorted(corners), "the outline of the part is not counterclockwise")
     for left, right in zip(corners, corners[1:] + corners[:1], strict=True):
         for k in set(range(len(places))) - set(corners):
-            box = [set(ends) for vertex in (left, right, k) for ends in places[vertex]]
-            least = min(cross_of(at[:2], at[2:4], at[4:]) for at in product(*box))
-            require(least >= 0, f"vertex {k} of the part may lie beyond its convex hull")
+            within = least_cross(places[left], places[right], places[k]) >= 0
+            require(within, f"vertex {k} of the part may lie beyond its convex hull")
     return corners
+
+
+def least_cross(start: VertexEnds, end: VertexEnds, place: VertexEnds) -> Fraction:
+    """Bound the cross product of vertices that are known to ends: by its terms, and only where that is below 0 exactly.
+
+    It is affine in each coordinate, so its least value is that at one of the corners of the box.
+    """
+
+    def product_of(a: Span, b: Span, c: Span, d: Span) -> list[Fraction]:
+        """Give the products of the ends of b - a and of d - c."""
+        return [x * y for x in (b[0] - a[1], b[1] - a[0]) for y in (d[0] - c[1], d[1] - c[0])]
+
+    ahead = product_of(start[0], end[0], start[1], place[1])
+    aside = product_of(start[1], end[1], start[0], place[0])
+    least = min(ahead) - max(aside)
+    if least < 0:
+        box = [set(ends) for vertex in (start, end, place) for ends in vertex]
+        least = min(cross_of(at[:2], at[2:4], at[4:]) for at in product(*box))
+    return least
 
 
 def cross_of(start: Sequence[Fraction], end: Sequence[Fraction], place: Sequence[Fraction]) -> Fraction:
@@ -180,7 +198,7 @@ def side_frame(vertices: list[tuple[Arb, Arb]], i: int) -> tuple[tuple[Arb, Arb]
     n = len(vertices)
     left, right = vertices[-i % n], vertices[(1 - i) % n]
     dx, dy = right[0] - left[0], right[1] - left[1]
-    long = (dx**2 + dy**2).sqrt()
+    long = (dx * dx + dy * dy).sqrt()  # in Arb the power of a ball around 0 is nan
     return left, (dx / long, dy / long), long
 
 
@@ -214,9 +232,10 @@ def read_plate(
         x, y = (read(point[key], f"part.mass.points.{key}") for key in "xy")
         w = read(point["mass"], "part.mass.points.mass")
         require(w > 0, "a mass is not positive")
-        total, sx, sy, second = total + w, sx + w * x, sy + w * y, second + w * (x**2 + y**2)
+        total, sx, sy, second = total + w, sx + w * x, sy + w * y, second + w * (x * x + y * y)
     require(density.lo > 0 and bool(total > 0), "a mass is not positive")
-    return (sx / total, sy / total), second / total - (sx / total) ** 2 - (sy / total) ** 2
+    x, y = sx / total, sy / total
+    return (x, y), second / total - x * x - y * y
 
 
 def moments_of(vertices: list[tuple[Arb, Arb]]) -> tuple[Arb, Arb, Arb, Arb]:
@@ -248,5 +267,5 @@ def hole_of(hole: object, where: str, unit: Fraction) -> tuple[Arb, Arb, Arb, Ar
     center = table(keys["center"], f"{where}.center", "x y")
     x, y, diameter = length(center["x"]), length(center["y"]), length(keys["diameter"])
     require(bool(diameter > 0), f"{where}.diameter is not positive")
-    area = arb.pi() * diameter**2 / 4
-    return area, area * x, area * y, area * (x**2 + y**2 + diameter**2 / 8)
+    area = arb.pi() * diameter * diameter / 4
+    return area, area * x, area * y, area * (x * x + y * y + diameter * diameter / 8)

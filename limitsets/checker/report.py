@@ -339,6 +339,10 @@ def recheck_map(file: MapFile, workers: int, progress: Progress, report: Report)
 def describe_scene(report: Report, raw: dict[str, Any], noise: object, alone: str = "") -> None:
     """Say what a file relies on, and of which scene it is; `alone`: its claim, where that stands alone."""
     tell_model(report, raw, noise)
+    if "plate_density" in raw["part"]["mass"] and "vertices" in raw["part"]:
+        report.relied_on.append(
+            "an outline of the plate that does not cross itself, holes inside it and apart"
+        )
     for name, value in quantities(raw):
         if not alone.startswith("policy") or not name.startswith(
             "throw."

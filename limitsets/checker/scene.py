@@ -106,18 +106,20 @@ class Scene:
         return sum(float(ball.rad()) for ball in balls)
 
 
+LISTS = re.compile(r"part\.(sides|vertices|mass\.points|holes(\[[0-9]+\]\.vertices)?)")
+VERTEX = re.compile(r"part\.(holes\[[0-9]+\]\.)?vertices\[[0-9]+\]")
+
+
 def quantities(value: object, where: str = "") -> Iterator[tuple[str, object]]:
-    """Name every quantity of a scene; holes have none, they are exact."""
-    if where == "part.holes":
-        return
+    """Name every quantity of a scene, and the numbers of its holes."""
     if isinstance(value, dict):
         for key, inner in value.items():
             if where or key in ("part", "arm", "throw", "gravity"):
                 yield from quantities(inner, f"{where}.{key}" if where else key)
-    elif isinstance(value, list) and where in ("part.sides", "part.vertices", "part.mass.points"):
+    elif isinstance(value, list) and LISTS.fullmatch(where):
         for i, inner in enumerate(value):
             yield from quantities(inner, f"{where}[{i}]")
-    elif isinstance(value, list) and re.fullmatch(r"part\.vertices\[[0-9]+\]", where):
+    elif isinstance(value, list) and VERTEX.fullmatch(where):
         yield from ((f"{where}.{key}", inner) for key, inner in zip("xy", value, strict=True))
     else:
         yield where, value

@@ -902,7 +902,7 @@ REFUSED_FILES = [
     ("part.dxf", b"  0\nSECTION\n  2\nENTITIES\n  0\nLINE\n 10\n1.0\n 20\nnan\n  0\nENDSEC\n  0\nEOF\n", "is"),
     ("part.svg", b"<svg", "this SVG is"),
     ("part.svg", b"\x89PNG\r\n\x1a\n\0\0", "this SVG is"),
-    ("part.svg", b"<html><p/></html>", "this SVG is \"its first element is 'html'\""),
+    ("part.svg", b"<html><p/></html>", "its reader says: its first element is 'html'"),
     ("part.svg", b'<!DOCTYPE svg [<!ENTITY a "b">]><svg>&a;</svg>', "this SVG is 'one with <!ENTITY'"),
     ("part.svg", '<!DOCTYPE svg [<!ENTITY a "b">]><svg>&a;</svg>'.encode("utf-16"), "'one with <!ENTITY'"),
     ("part.svg", WHOLE.replace('height="15"', 'height="15%"').encode(), "height is '15%'"),

@@ -1,5 +1,7 @@
 """Plates with notches and holes in proofs: the numbers of both readers against closed forms, and files made false."""
 
+import copy
+
 import flint
 import pytest
 
@@ -7,6 +9,7 @@ import limitsets as ls
 from limitsets.base import AnswerError, SceneError
 from limitsets.feeder.scene.quantities import replaced
 from limitsets.proofs.prover.parameters import parameter_box
+from limitsets.proofs.prover.stability import stability
 from tests.plates import bracket
 from tests.proofs import forge
 from tests.proofs.test_recheck import checker
@@ -96,6 +99,77 @@ def test_a_vertex_that_a_tolerance_may_move_out_of_the_hull_is_refused_by_both()
         checker.scene.read_scene(raw, None)
     raw["part"]["vertices"][1][1] = ["0 mm", "0.1 mm"]  # on the edge of the hull, or within
     assert len(checker.scene.read_scene(raw, None).sides) == 5
+
+
+def test_boxes_of_a_tolerance_that_differ_in_their_holes_are_not_one_part(tmp_path) -> None:
+    """Two true proofs, one of the part without holes, put into one file that claims a tolerance of the solid width."""
+
+    def proved(x: str, *, holes: bool):
+        raw = bracket()
+        raw["part"]["vertices"][7][0] = x
+        if not holes:
+            del raw["part"]["holes"]
+        proof = ls.certify(raw, ["invariant", "trapping"], tolerance={"part.vertices[7].x": "0.1 mm"})
+        return forge.opened(proof.save(tmp_path / f"{x}.proof.zip"))
+
+    drilled, solid = proved("39.9 mm", holes=True), proved("40.1 mm", holes=False)
+    drilled.header["boxes"].append({**copy.deepcopy(solid.header["boxes"][0]), "prefix": "1."})
+    drilled.header["tolerance"] = {"part.vertices[7].x": "0.2 mm"}
+    for name, array in solid.arrays.items():
+        drilled.arrays[f"1.{name[2:]}"] = array
+    file = tmp_path / "mixed.proof.zip"
+    drilled.seal().write(file)
+    report = checker.recheck(file, workers=1)
+    assert report.verdict == "failed"
+    assert report.reason.endswith("the boxes differ in something else than the tolerance")
+
+
+def test_a_report_names_the_holes_and_what_is_believed_of_them(tmp_path) -> None:
+    proof = ls.certify(bracket(), ["invariant"])
+    report = checker.recheck(proof.save(tmp_path / "bracket.proof.zip"), workers=1)
+    told = {name: report.parameters[f"part.holes[0].{name}"] for name in ("center.x", "center.y", "diameter")}
+    assert told == {"center.x": "20 mm", "center.y": "60 mm", "diameter": "10 mm"}
+    assert report.parameters["part.holes[1].vertices[2].y"] == "20 mm"
+    assert any("holes inside it and apart" in line for line in report.relied_on)
+
+
+@pytest.mark.parametrize("decimals", [False, True])
+def test_upright_edges_at_places_that_are_no_binary_numbers(decimals: bool, tmp_path) -> None:
+    """A rectangle of 62.3 mm, and an isosceles triangle about the origin: differences of equal decimals are balls."""
+    raw = bracket()
+    corners = [(0, 0), (62.3, 0), (62.3, 40), (0, 40)] if decimals else [(-30.1, 0), (30.1, 0), (0, 42.7)]
+    raw["part"] = {
+        "vertices": [[f"{x} mm", f"{y} mm"] for x, y in corners],
+        "mass": {"plate_density": "3 kg/m^2"},
+    }
+    checked = checker.scene.read_scene(raw | MODEL, None)
+    scene = ls.load(raw)
+    for side, rest in enumerate(checked.sides):
+        assert float(rest.a.mid()) == pytest.approx(scene.sides.a[side], rel=1e-14)
+        assert rest.a.rad() < 1e-20
+    assert float(checked.sides[0].rho2.mid()) == pytest.approx(scene.radius_of_gyration**2, rel=1e-13)
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_a_corner_that_a_tolerance_may_take_away_is_refused(measured: bool) -> None:
+    """At y = 99.5 mm the top of this part is one side of 100 mm, not two."""
+    mass = {"plate_density": "3 kg/m^2"}
+    if measured:
+        mass = {"center": {"side": 0, "along": "50 mm", "above": "50 mm"}, "radius_of_gyration": "40 mm"}
+    corners = [(0, 0), (100, 0), (100, 100), (30, 101), (0, 100)]
+    part = {"vertices": [[f"{x} mm", f"{y} mm"] for x, y in corners], "mass": mass}
+    effects = {"landing": True, "roll": True}
+    scene = ls.load(bracket() | {"part": part, "effects": effects})
+    assert len(stability(scene, tolerance={"part.vertices[3].y": "0.5 mm"}).sides) == 5
+    with pytest.raises(AnswerError, match="perhaps without the corner at vertex 3"):
+        stability(scene, tolerance={"part.vertices[3].y": "2 mm"})
+
+
+def test_a_tolerance_in_which_the_outline_cuts_a_hole_is_refused() -> None:
+    raw = bracket()
+    raw["part"]["holes"] = [{"center": {"x": "35.9 mm", "y": "44.1 mm"}, "diameter": "8 mm"}]
+    with pytest.raises(AnswerError, match="hole 0 is 'beyond the outline'"):
+        ls.certify(raw, ["invariant"], tolerance={"part.vertices[7].x": "0.3 mm"})
 
 
 def test_values_that_make_another_hull_are_refused() -> None:

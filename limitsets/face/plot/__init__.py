@@ -34,8 +34,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "assembly", "atlas", "atlas_surface", "audit", "basins", "bifurcation", "counterexample", "design", "feeding",
-    "film_rests", "fit_residuals", "flight", "limit_set", "map", "margin_curve", "morse", "noise_arrivals", "noise_density",
-    "noise_levels", "part", "policy", "regions", "resting_sides", "robust_design", "tolerance_box", "tornado", "tray",
+    "film_rests", "fit_residuals", "flight", "limit_set", "map", "margin_curve", "morse", "noise_arrivals",
+    "noise_density", "noise_levels", "part", "policy", "regions", "resting_sides", "robust_design", "tolerance_box",
+    "tornado", "tray",
 ]  # fmt: skip
 
 _FILES = {

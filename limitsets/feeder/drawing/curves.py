@@ -229,7 +229,8 @@ def require_known(layers: Sequence[str], known: Iterable[str]) -> None:
 def broken(kind: str, why: Exception) -> AnswerError:
     """Build the error for a file that cannot be what its suffix says."""
     reason = " ".join(str(why).split())[:200] or type(why).__name__
-    return AnswerError(f"this {kind}", reason, f"a whole {kind} file", "save the drawing again")
+    remedy = f"save the drawing again; its reader says: {reason}"
+    return AnswerError(f"this {kind}", "broken", f"a whole {kind} file", remedy)
 
 
 def package(name: str) -> Any:

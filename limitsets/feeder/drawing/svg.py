@@ -126,6 +126,7 @@ class _Walk:
         m = self.elements.Matrix(words.get("transform", ""))
         matrix = matrix @ np.array([[m.a, m.c, m.e], [m.b, m.d, m.f], [0.0, 0.0, 1.0]], float)
         if "{" in tag or tag in _SILENT:
+            self.left_out["style sheet"] += tag == "style"  # it may hide shapes
             return
         if words.get("display") == "none" or words.get("visibility") in ("hidden", "collapse"):
             self.left_out["hidden"] += 1
@@ -186,6 +187,8 @@ def _data(tag: str, words: Mapping[str, str]) -> str:
         points = words.get("points", "").strip()
         return f"M{points}{'Z' if tag == 'polygon' else ''}" if points else ""
     x, y, width, height = (_user_units(words, name) for name in ("x", "y", "width", "height"))
+    if width <= 0.0 or height <= 0.0:
+        return ""
     # of the two radii of a corner one stands for the other
     rx = min(_user_units(words, "rx" if "rx" in words else "ry"), width / 2)
     ry = min(_user_units(words, "ry" if "ry" in words else "rx"), height / 2)

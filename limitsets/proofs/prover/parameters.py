@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from limitsets.base import AnswerError
+from limitsets.base import AnswerError, SceneError
 from limitsets.base.arrays import Mask
 from limitsets.feeder.geometry import cross, side_ends
 from limitsets.feeder.geometry.polygon import Vector, above_side
-from limitsets.feeder.scene import Numbers, Scene
+from limitsets.feeder.scene import Numbers, Scene, unit_of
 from limitsets.feeder.scene.quantities import base_unit, find, text_at, texts
 from limitsets.feeder.scene.units import exact_factor, parse, share_of_pi
 from limitsets.feeder.thrower import Throw
@@ -220,7 +220,27 @@ def whole(scene: Scene, tolerance: Mapping[str, str]) -> SceneBox:
         factor = Fraction(1) if relative else exact_factor(quantity.unit, given.unit)
         half = abs(nominal) * share if relative else Fraction(quantity.number) * factor
         spans[name] = RationalInterval(nominal - half, nominal + half)
+    _require_plate(scene, spans)
     return SceneBox(scene, spans)
+
+
+def _require_plate(scene: Scene, spans: Mapping[str, RationalInterval]) -> None:
+    """Refuse a tolerance at a corner of which an outline crosses itself or a hole, as far as 16 corners show it."""
+    moved = {name: span for name, span in spans.items() if name.startswith("part.vertices")}
+    if moved and (scene.holes or len(scene.outline) > len(scene.vertices)):
+        for _, ends in zip(
+            range(16), product(*((span.lo, span.hi) for span in moved.values())), strict=False
+        ):
+            units = [unit_of(scene, name) for name in moved]
+            texts = {
+                name: f"{decimal(end)} {unit}" for name, end, unit in zip(moved, ends, units, strict=True)
+            }
+            try:
+                scene.with_values(texts)
+            except SceneError as error:
+                if error.key in ("part.vertices", "part.holes"):
+                    allowed = f"{error.allowed}, throughout"
+                    raise AnswerError(error.thing, error.value, allowed, NARROWER) from None
 
 
 # ----------------------------------------------------------------
@@ -369,15 +389,17 @@ class _Spans(Numbers):
     def polygon(self, outline: Sequence[Vector]) -> Sequence[Vector]:
         """Return the corners of the convex hull, throughout a tolerance the same; else the part is refused."""
         hull = super().polygon(outline)
-        exact = not any(isinstance(text, list) for pair in self.tree["part"]["vertices"] for text in pair)
-        inner = () if exact or self.instead else sorted(set(range(len(outline))) - set(self.corners))
-        for vertex in inner:
-            for left, right in zip(hull, [*hull[1:], hull[0]], strict=True):
-                if cross(left, right, outline[vertex]).lo < 0:
-                    allowed = "one with the same convex hull, throughout the tolerance"
-                    raise AnswerError(
-                        "the part", f"perhaps with a corner at vertex {vertex}", allowed, NARROWER
-                    )
+        if self.instead or not any(
+            isinstance(text, list) for pair in self.tree["part"]["vertices"] for text in pair
+        ):
+            return hull
+        count, corners = len(hull), self.corners
+        for k, point in enumerate(hull):
+            if _least_cross(hull[k - 1], point, hull[(k + 1) % count]) <= 0:
+                raise _other_hull(f"perhaps without the corner at vertex {corners[k]}")
+        for vertex in sorted(set(range(len(outline))) - set(corners)):
+            if any(_least_cross(hull[k - 1], hull[k], outline[vertex]) < 0 for k in range(count)):
+                raise _other_hull(f"perhaps with a corner at vertex {vertex}")
         return hull
 
     def deviation(self, name: str) -> tuple[RationalInterval, RationalInterval]:
@@ -464,6 +486,18 @@ def body_of(scene: Scene, tolerance: Mapping[str, str]) -> list[tuple[RationalIn
         return _Spans(scene.unit, tree).narrow_body()[0]
     except (ZeroDivisionError, ValueError):
         raise _no_part() from None
+
+
+def _least_cross(start: Vector, end: Vector, point: Vector) -> Fraction:
+    """Give the least cross product of vertices in their spans: affine in each coordinate, it is that of a corner."""
+    box = [sorted({span.lo, span.hi}) for vertex in (start, end, point) for span in vertex]
+    least: Fraction = min(cross(at[:2], at[2:4], at[4:]) for at in product(*box))
+    return least
+
+
+def _other_hull(how: str) -> AnswerError:
+    allowed = "one with the same convex hull, throughout the tolerance"
+    return AnswerError("the part", how, allowed, NARROWER)
 
 
 def _no_part() -> AnswerError:
