@@ -473,7 +473,7 @@ def test_files(capfd):
     assert (folder / "audit.png").read_bytes().startswith(b"\x89PNG")
     page = (folder / "audit.md").read_text(encoding="utf-8")
     assert re.findall(r"!\[.*?\]\((.*?)\)", page) == ["part.png", "audit.png"]
-    assert "| left corner lands first | 0 | 20.1517 to 28.0000 |" in page
+    assert "| left corner lands first | 0 | 20.1516 to 28.0000 |" in page
     assert "| left corner lands first | 1 | 26.4235 to 28.0000 |" in page
     assert json.loads((folder / "audit.json").read_text())[0]["effect"] == "release"
 
