@@ -150,6 +150,14 @@ def test_upright_edges_at_places_that_are_no_binary_numbers(decimals: bool, tmp_
     assert float(checked.sides[0].rho2.mid()) == pytest.approx(scene.radius_of_gyration**2, rel=1e-13)
 
 
+def test_a_piece_of_a_tolerance_whose_own_hull_has_other_corners_is_refused() -> None:
+    """The inward corner moved beyond the line of side 3: six sides throughout, where the scene has five."""
+    scene, tree = ls.load(bracket()), bracket()
+    tree["part"]["vertices"][7] = [["61 mm", "62 mm"], ["61 mm", "62 mm"]]
+    with pytest.raises(AnswerError, match="one with the corners 0, 5, 6, 7, 8, 9 of its hull"):
+        parameter_box(scene, tree=tree)
+
+
 @pytest.mark.parametrize("measured", [False, True])
 def test_a_corner_that_a_tolerance_may_take_away_is_refused(measured: bool) -> None:
     """At y = 99.5 mm the top of this part is one side of 100 mm, not two."""

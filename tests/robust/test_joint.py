@@ -287,12 +287,12 @@ def test_a_side_on_which_no_part_rests_has_no_room_to_lose():
 
 
 def test_a_corner_that_becomes_flat_is_no_part():
-    """At y = 0 the chamfer's upper corner lies on the line of side 0: the angle there was a division by 0."""
+    """At y = 0 the chamfer's upper corner lies on the line of side 0: the hull of the plate has a side less."""
     query = asked(CHAMFERED)
     scale = deviation_scale(query.scene, "part.vertices[2].y")
     found = query.prove(scale.piece(scale.at(Fraction(-4))), finest=0)
     assert found.verdict == "impossible"
-    assert "of no convex shape" in found.reason
+    assert "the corners 0, 2, 3, 4 of its hull" in found.reason
 
 
 def test_a_proof_of_too_many_pieces_says_so(monkeypatch):

@@ -21,6 +21,7 @@ from limitsets.base.arrays import Mask
 from limitsets.feeder.geometry import cross, side_ends
 from limitsets.feeder.geometry.polygon import Vector, above_side
 from limitsets.feeder.scene import Numbers, Scene, unit_of
+from limitsets.feeder.scene.numbers import corners_of
 from limitsets.feeder.scene.quantities import base_unit, find, text_at, texts
 from limitsets.feeder.scene.units import exact_factor, parse, share_of_pi
 from limitsets.feeder.thrower import Throw
@@ -482,6 +483,7 @@ def body_of(scene: Scene, tolerance: Mapping[str, str]) -> list[tuple[RationalIn
         A quantity that the scene does not give, or a tolerance in which the part may be none.
     """
     tree = whole(scene, tolerance).tree()
+    _require_corners(scene, tree)
     try:
         return _Spans(scene.unit, tree).narrow_body()[0]
     except (ZeroDivisionError, ValueError):
@@ -493,6 +495,13 @@ def _least_cross(start: Vector, end: Vector, point: Vector) -> Fraction:
     box = [sorted({span.lo, span.hi}) for vertex in (start, end, point) for span in vertex]
     least: Fraction = min(cross(at[:2], at[2:4], at[4:]) for at in product(*box))
     return least
+
+
+def _require_corners(scene: Scene, tree: Mapping[str, Any]) -> None:
+    """Refuse values in the middle of which the hull has other corners: sides would bear other numbers."""
+    corners, own = corners_of(tree["part"]), corners_of(scene.text["part"])
+    if tuple(corners) != tuple(own):
+        raise _other_hull(f"one with the corners {', '.join(map(str, corners))} of its hull")
 
 
 def _other_hull(how: str) -> AnswerError:
@@ -563,6 +572,7 @@ def parameter_box(
     True
     """
     text: Any = copy.deepcopy(dict(scene.text if tree is None else tree))
+    _require_corners(scene, text)
     reader = _Spans(scene.unit, text, noise)
     for name in noise or {}:
         if name not in VARYING:
