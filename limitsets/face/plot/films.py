@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from limitsets.base import arguments_checked
 from limitsets.face.plot import style
-
-if TYPE_CHECKING:
-    from limitsets.parameters.fitting.filmed import Film
+from limitsets.parameters.fitting.filmed import Film
 
 THROWN: dict[str, Any] = {"color": style.INK, "lw": 0.9, "ls": (0, (3, 2))}
 UNUSED: dict[str, Any] = {"color": style.FAINT, "lw": 5.0, "alpha": 0.6, "solid_capstyle": "butt"}

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
@@ -13,12 +14,8 @@ from limitsets.base import arguments_checked, rounded
 from limitsets.face.plot import style
 from limitsets.face.plot.parts import CENTRE, OUTLINE, SOLID, TIPS
 from limitsets.face.plot.throwing import about_centre, angle_on_side, turned
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from limitsets.feeder.scene import Scene
-    from limitsets.proofs.prover.stability import SideStability, Stability
+from limitsets.feeder.scene import Scene
+from limitsets.proofs.prover.stability import SideStability, Stability
 
 MOST = 12
 """Sides that are drawn: of a part with more, those on which it rests, the most stable ones."""
