@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from limitsets.base import arguments_checked
 from limitsets.face.plot import style
-from limitsets.parameters.fitting.filmed import Film
+from limitsets.parameters.fitting.filmed import FilmedThrows
 
 THROWN: dict[str, Any] = {"color": style.INK, "lw": 0.9, "ls": (0, (3, 2))}
 UNUSED: dict[str, Any] = {"color": style.FAINT, "lw": 5.0, "alpha": 0.6, "solid_capstyle": "butt"}
@@ -17,12 +17,12 @@ LEFT_OUT: dict[str, Any] = {"color": style.FLIP, "lw": 4.0, "solid_capstyle": "b
 
 
 @arguments_checked
-def film_rests(film: Film) -> Figure:
+def film_rests(film: FilmedThrows) -> Figure:
     """Draw where a filmed part rests in which frames.
 
     Parameters
     ----------
-    film : Film
+    film : FilmedThrows
         From `limitsets.fitting.throws_of_film`.
 
     Returns

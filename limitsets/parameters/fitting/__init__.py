@@ -9,7 +9,7 @@ file of throws from the table of a tracker: `tracks` reads it, `poses` says wher
 where it lies still.
 """
 
-from limitsets.parameters.fitting.filmed import Film, throws_of_film
+from limitsets.parameters.fitting.filmed import FilmedThrows, throws_of_film
 from limitsets.parameters.fitting.fit_result import Enough, Fit, Fitted, Scatter, enough
 from limitsets.parameters.fitting.fitting_run import Bootstrap, bootstrap, fit, simulated_throws
 from limitsets.parameters.fitting.throws import Throws, read_throws
@@ -17,7 +17,7 @@ from limitsets.parameters.fitting.throws import Throws, read_throws
 __all__ = [
     "Bootstrap",
     "Enough",
-    "Film",
+    "FilmedThrows",
     "Fit",
     "Fitted",
     "Scatter",

@@ -25,7 +25,7 @@ _SCALE_FITS = 0.002
 
 
 @dataclass(frozen=True, eq=False)
-class Film(Tabled):
+class FilmedThrows(Tabled):
     """Throws of a film.
 
     Attributes
@@ -146,7 +146,7 @@ def throws_of_film(
     fps: float | None = None,
     period: float | None = None,
     centre: bool = False,
-) -> Film:
+) -> FilmedThrows:
     r"""Find the throws of a filmed part in the table that a tracker wrote.
 
     Parameters
@@ -184,7 +184,7 @@ def throws_of_film(
 
     Returns
     -------
-    Film
+    FilmedThrows
 
     Raises
     ------
@@ -252,7 +252,7 @@ def throws_of_film(
     for each in wrong:
         spans[each.wrong] = (*spans.get(each.wrong, ()), (int(each.frames[0]), int(each.frames[-1])))
     left_out = {reason: ranges for reason, ranges in spans.items() if ranges}
-    return Film(chosen, tracks, poses, seen, tuple(throws), centre=centre, left_out=left_out, fps=fps)
+    return FilmedThrows(chosen, tracks, poses, seen, tuple(throws), centre=centre, left_out=left_out, fps=fps)
 
 
 def _spans(frames: Ints) -> tuple[tuple[int, int], ...]:
