@@ -140,8 +140,8 @@ def read_polygon(
     return outline, corners
 
 
-Span = tuple[Fraction, Fraction]
-VertexEnds = Sequence[Span]  # least and largest x, least and largest y of a vertex
+CoordinateEnds = tuple[Fraction, Fraction]
+VertexEnds = Sequence[CoordinateEnds]  # least and largest x, least and largest y of a vertex
 
 
 def hull_of(places: Sequence[VertexEnds]) -> list[int]:
@@ -175,7 +175,9 @@ def least_cross(start: VertexEnds, end: VertexEnds, place: VertexEnds) -> Fracti
     It is affine in each coordinate, so its least value is that at one of the corners of the box.
     """
 
-    def product_of(a: Span, b: Span, c: Span, d: Span) -> list[Fraction]:
+    def product_of(
+        a: CoordinateEnds, b: CoordinateEnds, c: CoordinateEnds, d: CoordinateEnds
+    ) -> list[Fraction]:
         """Give the products of the ends of b - a and of d - c."""
         return [x * y for x in (b[0] - a[1], b[1] - a[0]) for y in (d[0] - c[1], d[1] - c[0])]
 
