@@ -22,7 +22,8 @@ from limitsets.feeder.scene import Deviation, Scene
 from limitsets.feeder.scene.quantities import base_unit, deviation, find, parsed_deviation, text_at, texts
 from limitsets.feeder.scene.units import Quantity, exact_factor, parse
 from limitsets.proofs.prover.numbers import RationalInterval
-from limitsets.proofs.prover.parameters import VARYING, SceneBox, decimal
+from limitsets.proofs.prover.parameters import VARYING
+from limitsets.proofs.prover.tolerances import SceneBox, decimal
 
 READINGS = ("fixed", "per-throw")
 """Fixed but unknown, or another one at every throw."""

@@ -30,8 +30,8 @@ from limitsets.parameters.margins.deviations import (
 )
 from limitsets.parameters.margins.margin_result import Margin
 from limitsets.proofs.prover.goals.violating_orbits import on_limit_set
-from limitsets.proofs.prover.parameters import SceneBox
 from limitsets.proofs.prover.query import Outcome, Query
+from limitsets.proofs.prover.tolerances import SceneBox
 from limitsets.systems.maps import orbit
 
 # ----------------------------------------------------------------

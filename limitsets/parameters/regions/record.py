@@ -27,7 +27,8 @@ from limitsets.proofs.prover.goals.kind import above, throws_to_reach
 from limitsets.proofs.prover.goals.violating_orbits import MORE_THAN_ROUNDING, middle
 from limitsets.proofs.prover.numbers import RationalInterval
 from limitsets.proofs.prover.orbits import follow
-from limitsets.proofs.prover.parameters import ParameterBox, SceneBox, parameter_box
+from limitsets.proofs.prover.parameters import ParameterBox, parameter_box
+from limitsets.proofs.prover.tolerances import SceneBox
 from limitsets.systems.cells import CellSet, cell_ends
 from limitsets.systems.maps import Orbit, orbit
 

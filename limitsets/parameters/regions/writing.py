@@ -22,8 +22,8 @@ from limitsets.feeder.scene.quantities import NOISE_ONLY, find
 from limitsets.feeder.scene.units import parse
 from limitsets.parameters.regions.record import Record
 from limitsets.proofs.prover.certificate import in_certificate, pack
-from limitsets.proofs.prover.parameters import DIGITS, decimal
 from limitsets.proofs.prover.proof import require_checkable
+from limitsets.proofs.prover.tolerances import DIGITS, decimal
 
 # ----------------------------------------------------------------
 # The two quantities of a plane of parameters, and the borders of its cells: exact decimals, shared by

@@ -21,18 +21,12 @@ from limitsets.proofs.prover.goals import cuts, prove, prove_or_refute
 from limitsets.proofs.prover.goals.violating_orbits import start_that_leaves
 from limitsets.proofs.prover.of_map import certify_map
 from limitsets.proofs.prover.orbits import proved_cycles
-from limitsets.proofs.prover.parameters import (
-    ParameterBox,
-    SceneBox,
-    joined,
-    parameter_box,
-    scattered,
-    whole,
-)
+from limitsets.proofs.prover.parameters import ParameterBox, joined, parameter_box, scattered
 from limitsets.proofs.prover.proof import Claim, Proof, claimed, undecided
 from limitsets.proofs.prover.proof_of_map import ProofOfMap
 from limitsets.proofs.prover.query import weakest_of
 from limitsets.proofs.prover.thinning import least_slope
+from limitsets.proofs.prover.tolerances import SceneBox, whole
 from limitsets.systems.cells import Grid
 
 # Cells per side, tried in turn until everything asked for is proved or refuted.

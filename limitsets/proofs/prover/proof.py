@@ -22,7 +22,7 @@ from limitsets.proofs.prover.certificate import Saved, require_proved, write
 from limitsets.proofs.prover.end_points import union_of
 from limitsets.proofs.prover.entropies import Entropy
 from limitsets.proofs.prover.goals import State, hexed, rechecked
-from limitsets.proofs.prover.parameters import whole
+from limitsets.proofs.prover.tolerances import whole
 
 # ----------------------------------------------------------------
 # Writing an orbit that refutes a goal, so that it can be checked independently.

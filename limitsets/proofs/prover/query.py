@@ -34,8 +34,9 @@ from limitsets.proofs.prover.goals.violating_orbits import (
     throws,
     violation,
 )
-from limitsets.proofs.prover.parameters import ParameterBox, SceneBox, parameter_box
+from limitsets.proofs.prover.parameters import ParameterBox, parameter_box
 from limitsets.proofs.prover.proof import Claim
+from limitsets.proofs.prover.tolerances import SceneBox
 from limitsets.systems.graph.images.enclosed import least_known
 from limitsets.systems.maps import Orbit, orbit
 
