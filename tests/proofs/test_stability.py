@@ -1,7 +1,10 @@
 """How far the ground can lean under a part on each of its sides: against the arctangent, and a chamfer, a tolerance."""
 
+import math
+
 import mpmath
 import pytest
+from matplotlib.patches import Circle
 
 import limitsets as ls
 from limitsets.base import AnswerError
@@ -78,3 +81,18 @@ def test_a_side_on_which_the_part_does_not_rest_tips_by_itself() -> None:
     )
     assert sorted(text.get_text() for text in panel.texts) == ["", "tips"]
     assert any(line.get_gid() == "no rest" for line in panel.lines)
+
+
+def test_every_panel_shows_the_holes_where_the_part_has_them() -> None:
+    """Turning keeps the way from the centre of mass to the round hole: 18.92 and 28.99 mm in the part's own frame."""
+    scene = ls.load(bracket())
+    way = math.dist(scene.centre, (20.0, 60.0))
+    panels = ls.plot.resting_sides(stability(scene)).axes
+    assert len(panels) == 5
+    for axes, d in zip(panels, scene.sides.d.tolist(), strict=True):
+        holes = [patch for patch in axes.patches if patch.get_gid() == "hole"]
+        assert len(holes) == 2
+        (circle,) = (patch for patch in holes if isinstance(patch, Circle))
+        assert circle.radius == pytest.approx(5.0)
+        assert math.dist(circle.center, (0.0, d)) == pytest.approx(way, rel=1e-12)
+        assert circle.center[1] - circle.radius > 0.0  # above the ground

@@ -95,11 +95,21 @@ def part(scene: Scene) -> Figure:
 
 
 def _plate(axes: Axes, scene: Scene) -> bool:
-    """Draw the outline with its holes, and the hull where it is another polygon; say whether it is."""
+    """Draw the part, and its hull where that is another polygon; say whether it is."""
+    draw_on_side(axes, scene, 0, _centre_at(scene))
+    notched = len(scene.outline) > len(scene.vertices)
+    if notched:
+        hull = turned(about_centre(scene), angle_on_side(scene, 0)) + _centre_at(scene)
+        axes.add_patch(Polygon(hull, closed=True, fill=False, zorder=1.5, gid="hull", **HULL))
+    return notched
+
+
+def draw_on_side(axes: Axes, scene: Scene, side: int, centre: Array) -> None:
+    """Draw the part as it lies on a side, with its holes; `centre` is where its centre of mass is."""
 
     def placed(points: Any) -> Array:
         about = np.asarray(points, dtype=np.float64) - np.asarray(scene.centre)
-        return turned(about, angle_on_side(scene, 0)) + _centre_at(scene)
+        return turned(about, angle_on_side(scene, side)) + centre
 
     axes.add_patch(Polygon(placed(scene.outline), closed=True, zorder=2, gid="part", **OUTLINE))
     for hole in scene.holes:
@@ -108,12 +118,6 @@ def _plate(axes: Axes, scene: Scene) -> bool:
             axes.add_patch(Polygon(placed(hole.vertices), closed=True, **look))
         else:
             axes.add_patch(Circle(tuple(placed([hole.centre])[0]), 0.5 * float(hole.diameter), **look))
-    notched = len(scene.outline) > len(scene.vertices)
-    if notched:
-        axes.add_patch(
-            Polygon(placed(scene.vertices), closed=True, fill=False, zorder=1.5, gid="hull", **HULL)
-        )
-    return notched
 
 
 def refused_part(sketch: Sketch, why: str) -> Figure:

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
 
 from limitsets.base import arguments_checked, rounded
 from limitsets.face.plot import style
-from limitsets.face.plot.parts import CENTRE, OUTLINE, SOLID, TIPS
-from limitsets.face.plot.throwing import about_centre, angle_on_side, turned
+from limitsets.face.plot.parts import CENTRE, SOLID, TIPS, draw_on_side
+from limitsets.face.plot.throwing import about_centre
 from limitsets.feeder.scene import Scene
 from limitsets.proofs.prover.stability import SideStability, Stability
 
@@ -77,11 +76,10 @@ def resting_sides(answer: Stability) -> Figure:
 def _panel(axes: Axes, scene: Scene, side: SideStability, size: float) -> None:
     """Draw the part on a side; x runs from below the centre of mass, y from the ground."""
     a, d = 0.5 * sum(side.a), 0.5 * sum(side.d)
-    shape = turned(about_centre(scene, hull=False), angle_on_side(scene, side.side)) + np.array([0.0, d])
     axes.set_axis_off()
     axes.fill_between([-1.3 * size, 1.3 * size], 0.0, -0.07 * size, **SOLID)
     axes.axhline(0.0, color=style.INK, lw=1.6, zorder=1)
-    axes.add_patch(Polygon(shape, closed=True, zorder=2, gid="part", **OUTLINE))
+    draw_on_side(axes, scene, side.side, np.array([0.0, d]))
     ends = {-1: (-a, side.left[0]), 1: (0.5 * sum(side.length) - a, side.right[0])}
     if not side.rests:
         axes.plot([ends[-1][0], ends[1][0]], [0.0, 0.0], zorder=4, gid="no rest", **TIPS)
