@@ -279,7 +279,7 @@ def require_root(found, side, root, columns=slice(None)):
         changed("paper-initial-small-angle"),
         changed("paper-designed-small-angle"),
         changed("paper-initial-small-angle", ALONG=4.6, ABOVE=0.0003, KAPPA=60.0),
-        changed("paper-initial-small-angle", ALONG=4.83, ABOVE=3.0, KAPPA=60.0),
+        changed("paper-initial-small-angle", ALONG=4.83, ABOVE=3.0, KAPPA=60.0, RHO=0.7),
         changed("paper-initial-small-angle", ALONG=6.1, ABOVE=0.5, KAPPA=40.0),
     ],
     ids=["initial", "designed", "level", "corner", "end"],
