@@ -36,6 +36,7 @@ GIVEN_BY = {
     "Fit": "limitsets.fit(scene, file)",
     "Grid": "limitsets.grid(scene.domain, cells=1024)",
     "Levels": "limitsets.robust.noise_levels(scene)",
+    "Machines": "limitsets.fit(scene, file).machines",
     "Margin": "limitsets.margin(scene)",
     "MarginsBeyond": "limitsets.robustness(scene).curve(side)",
     "NoiseStatistics": "limitsets.noise_statistics(scene)",

@@ -254,6 +254,10 @@ def check_starts_from_foot(c: Cells, scene: Scene, side: int, away: float) -> No
     check_reach(c, scene, side)
     edges, ranked = c.edges[side], c.rank[c.start[side] : c.start[side + 1]] >= 0
     until = float(edges[int(np.flatnonzero(~ranked).max(initial=-1)) + 1])
+    begin = scene.sides[side].a + away
+    prove(begin < scene.sides[side].arm, f"side {side}: no start is claimed that lies on the arm")
+    if begin >= until:
+        return  # all these starts lie in cells with a rank
     with about(f"side {side}, starts with x - a_{side} > {away!r}"):
         check_by_halves(scene, check_outward, side, until, away)
 

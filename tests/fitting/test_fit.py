@@ -48,6 +48,9 @@ def held_by(found, truth):
     held["landing"] = found.landing.lo <= LANDING <= found.landing.hi
     fitted = [name for name in PLACES if name not in found.held]
     joint = searching.threshold_of(len(fitted), len(found.rows.throws), len(fitted))
+    machines = found.machines
+    off = [(truth[name] - machines.values[name]) / machines.halves[name] for name in machines.together]
+    held["ellipsoid"] = off @ np.linalg.solve(machines.correlation, off) <= machines.stretch(len(off)) ** 2
     held["region"] = found.deviance({name: truth[name] for name in fitted}) <= joint
     return held
 
@@ -62,7 +65,14 @@ def fifteen(flipped):
 def test_intervals_of_15_machines_hold(flipped):
     """A thousand machines, from both sides, are in the benchmarks."""
     cases = [held_by(found, truth) for truth, found in fifteen(flipped)]
-    for name in (*PLACES, "region", RADIUS, "speed", "landing"):  # at a bound an interval holds more often
+    for name in (
+        *PLACES,
+        "region",
+        "ellipsoid",
+        RADIUS,
+        "speed",
+        "landing",
+    ):  # at a bound an interval holds more often
         held = [each[name] for each in cases if name in each]
         assert len(held) == 15 or name in (RADIUS, "speed", "landing")
         assert sum(held) >= binom.ppf(1e-3, len(held), 0.95), (name, held)

@@ -301,6 +301,20 @@ def test_a_start_that_is_lost_is_not_claimed_nor_one_that_comes_lost(good, tmp_p
         assert judged(f, tmp_path)[0] == "failed"
 
 
+def test_starts_from_farther_than_the_first_cells_on_need_no_jog_near_the_foot(good, tmp_path):
+    """As of pieces whose joined claim begins where the last of them does: all such starts lie in cells with a rank."""
+    f = good["nine"].copy()
+    away, sides = section(f)["starts"]["from_foot"], ls.load("paper-designed").sides
+    before, whole = verdict(f.copy().seal(), tmp_path), 3 * 28.0 - float(sides.a.sum())
+    left_out = 2.0 - float.fromhex(away["0"])
+    away["0"] = (2.0).hex()
+    report = verdict(f.seal(), tmp_path)
+    assert (before.verdict, report.verdict) == ("proved", "proved-on-cells")
+    assert report.open - before.open == pytest.approx(
+        left_out / whole, rel=0.02
+    )  # arms and feet of the tolerance
+
+
 def near_foot(model, kappa, noise):
     """Whether the checker proves something of starts near the foot in paper-designed."""
     scene = checker.scene.read_scene(written("paper-designed", model) | {"throw": {"kappa": kappa}}, noise)

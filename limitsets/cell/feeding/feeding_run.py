@@ -22,6 +22,7 @@ from limitsets.base import (
     shown_in_notebooks,
 )
 from limitsets.cell.feeding.crowd import BATCHES, CrowdTrials, run_crowd
+from limitsets.cell.feeding.drawn import Drawn, drawn_trials
 from limitsets.cell.feeding.falling import ArmEnd, arm_end_of, clear_beyond, tipping_times
 from limitsets.cell.feeding.paths import Fed, Safe, without_scatter
 from limitsets.cell.feeding.proving import FeedingProof, fate_brackets, holds, proved_feeding, write_proof
@@ -37,6 +38,7 @@ from limitsets.cell.feeding.trials import (
 from limitsets.feeder.goals import by_side
 from limitsets.feeder.scattering import Scattering, scattering_of
 from limitsets.feeder.scene import LaidLike, Model, Scene, load
+from limitsets.parameters.margins.machines import Machines
 from limitsets.parameters.noise.sampling import require_seed
 from limitsets.parameters.sheet.summary import still
 from limitsets.proofs.chances.absorption import AbsorptionBrackets
@@ -86,6 +88,8 @@ class Feeding(Saved):
     crowds : tuple of CrowdTrials
         Many parts at once in the engine: that push each other, and that pass through each other, from the same seeds;
         empty where they were not asked for.
+    drawn : Drawn or None
+        What each machine drawn from a fit feeds; the trials are of all of them.  None without a fit.
     """
 
     end: ArmEnd
@@ -97,6 +101,7 @@ class Feeding(Saved):
     trials: Trials
     brackets: AbsorptionBrackets | None = None
     crowds: tuple[CrowdTrials, ...] = ()
+    drawn: Drawn | None = None
 
     @cached_property
     def shares(self) -> FedShares:
@@ -236,6 +241,7 @@ class Feeding(Saved):
             else as_table(**picked(self.curve, *(each.name for each in fields(Curve)))),
             trials=self.trials,
             brackets=self.brackets,
+            machines=self.drawn,
             crowds=[crowd.to_json() | {"right_per_minute": crowd.per_minute(rate)} for crowd in self.crowds],
         )
 
@@ -251,6 +257,7 @@ def feed(
     scene: Scene | str | Path | Mapping[str, Any],
     scatter: Scattering | None = None,
     *,
+    fitted: Machines | None = None,
     side: int | None = None,
     laid: LaidLike | None = None,
     noise: Mapping[str, str] | None = None,
@@ -274,6 +281,9 @@ def feed(
     scatter : Scattering, optional
         Random noise of every throw, for probabilities and trials; default that of the scene, `[world] scatter` with
         `[effects] spread`, or none.
+    fitted : Machines, optional
+        Of a fit (`limitsets.fitting.Fit.machines`): the scene becomes its most likely machine, the trials are of
+        machines drawn from it with its scatter, and three standard deviations of it are the noise of the proofs.
     side : int, optional
         The side wanted; default the goal's.
     laid : mapping of int to sequence of (float, float), optional
@@ -326,6 +336,9 @@ def feed(
     1000
     """
     read = load(scene)
+    if fitted is not None:
+        read = fitted.on(read)
+        scatter, noise = scatter or fitted.scattering, fitted.noise if noise is None else noise
     end = arm_end_of(read, side, laid)
     if trials is not None and trials < 1:
         raise AnswerError("the trials", trials, "1 or more", "throw some parts")
@@ -341,6 +354,10 @@ def feed(
     curve = None
     if level and scatter.given():
         curve = success_curve(end, scatter, parts=min(count, TRIALS), seed=seed, progress=progress)
+    if fitted is None:
+        thrown, drawn = run_trials(end, scatter, count, seed=seed, progress=progress), None
+    else:
+        thrown, drawn = drawn_trials(fitted, end, scatter, count, laid=laid, seed=seed, progress=progress)
     return Feeding(
         end,
         {number: clear_beyond(read, number) for number in range(len(read.sides))},
@@ -348,7 +365,8 @@ def feed(
         noise=dict(noise or {}),
         scatter=scatter,
         curve=curve,
-        trials=run_trials(end, scatter, count, seed=seed, progress=progress),
+        trials=thrown,
         brackets=None if brackets is None else fate_brackets(end, scatter, brackets, progress=progress),
         crowds=crowds,
+        drawn=drawn,
     )

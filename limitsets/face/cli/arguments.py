@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from limitsets.feeder.goals import Goal
     from limitsets.feeder.scattering import Scattering
     from limitsets.feeder.scene import Scene
+    from limitsets.parameters.margins.machines import Machines
 
 
 _BARE = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
@@ -89,6 +90,13 @@ def scattering_of(scene: Scene, words: list[str] | None, law: str) -> Scattering
 
     random = deviations("--scatter", words)
     return scattering_from(scene, random, law) if random else None
+
+
+def machines_of(file: Path | None) -> Machines | None:
+    """Read --fitted."""
+    from limitsets.parameters.margins.machines import Machines
+
+    return None if file is None else Machines.read(file)
 
 
 def laid_ranges(

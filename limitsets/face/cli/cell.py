@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import limitsets as ls
 from limitsets.base import BETWEEN, Table
 from limitsets.face import report
-from limitsets.face.cli.arguments import certified, deviations, laid_ranges, said_of, scattering_of
+from limitsets.face.cli.arguments import (
+    certified,
+    deviations,
+    laid_ranges,
+    machines_of,
+    said_of,
+    scattering_of,
+)
 from limitsets.face.cli.commands import Answer, Run, Scene, Seed, Words, command, limits
 
 if TYPE_CHECKING:
@@ -38,6 +45,7 @@ def feed(
     run: Run,
     scene: Scene,
     *,
+    fitted: Path | None = None,
     side: int | None = None,
     scatter: Words = None,
     law: str = "gaussian",
@@ -90,9 +98,10 @@ def feed(
     feeding = ls.feed(
         chosen,
         scattering_of(chosen, scatter, law),
+        fitted=machines_of(fitted),
         side=side,
         laid=laid_ranges(laid),
-        noise=deviations("--noise", noise),
+        noise=deviations("--noise", noise) if noise or fitted is None else None,
         prove=not no_proof,
         seconds=seconds,
         level=not no_level,
@@ -163,6 +172,10 @@ def _words_of_feeding(feeding: Feeding) -> Iterator[str | Table]:
     series = feeding.trials.series()
     if series.size:
         yield f"{series[0]} right in the first series of 20 trials, {series.mean():.2f} in the mean"
+    if feeding.drawn is not None:
+        yield feeding.drawn.sentence()
+        noise = " and ".join(f"{name} by up to {size}" for name, size in feeding.noise.items())
+        yield f"the proofs are of the most likely machine, {noise} at every throw; margin --fitted proves all machines"
     if feeding.curve is not None:
         yield feeding.curve.line()
     for crowd in feeding.crowds:

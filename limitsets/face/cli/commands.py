@@ -100,6 +100,10 @@ _DOCUMENTED = {
     "json": ("", "Print JSON, and nothing else, on stdout."),
     "law": ("LAW", "Of --scatter: gaussian (standard deviations) or bounded."),
     "laid": ("SIDE=LO:HI", _LAID),
+    "fitted": (
+        "FIT.json",
+        "The machine, how far off it may be, and its scatter: fit.json of limitsets fit -o DIR.",
+    ),
     "no_recheck": ("", "Write certificates without checking them first."),
     "seed": ("N", "Of all random numbers."),
 }

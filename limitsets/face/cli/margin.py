@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import limitsets as ls
 from limitsets.base import Table, joined
 from limitsets.face import report
-from limitsets.face.cli.arguments import deviations, goal_at, laid_ranges, scattering_of
+from limitsets.face.cli.arguments import deviations, goal_at, laid_ranges, machines_of, scattering_of
 from limitsets.face.cli.commands import About, Answer, Run, Scene, Words, command, limits
 from limitsets.face.cli.output import processes, saved, stem_of
 from limitsets.face.cli.subjects import MapOfFile, domain_of, of_map_alone, of_scene_alone, subject
@@ -34,6 +34,7 @@ def margin(
     reading: str | None = None,
     x: str | None = None,
     laid: Words = None,
+    fitted: Path | None = None,
     width: float = 0.01,
     no_recheck: bool = False,
 ) -> Answer:
@@ -45,7 +46,7 @@ def margin(
     Parameters
     ----------
     quantity : QUANTITY
-        Like throw.speed, or "joint"; default: all there are.
+        Like throw.speed, or "joint"; default: all there are, with --fitted joint.
     reading : R
         fixed (but unknown) or per-throw.
     x : X
@@ -56,9 +57,19 @@ def margin(
         Write margins.json, certificates, orbits, a figure.
     """
     begins, chosen = laid_ranges(laid), run.opened(scene)
+    machines, noise = machines_of(fitted), None
+    if machines is not None:
+        chosen, noise, quantity = machines.on(chosen), machines.noise, quantity or ["joint"]
     goal = None if x is None else goal_at(chosen, x)
     margins = ls.margin(
-        chosen, *(quantity or ()), reading=reading, goal=goal, laid=begins, width=width, progress=run.tell
+        chosen,
+        *(quantity or ()),
+        reading=reading,
+        goal=goal,
+        laid=begins,
+        noise=noise,
+        width=width,
+        progress=run.tell,
     )
     about = run.about(margins[0].model, chosen)
     if run.out is not None:
@@ -66,6 +77,8 @@ def margin(
         margins = _write(run, margins, about, recheck=not no_recheck)
     again = "not rechecked" if no_recheck else "rechecked"
     last = [] if run.out is None else [f"certificates: {again} (again: limitsets recheck FILE)"]
+    if machines is not None:
+        last += [machines.sentence(each.proved, each.refuted) for each in margins if each.quantity == "joint"]
     bracketed = all(each.proved > 0 and (each.closed or each.refuted is None) for each in margins)
     return Answer(
         margins,
@@ -227,6 +240,7 @@ def atlas(
     task: str | None = None,
     margin: str | None = None,
     reading: str = "fixed",
+    fitted: Path | None = None,
     certify: bool = False,
     set_: Words = None,
     domain: str | None = None,
@@ -278,11 +292,13 @@ def atlas(
         sys.path.insert(0, str(Path.cwd()))
     chosen = subject(scene, set_)
     if isinstance(chosen, MapOfFile):
-        of_map_alone({"--margin": margin, "--certify": certify or None})
+        of_map_alone({"--margin": margin, "--certify": certify or None, "--fitted": fitted})
         name, box = chosen.name, domain_of(chosen, domain)
         about: Any = chosen.one()
     else:
         name, about, box = stem_of(chosen), of_scene_alone(chosen, {"--domain": domain}), None
+    machines = machines_of(fitted)
+    about = about if machines is None else machines.on(about)
     store = run.out or Path(f"{name}-atlas.zarr")
     wanted = [name.strip() for words in variables or [] for name in words.split(",")]
     answers = ls.atlas(
@@ -304,7 +320,7 @@ def atlas(
     if is_classified(answers.dataset):
         picture = store.with_name(f"{store.name.removesuffix('.zarr')}.{run.form}")
         with saved(picture) as draft:
-            ls.plot.atlas(answers).savefig(draft, dpi=report.writing.DPI)
+            ls.plot.atlas(answers, fitted=machines).savefig(draft, dpi=report.writing.DPI)
         last.append(f"figure: {picture}")
     if answers.model is not None:
         last.append(run.about(answers.model).line())

@@ -38,6 +38,7 @@ from limitsets.parameters.atlas.classes import (
     named_class,
     numbers_of,
 )
+from limitsets.parameters.margins.machines import Machines
 
 # ----------------------------------------------------------------
 # What the pictures of an atlas share: axes, pixels about the points, hatches, and the mark of the scene itself.
@@ -184,6 +185,27 @@ def mark(axes: Axes, answers: Atlas) -> list[Any]:
     return [style.key(f"{title_of(answers)}: {numbers}", **DESIGN)]
 
 
+def possible(axes: Axes, answers: Atlas, machines: Machines) -> list[Any]:
+    """Draw where a fit leaves the varied quantities, with 95 %; return the legend's entry."""
+    names = answers.axes
+    look: dict[str, Any] = {"color": style.INK, "lw": 1.8, "ls": (0, (4, 2)), "zorder": 5}
+    missing = [name for name in names if name not in machines.values]
+    if missing:
+        return [Patch(label=f"the fit does not tell {' and '.join(missing)}", alpha=0.0)]
+    units = [answers.dataset[name].attrs.get("units", "") for name in names]
+    factors = [
+        float(exact_factor(unit, base_unit(find(name).dimension, machines.unit)))
+        for name, unit in zip(names, units, strict=True)
+    ]
+    if len(names) == 2 and set(names) <= {*machines.together}:
+        axes.plot(*(machines.ellipse(*names) / factors).T[::-1], gid="fit", **look)
+        return [style.key("where the fit leaves both, 95 %", **look | {"marker": ""})]
+    for name, factor, line in zip(names[::-1], factors[::-1], (axes.axvline, axes.axhline), strict=False):
+        for end in (-1.0, 1.0):
+            line((machines.values[name] + end * machines.halves[name]) / factor, gid="fit", **look)
+    return [style.key("where the fit leaves each, 95 %", **look | {"marker": ""})]
+
+
 def _value_of(answers: Atlas, name: str) -> float | None:
     """Return the value of a quantity in the unvaried scene or map, in the unit of its axis."""
     data, plan = answers.dataset, answers.dataset.attrs["plan"]
@@ -252,13 +274,15 @@ def _spread(kind: AttractorKind) -> int:
 
 
 @arguments_checked
-def atlas(found: Atlas) -> Figure:
+def atlas(found: Atlas, fitted: Machines | None = None) -> Figure:
     """Draw the classes of an atlas of one or two axes, with a legend in words, most frequent classes first.
 
     Parameters
     ----------
     found : Atlas
         From `limitsets.atlas`, with the variable `class`, or those of which classes are made.
+    fitted : Machines, optional
+        Of a fit (`limitsets.fitting.Fit.machines`): where it leaves the quantities is drawn.
 
     Returns
     -------
@@ -310,7 +334,7 @@ def atlas(found: Atlas) -> Figure:
     if rest:
         share = _percent(sum(each.share for each in rest))
         handles.append(Patch(label=f"{len(rest)} other class{'es' * (len(rest) > 1)} ({share})", alpha=0.0))
-    handles += goal + mark(axes, found)
+    handles += goal + mark(axes, found) + ([] if fitted is None else possible(axes, found, fitted))
     figure.legend(
         handles=handles, loc="outside right upper", fontsize=style.SMALL, frameon=False, handlelength=2.4,
         handleheight=1.6, labelspacing=0.9, borderaxespad=0.8,

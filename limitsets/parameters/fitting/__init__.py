@@ -13,6 +13,7 @@ from limitsets.parameters.fitting.filmed import FilmedThrows, throws_of_film
 from limitsets.parameters.fitting.fit_result import Enough, Fit, Fitted, Scatter, enough
 from limitsets.parameters.fitting.fitting_run import Bootstrap, bootstrap, fit, simulated_throws
 from limitsets.parameters.fitting.throws import Throws, read_throws
+from limitsets.parameters.margins.machines import Machines
 
 __all__ = [
     "Bootstrap",
@@ -20,6 +21,7 @@ __all__ = [
     "FilmedThrows",
     "Fit",
     "Fitted",
+    "Machines",
     "Scatter",
     "Throws",
     "bootstrap",

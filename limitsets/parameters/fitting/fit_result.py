@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,15 @@ import numpy as np
 from limitsets.base import AnswerError, Column, Progress, Table, Tabled, as_table, picked
 from limitsets.base.arrays import Array
 from limitsets.feeder.goals import OrientedBeyond
-from limitsets.feeder.scene import Scene, in_unit_of, in_units_of, load, unit_of
+from limitsets.feeder.scene import Scene, load
 from limitsets.parameters.fitting.likelihood import Further, Likelihood, Rows
 from limitsets.parameters.fitting.misfit import Misfit
-from limitsets.parameters.fitting.searching import Maximum, maximised
-from limitsets.parameters.margins.deviations import deviation_scale
+from limitsets.parameters.fitting.searching import RADIUS, Maximum, maximised
+from limitsets.parameters.margins.machines import SIGMAS, Machines, rounded_up, with_uncertainty
 from limitsets.parameters.margins.margin_result import Margin, bound
 from limitsets.parameters.margins.single import margin
 from limitsets.proofs.prover.certifying import certify
 from limitsets.proofs.prover.query import Query
-
-# A larger share of a value is no tolerance: what is fitted is then not known at all.
-MOST = 0.99
 
 
 @dataclass(frozen=True)
@@ -163,6 +159,36 @@ class Fit(Tabled):
 
         return 2.0 * (self.best.value - maximised(function, at[free]).value)
 
+    @property
+    def machines(self) -> Machines:
+        """The machines that the film leaves possible.
+
+        Raises
+        ------
+        DataError
+            The film leaves a quantity open.
+        """
+        return Machines.of(self.to_json(), self.rows.throws.file or None)
+
+    def _correlation(self) -> dict[str, Any]:
+        """Say how the errors of bounded quantities go together: by the likelihood's curvature at its maximum."""
+        own, names = self.likelihood, [each.name for each in self.quantities]
+        kept = [own.names.index(name) for name in names]
+        bend = -self.best.hessian[np.ix_(kept, kept)]
+        if (
+            RADIUS in names
+        ):  # nothing within its interval is more likely: as much as a uniform law of its width bends
+            k = names.index(RADIUS)
+            bend[k, k] += 3.0 * (own.scale[kept[k]] / self[RADIUS].half) ** 2
+        told = [k for k, each in enumerate(self.quantities) if each.bounded and each.name != RADIUS]
+        covariance = np.linalg.inv(bend)[np.ix_(told, told)]
+        size = np.sqrt(np.diag(covariance))
+        return {
+            "names": [names[k] for k in told],
+            "matrix": covariance / np.outer(size, size),
+            "spare": len(self.rows.throws) - len(own.names),
+        }
+
     def tables(self) -> tuple[Table, ...]:
         """Give the tables that show it, the one that is saved as CSV first."""
         scatters = (
@@ -198,6 +224,7 @@ class Fit(Tabled):
             held=self.held,
             undetermined=self.undetermined,
             scatter={"throw.speed": self.speed, "landing.x": self.landing},
+            correlation=self._correlation(),
             error=self.error,
             misread=[
                 {"row": row, "column": column, "recorded": recorded, "fits": fits}
@@ -229,40 +256,12 @@ def _number(value: float) -> str:
     return f"{value:.6g}" if math.isfinite(value) else "open"
 
 
-def rounded_up(value: float) -> str:
-    """Write a size with three digits, not less than it is."""
-    return f"{Context(prec=3, rounding=ROUND_CEILING).create_decimal(Decimal(repr(value))):f}"
-
-
 def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: Scatter, landing: Scatter) -> Scene:
     """Return the scene with the values, the intervals as [tolerance], and the scatter in [world], in its own units."""
-    scene = given.with_values({each.name: each.value for each in quantities})
-    scene = in_units_of(scene, given, [each.name for each in quantities])
-    tree = scene.as_dict()
-    tolerance = {}
-    for each in quantities:
-        name = "throw.speed" if each.name == "throw.kappa" else each.name
-        share = deviation_scale(scene, name).relative
-        # the speed goes as the inverse square root of kappa
-        per = (0.5 if each.name == "throw.kappa" else 1.0) / each.value if share else 1.0
-        half = per * each.half
-        if each.bounded and half < (MOST if share else math.inf):
-            size, unit = (
-                (100.0 * half, "%") if share else (in_unit_of(given, name, half), unit_of(given, name))
-            )
-            tolerance[name] = f"{rounded_up(size)} {unit}"
-    kept = {name: text for name, text in tree.get("tolerance", {}).items() if name not in tolerance}
-    tree["tolerance"] = kept | tolerance
+    halves = {each.name: each.half if each.bounded else math.inf for each in quantities}
     # where none is most likely, but some is not ruled out, the most that is possible is written
-    length, rate = (each.value or each.hi for each in (landing, speed))
-    scatter = {}
-    if math.isfinite(length):
-        size, unit = in_unit_of(given, "landing.x", length), unit_of(given, "landing.x")
-        scatter["landing"] = f"{rounded_up(size)} {unit}"
-    if rate < MOST:
-        scatter["speed"] = f"{rounded_up(100.0 * rate)} %"
-    tree["world"] = {**tree.get("world", {}), "scatter": scatter}
-    return Scene.of(tree, given.file)
+    scatter = {"throw.speed": speed.value or speed.hi, "landing.x": landing.value or landing.hi}
+    return with_uncertainty(given, {each.name: each.value for each in quantities}, halves, scatter)
 
 
 # ----------------------------------------------------------------
@@ -271,9 +270,6 @@ def fitted_scene(given: Scene, quantities: tuple[Fitted, ...], speed: Scatter, l
 # The margins of the fitted scene, at every throw another speed or landing, stand against the fitted scatter; and
 # the goal is asked of all scenes within the fitted intervals together with that scatter at once.
 
-
-# Throws scatter without a bound; so many standard deviations are taken for one (1 throw in 370 is outside).
-SIGMAS = 3.0
 
 WORDS = {"throw.speed": "speed repeats", "landing.x": "landings repeat"}
 ALL_OF_IT = {

@@ -389,42 +389,43 @@ class Tolerance:
         What is fixed but unknown.
     sizes : tuple of Fraction
         A size for each.
-    varying : DeviationScale or None
-        What differs at every throw, if something does: where parts land.
-    varying_size : Fraction
-        How much.
+    varying : tuple of (DeviationScale, Fraction)
+        What differs at every throw, and how much: where parts land, and what noise is given beside.
     """
 
     scales: tuple[DeviationScale, ...]
     sizes: Parts
-    varying: DeviationScale | None = None
-    varying_size: Fraction = Fraction(0)
+    varying: tuple[tuple[DeviationScale, Fraction], ...] = ()
 
     @classmethod
-    def of(cls, scene: Scene, texts: Mapping[str, str]) -> Tolerance:
-        """Read it from texts by quantity."""
-        scales, sizes, landing, landing_size = list[DeviationScale](), list[Fraction](), None, Fraction(0)
+    def of(cls, scene: Scene, texts: Mapping[str, str], noise: Mapping[str, str] | None = None) -> Tolerance:
+        """Read it from texts by quantity, and the noise at every throw beside it."""
+        fixed, varying = list[tuple[DeviationScale, Fraction]](), list[tuple[DeviationScale, Fraction]]()
         if not texts:
             raise AnswerError(
                 "the tolerance", "empty", "deviations by quantity", "give the scene [tolerance]"
             )
-        for name, text in texts.items():
+        readings = [
+            *(
+                (name, text, None)
+                for name, text in texts.items()
+                if name != "landing.x" or name not in (noise or ())
+            ),
+            *((name, text, "per-throw") for name, text in (noise or {}).items()),
+        ]
+        for name, text, reading in readings:
             deviation(text, name, scene.unit, key=f'tolerance."{name}"')  # refuses what is none
-            one, given = deviation_scale(scene, name), parsed_deviation(text, name)
+            one, given = deviation_scale(scene, name, reading), parsed_deviation(text, name)
             one = replace(one, unit=given.unit)
             if name == "throw.speed" and one.key != name and given.unit != "%":
                 raise AnswerError("the tolerance", text, "percent, for a scene given by kappa", "give it so")
-            if name == "landing.x":
-                landing, landing_size = one, Fraction(given.number)
-            else:
-                scales.append(one)
-                sizes.append(Fraction(given.number))
-        return cls(tuple(scales), tuple(sizes), landing, landing_size)
+            (fixed if one.reading == "fixed" else varying).append((one, Fraction(given.number)))
+        return cls(tuple(one for one, _ in fixed), tuple(size for _, size in fixed), tuple(varying))
 
     @classmethod
     def alone(cls, one: DeviationScale) -> Tolerance:
         """Return one quantity, by 1 of its unit."""
-        return cls((one,), (Fraction(1),)) if one.reading == "fixed" else cls((), (), one, Fraction(1))
+        return cls((one,), (Fraction(1),)) if one.reading == "fixed" else cls((), (), ((one, Fraction(1)),))
 
     @cached_property
     def deviations(self) -> dict[str, Deviation]:
@@ -434,12 +435,11 @@ class Tolerance:
     @cached_property
     def scatter(self) -> float:
         """How far landings are off, in floats [length]; 0 where they are not."""
-        return 0.0 if self.varying is None else self.varying.deviation(self.varying_size).value
+        return sum(one.deviation(size).value for one, size in self.varying if one.quantity == "landing.x")
 
     def noise(self, factor: Fraction) -> dict[str, str]:
         """Say what differs at every throw."""
-        one = self.varying
-        return {} if one is None else {one.quantity: one.text(short(factor * self.varying_size))}
+        return {one.quantity: one.text(short(factor * size)) for one, size in self.varying}
 
     def texts(self, factor: Fraction) -> dict[str, str]:
         """Say what is fixed but unknown, as `limitsets.certify` takes it."""

@@ -293,6 +293,7 @@ def joint_margin(
     goals: tuple[Goal, ...],
     tolerance: Mapping[str, str] | None = None,
     *,
+    noise: Mapping[str, str] | None = None,
     width: float = 0.01,
     seconds: float = SECONDS,
     tell: Tell = lambda _: None,
@@ -308,6 +309,8 @@ def joint_margin(
     tolerance : mapping of str to str, optional
         Deviations by quantity, ``{"throw.speed": "1 %", "landing.x": "0.01 in"}``; default the scene's.  landing.x is
         noise at every throw, all else fixed but unknown.
+    noise : mapping of str to str, optional
+        Deviations at every throw beside it, of throw.speed, gravity.tilt or landing.x; the same factor is on them.
     width : float
         How close the two ends have to be, as a share of the upper one.
     seconds : float
@@ -323,7 +326,7 @@ def joint_margin(
     begin = time.perf_counter()
     query = Query.of(scene, goals)
     texts = dict(scene.text.get("tolerance", {}) if tolerance is None else tolerance)
-    vector, share = Tolerance.of(query.scene, texts), Fraction(repr(width))
+    vector, share = Tolerance.of(query.scene, texts, noise), Fraction(repr(width))
     sensitivity = sensitivity_of(query, vector)
     at_corners = _at_corners(query, vector, sensitivity, share / 8)
     bad, reason, target = at_corners.refuted, at_corners.reason, at_corners.proved

@@ -209,6 +209,7 @@ class Margin(Tabled):
             reason=self.reason or None,
             counterexample=self.orbit or None,
             certificate=self.files or None,
+            **picked(self, "deviations", "noise"),
             pieces=len(self.pieces),
             model=self.model,
             timings={"margin": self.seconds},

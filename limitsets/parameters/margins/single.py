@@ -83,6 +83,7 @@ def margin(
     reading: str | None = None,
     goal: GoalLike | Sequence[GoalLike] | None = None,
     laid: LaidLike | None = None,
+    noise: Mapping[str, str] | None = None,
     width: float = 0.01,
     progress: Progress | None = None,
 ) -> tuple[Margin, ...]: ...
@@ -101,6 +102,7 @@ def margin(
     reading: str | None = None,
     goal: GoalLike | Sequence[GoalLike] | None = None,
     laid: LaidLike | None = None,
+    noise: Mapping[str, str] | None = None,
     ends: Any = None,
     starts: Any = None,
     width: float = 0.01,
@@ -123,6 +125,8 @@ def margin(
     laid : mapping of int to sequence of (float, float), optional
         By side the ranges of x where parts are laid down, as for `limitsets.certify`: the goal's starts are these.
         Default: the whole arm.
+    noise : mapping of str to str, optional
+        ``{"throw.speed": "0.3 %"}``: what differs at every throw beside the tolerance of "joint", and as many times it.
     ends, starts : sequence of boxes
         Of a map: its goal, that every start in `starts` ends in `ends` and stays, as for `limitsets.certify`.
     width : float
@@ -158,12 +162,14 @@ def margin(
     (True, 'less')
     """
     if isinstance(scene, tuple | type):
-        require_none({"reading": reading, "goal": goal, "laid": laid}, "margin", "beside a map")
+        require_none(
+            {"reading": reading, "goal": goal, "laid": laid, "noise": noise}, "margin", "beside a map"
+        )
         given = quantities or (None,)  # which is then refused as the grid
         return margins_of_map(scene, *given, ends=ends, starts=starts, width=width, progress=progress)
     require_none({"ends": ends, "starts": starts}, "margin", "beside a scene")
     return margin_scene(
-        scene, *quantities, reading=reading, goal=goal, laid=laid, width=width, progress=progress
+        scene, *quantities, reading=reading, goal=goal, laid=laid, noise=noise, width=width, progress=progress
     )
 
 
@@ -175,6 +181,7 @@ def margin_scene(
     reading: str | None = None,
     goal: GoalLike | Sequence[GoalLike] | None = None,
     laid: LaidLike | None = None,
+    noise: Mapping[str, str] | None = None,
     width: float = 0.01,
     progress: Progress | None = None,
 ) -> tuple[Margin, ...]:
@@ -202,7 +209,7 @@ def margin_scene(
         tell(0.0)
         try:
             if isinstance(one, str):
-                answer = joint_margin(loaded, goals, width=width, tell=tell)
+                answer = joint_margin(loaded, goals, noise=noise, width=width, tell=tell)
             else:
                 answer = _single(query, one, Fraction(repr(width)), tell)
         except Exception as error:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from limitsets.proofs.prover.basin import (
+    MOST_UNEXPLAINED,
     ROUNDING,
     Basin,
     NearHinge,
@@ -101,8 +102,9 @@ class Attraction:
             ]
         )
         shut = self.basin.rank < 0
-        *shares, whole = shares_of(self.cover, self.joint, shut, near is not None, start, explained)
-        return dict(zip(self.basin.shares, shares, strict=True)), whole
+        *numbers, whole = shares_of(self.cover, self.joint, shut, near is not None, start, explained)
+        shares = dict(zip(self.basin.shares, numbers, strict=True))
+        return shares, whole and shares["open"] <= MOST_UNEXPLAINED  # the checker counts what is open
 
     @property
     def max_rank(self) -> int:
