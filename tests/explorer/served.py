@@ -63,6 +63,11 @@ class Visitor:
         found: dict[str, Any] = self.page.locator("canvas[data-name]").evaluate_all(script, name)
         return {key: value for key, value in found.items() if isinstance(value, list)}
 
+    def cells(self) -> dict[str, dict[str, float]]:
+        """Give the places of the cells of the page."""
+        names = ("title", "error", "sliders", "pictures", "proved", "estimated", "part", "atlas")
+        return {name: self.page.locator(f".{name}").bounding_box() for name in names}
+
     def canvas(self, name: str) -> Any:
         """Find a picture."""
         return self.page.locator(f'canvas[data-name="{name}"]')

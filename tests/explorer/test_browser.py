@@ -23,6 +23,16 @@ pytestmark = pytest.mark.sweep
 
 
 SPEED = 2  # the third slider
+CELLS = {
+    "title": 0,
+    "error": 1,
+    "sliders": 0,
+    "pictures": 1,
+    "proved": 0,
+    "estimated": 1,
+    "part": 2,
+    "atlas": 0,
+}
 
 
 @pytest.fixture(scope="module")
@@ -81,18 +91,36 @@ def test_arrow_keys_move_a_slider_that_has_the_focus(visitor):
 
 
 def test_a_bad_value_is_said_and_the_picture_stays(visitor):
-    sets = visitor.columns("limit sets")
+    sets, places = visitor.columns("limit sets"), visitor.cells()
     field = visitor.page.get_by_label("speed, typed")
     field.fill("very fast")
     field.press("Enter")
     wrong = visitor.page.locator(".wrong")
     wrong.wait_for()
     assert "very fast" in wrong.inner_text()
+    assert visitor.cells() == places  # the room of the line is kept
     assert visitor.columns("limit sets") == sets
     field.fill("150 deg/s")
     field.press("Enter")
     visitor.changed("limit sets", sets)
     wrong.wait_for(state="detached")
+
+
+def test_the_rows_have_the_same_columns_and_the_arm_lies_below_its_x(visitor):
+    cells = visitor.cells()
+    lefts = sorted({box["x"] for box in cells.values()})
+    assert len(lefts) == 3
+    for called, column in CELLS.items():
+        assert cells[called]["x"] == lefts[column]
+    sliders, proved, pictures = cells["sliders"], cells["proved"], cells["pictures"]
+    assert proved["y"] < sliders["y"] + sliders["height"] + 20  # right below the sliders
+    assert proved["y"] < 500  # of 900: room for what is proved
+    right = {box["x"] + box["width"] for box in (pictures, cells["part"])}
+    assert len(right) == 1
+    lanes, arm = (visitor.figure(name) for name in ("lanes", "the arm"))
+    for edge in ("left", "width", "x0", "x1"):
+        assert arm[edge] == pytest.approx(lanes[edge], abs=1e-6)
+    assert arm["height"] / (arm["y1"] - arm["y0"]) == pytest.approx(arm["width"] / (arm["x1"] - arm["x0"]))
 
 
 def test_a_click_in_a_lane_throws_from_there(visitor):
@@ -187,6 +215,7 @@ def test_a_phone_shows_it_in_one_column(chromium, address):
     phone = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
     one = Visitor(chromium, address, **phone)
     assert one.page.evaluate("document.documentElement.scrollWidth") == 390
+    assert {box["x"] for box in one.cells().values()} == {10}
     boxes = one.canvas("lanes").evaluate("canvas => canvas.boxes")
     assert len(boxes) == 5  # three critical points, the threshold, the goal
     assert all(box["h"] >= 0 and box["h"] + box["wide"] <= 390 for box in boxes)

@@ -1,9 +1,11 @@
 """What the explorer computes, and the canvas it is drawn on."""
 
 import base64
+import io
 import itertools
 import json
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -13,6 +15,8 @@ from limitsets.base.errors import LimitsetsError, SceneError
 from limitsets.face.explorer.answers import estimate_words, proof_words
 from limitsets.face.explorer.canvas import Canvas, Layer
 from limitsets.face.explorer.estimates import (
+    GOAL_X,
+    centre_at,
     estimate,
     estimate_of_map,
     knobs_of,
@@ -21,7 +25,7 @@ from limitsets.face.explorer.estimates import (
     points_of_map,
     scene_with,
 )
-from limitsets.face.explorer.work import MOST_BYTES, MOST_SIDES, answers, scene_from, with_outline
+from limitsets.face.explorer.work import MOST_BYTES, MOST_SIDES, answers, main, scene_from, with_outline
 from limitsets.systems.cells import as_domain
 from tests.plates import left_by_some
 
@@ -135,6 +139,74 @@ def test_typed_values_are_read_with_their_units():
     for wrong in ("fast", "3 kg", "nan", "1e999", ""):
         with pytest.raises(LimitsetsError):
             speed.read(wrong)
+
+
+def in_other_units():
+    """Paper-designed with its arm in mm, X and a height in cm, and its speed in rpm: 1 in is 25.4 mm."""
+    tree = PAPER.as_dict()
+    tree["arm"] = {"length": "711.2 mm", "surface_height": "-0.508 cm"}
+    tree["throw"] = {"speed": "30 rpm"}
+    tree["part"]["mass"]["center"]["along"] = "10 cm"
+    tree["goal"] = {"oriented_beyond": {"x": "50.8 cm", "side": 2}}
+    return ls.load(tree)
+
+
+def test_each_knob_is_in_the_unit_of_the_file():
+    scene = in_other_units()
+    knobs = {knob.name: knob for knob in knobs_of(scene)}
+    expected = {
+        "throw.speed": ("rpm", 30.0, 21.0, 39.0),
+        "arm.length": ("mm", 711.2, 497.84, 924.56),
+        "arm.surface_height": ("cm", -0.508, -3.556, 3.556),  # 5 % of the arm's length to either side
+        "gravity.tilt": ("deg", 30.0001, 5.0, 90.0),
+        GOAL_X: ("cm", 50.8, 0.0, 70.4088),  # to 99 % of the arm's length
+    }
+    for name, (unit, *numbers) in expected.items():
+        assert knobs[name].unit == unit
+        assert knobs[name][3:] == pytest.approx(numbers, rel=1e-6)
+    assert knobs["throw.speed"].read("180 deg/s") == pytest.approx(30.0)
+    assert knobs[GOAL_X].read("20 in") == pytest.approx(50.8)
+    assert centre_at(scene, *scene.centre)["part.mass.center.along"] == pytest.approx(10.0)  # cm
+    moved = scene_with(scene, tuple(knobs.values()), {"throw.speed": 31.0, "arm.surface_height": -1.0})
+    assert (moved.text["throw"]["speed"], moved.text["arm"]["surface_height"]) == ("31.0 rpm", "-1.0 cm")
+    assert moved.surface_height == pytest.approx(-10.0)  # mm
+
+
+def test_an_x_moves_alone_and_together_with_an_arm_that_would_be_too_short_for_the_old_one():
+    scene = in_other_units()
+    moved = scene_with(scene, knobs_of(scene), {GOAL_X: 40.0})
+    assert (moved.goal.x, moved.goal.side, moved.arm_length) == (400.0, 2, 711.2)
+    moved = scene_with(scene, knobs_of(scene), {GOAL_X: 40.0, "arm.length": 500.0})
+    assert (moved.goal.x, moved.arm_length) == (400.0, 500.0)
+    with pytest.raises(SceneError, match="below the arm's length, 500 mm"):
+        scene_with(scene, knobs_of(scene), {"arm.length": 500.0})
+
+
+def test_goals_without_an_x_have_no_knob_of_it():
+    scene = ls.load(PAPER.as_dict() | {"goal": {"attracts_all": True}})
+    assert GOAL_X not in {knob.name for knob in knobs_of(scene)}
+    assert (
+        knobs_of(ls.load(PAPER.as_dict() | {"goal": {"reaches": {"x": "20 in", "side": 2}}}))[-1].value
+        == 20.0
+    )
+
+
+def test_the_process_tells_how_far_it_is(monkeypatch, capsys):
+    """A ladder of four grids, from 2048 cells on, and two margins; lines come five times a second at most."""
+    question = {"what": "proof", "scene": ls.dump(PAPER), "margins": ["throw.speed", "arm.surface_height"]}
+    told = []
+    told += answers(question, lambda *step: told.append(step))
+    assert told[0] == ("2048 cells a side", 0, 4)
+    steps = [each for each in told if isinstance(each, tuple) and each[0].startswith("margin of ")]
+    assert {(step.split(",")[0], done, of) for step, done, of in steps} == {
+        ("margin of throw.speed", 0, 2),
+        ("margin of arm.surface_height", 1, 2),
+    }
+    monkeypatch.setattr(sys, "stdin", io.StringIO(json.dumps(question | {"margins": []})))
+    main()
+    first, *lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert first == {"step": "2048 cells a side", "number": 1, "of": 4}
+    assert [line["claim"] for line in lines if "claim" in line] == ["attracts-all", "goal"]
 
 
 def test_a_drawn_rectangle_balances_in_its_middle_whichever_way_it_is_drawn():

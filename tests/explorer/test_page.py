@@ -67,6 +67,57 @@ def test_a_bad_value_is_one_line_and_the_last_good_picture_stays(page, values):
     assert "wrong" not in page._error.object
 
 
+def test_a_slider_moves_the_goal_and_what_is_asked_of_it(page, monkeypatch):
+    """Paper-designed has other sides up to 19.753 in: beyond 19 in its goal fails."""
+    threshold, asked = page._found.threshold, []
+    monkeypatch.setattr(page._proofs, "ask", asked.append)
+    page._wrote = -1.0  # text is written a few times a second
+    page.sliders.put({"goal.x": 19.0})
+    page.beat()
+    assert shown(page.lanes, "goal")["x"] == [19.0, 19.0]
+    assert shown(page.lanes, "goal in words")["words"] == [" goal: side 2 from 19 in on "]
+    assert page._found.threshold == threshold
+    assert f"does not hold; threshold x = {threshold:.4f} in" in page._estimated.object
+    page._ask()
+    assert ls.load(asked[0]["scene"]).goal == type(page.scene.goal)(19.0, 2)
+    assert "goal.x" not in asked[0]["margins"]  # X is no quantity that deviates
+    assert "arm.length" in asked[0]["margins"]
+    assert "goal.x" not in page.atlas._x.options.values()
+
+
+def test_the_arm_is_as_wide_as_the_lanes_also_where_its_length_moves(page):
+    for length in (28.0, 33.0):
+        page.sliders.put({"arm.length": length})
+        page.beat()
+        lanes, arm = page.lanes.canvas.view, page.arm.canvas.view
+        assert arm["x"] == lanes["x"]
+        assert arm["margins"][:2] == lanes["margins"][:2]
+        end = max(shown(page.arm, "arm")["x"])
+        assert end == pytest.approx(length, abs=0.01)
+        page.throw(length - 1e-6, 0)
+        page.arm.rest(page.scene, length - 1e-6, 0, lanes["x"])
+        assert max(shown(page.arm, "part")["x"]) < lanes["x"][1]  # a part at the end of the arm is in sight
+        low, high = arm["y"]
+        assert arm["tall"] == pytest.approx(
+            (high - low) / (lanes["x"][1] - lanes["x"][0])
+        )  # one scale on both axes
+
+
+def test_the_progress_of_a_proof_stands_until_the_next_answer(page):
+    step = {"step": "margin of throw.speed, 40 %", "number": 2, "of": 6}
+    page._tell([{"claim": "goal", "verdict": "proved", "reason": "", "starts": "every", "share": 1.0}, step])
+    said = page._proved.object
+    assert '<progress value="1" max="6"></progress> margin of speed, 40 % (2 of 6)' in said
+    page._tell([step | {"step": "margin of throw.speed, 50 %"}])
+    assert page._proved.object.count("<progress") == 1
+    page._tell([step, {"margin": "throw.speed", "proved": "0.7 %", "refuted": None}])
+    assert "<progress" not in page._proved.object
+    page._tell([step, {"done": True}])
+    assert "<progress" not in page._proved.object
+    assert "also compiles" not in page._proved.object
+    assert page._proved.object.count("proved</b>, for every start") == 1
+
+
 def test_what_is_typed_moves_the_slider(page):
     page.sliders._fields["throw.speed"].value = "2.7 rad/s"
     page.beat()

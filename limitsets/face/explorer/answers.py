@@ -23,7 +23,7 @@ from limitsets.systems.maps import codes
 
 KEY = (
     '<p class="how">Bars: limit sets. Strips: where starts lead, hatched unless to limit set 0. Strokes r: critical '
-    "points. Dotted: the goal. Triangle: the part; click a lane to throw from there.</p>"
+    "points. Dotted: the goal. Triangle: the part; click to throw it.</p>"
 )
 
 LISTED = 12
@@ -117,7 +117,7 @@ def _goal_words(estimate: Estimate, goal: Goal, unit: str) -> str:
 
 
 def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state: str, of: str = "") -> str:
-    """Put the proofs into words; `of` names their model."""
+    """Put the proofs into words, and how far the next one is; `of` names their model."""
     names = {knob.name: knob.words for knob in knobs}
     rows = []
     for line in lines:
@@ -139,7 +139,24 @@ def proof_words(lines: Sequence[Mapping[str, Any]], knobs: Sequence[Knob], state
             )
         elif "error" in line and "margin" not in line:
             rows.append(("no answer", escape(str(line["error"]))))
+        elif "step" in line:
+            rows.append(progress_row(line, names))
     return _table("Proved (once the sliders rest)", rows, "; ".join(filter(None, (state, of))))
+
+
+def progress_row(line: Mapping[str, Any], names: Mapping[str, str]) -> tuple[str, str]:
+    """Say what the background is computing, and how far it is; names of quantities become words.
+
+    Examples
+    --------
+    >>> progress_row({"step": "margin of throw.speed, 40 %", "number": 2, "of": 6}, {"throw.speed": "speed"})[1]
+    '<progress value="1" max="6"></progress> margin of speed, 40 % (2 of 6)'
+    """
+    step, number, of = escape(str(line["step"])), line["number"], line["of"]
+    for name, words in names.items():
+        step = step.replace(f" {name},", f" {words},")
+    bar = f'<progress value="{number - 1}" max="{of}"></progress>'
+    return "being computed", f"{bar} {step} ({number} of {of})"
 
 
 def _table(title: str, rows: Sequence[tuple[str, str]], foot: str) -> str:
@@ -178,7 +195,7 @@ class Opening:
     ) -> None:
         self._opened, self._drawn, self._say = opened, drawn, say
         self._scene: Scene | None = None
-        look: dict[str, Any] = {"stylesheets": [SLIDER]}
+        look: dict[str, Any] = {"stylesheets": [SLIDER], "margin": (4, 0)}
         self._draw = pn.widgets.Toggle(label="Draw a part", sizing_mode="stretch_width", **look)
         self._corners = pn.widgets.TextInput(
             label="corners x,y, clicked or typed",

@@ -1,7 +1,7 @@
 // Draws what a `Canvas` of canvas.py lists, layer upon layer, once a frame of the screen at most.  Scripts of a reader, and
 // tests, find on the canvas itself what it shows (`shown`) and where (`frame`, and the `boxes` of words).
 const FACE = 'system-ui, -apple-system, "Segoe UI", "DejaVu Sans", sans-serif'
-const INK = "#222222", TILE = 8, NEAR = 24, MOVED = 4, NARROW = 480
+const INK = "#222222", TILE = 8, NEAR = 24, MOVED = 4, NARROW = 480, LOW = 120, HIGH = 420
 
 export function render({ model, el }) {
   const canvas = document.createElement("canvas"), pen = canvas.getContext("2d"), tiles = new Map()
@@ -166,6 +166,11 @@ export function render({ model, el }) {
   // ---------------------------------------------------------------- painting
   const paint = () => {
     due = false
+    if (canvas.shown?.view.tall) {
+      const { margins: [left, right, top, bottom], tall } = canvas.shown.view
+      const fits = Math.ceil((canvas.clientWidth - left - right) * tall) + top + bottom
+      canvas.style.height = `${Math.min(Math.max(fits, LOW), HIGH)}px`
+    }
     const ratio = window.devicePixelRatio || 1, wide = canvas.clientWidth, high = canvas.clientHeight
     if (!wide || !high || !canvas.shown) return
     if (canvas.width !== Math.round(wide * ratio) || canvas.height !== Math.round(high * ratio)) {
@@ -179,7 +184,7 @@ export function render({ model, el }) {
     boxes = []
     if (view.across) axes(view)
     Object.assign(pen, { fillStyle: INK, font: `600 13px ${FACE}`, textAlign: "left", textBaseline: "middle" })
-    const begins = Math.min(view.across ? view.margins[0] : 4, wide - pen.measureText(heading).width - 4)
+    const begins = Math.min(view.margins[0], wide - pen.measureText(heading).width - 4)
     pen.fillText(heading, Math.max(begins, 4), 9, wide - 8)
     for (const layer of layers) kinds[layer.kind](layer)
     canvas.boxes = boxes

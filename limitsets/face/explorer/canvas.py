@@ -77,14 +77,14 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
         What scripts of a reader, and tests, find it by.
     layers : sequence of Layer
         From below to above.
-    height : int
-        Height on the page [pixel].
+    height : int or None
+        Height on the page [pixel]; None where `tall` gives it.
     touched : callable, optional
         Called with each `Hand`.
     **view
         How it is laid out: `margins` [pixel] to the left, right, top and bottom; `equal` for one scale on both axes;
         `across` and `up`, names of the axes where they are drawn; `lanes`, words instead of numbers on the other axis;
-        `keys` if arrow keys and Enter are reported.
+        `keys` if arrow keys and Enter are reported; `tall`, the frame's height as a share of its width.
     """
 
     called = param.String()
@@ -95,7 +95,7 @@ class Canvas(JSComponent):  # type: ignore[misc]  # panel is not followed
         self,
         called: str,
         layers: list[Layer],
-        height: int,
+        height: int | None,
         touched: Callable[[Hand], None] | None = None,
         *,
         stylesheets: Sequence[str] = (),
@@ -175,12 +175,12 @@ class Words(JSComponent):  # type: ignore[misc]  # panel is not followed
     }
     """
 
-    def __init__(self, html: str = "") -> None:
-        super().__init__(object=html, sizing_mode="stretch_width", stylesheets=[SAID])
+    def __init__(self, html: str = "", **look: Any) -> None:
+        super().__init__(object=html, sizing_mode="stretch_width", stylesheets=[SAID], **look)
 
 
 # ----------------------------------------------------------------
-# The look of the page: one column on a phone, two on a wide screen; the keyboard's focus is visible.
+# The look of the page: one column on a phone, three on a wide screen; the keyboard's focus is visible.
 
 
 # Panel's own page (`base`), with the line that makes phones use their own width.
@@ -188,6 +188,23 @@ PAGE = """{% extends base %}{% block preamble %}
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>body { padding: 0 10px 10px !important; box-sizing: border-box; color: #222; }</style>
 {% endblock %}"""
+
+
+GRID = """
+:host { display: grid !important; grid-template-columns: minmax(0, 1fr); gap: 8px 24px; align-items: start; }
+.error { height: 3.4rem; overflow: auto; }
+@media (min-width: 1000px) {
+  :host { grid-template-columns: repeat(3, minmax(0, 1fr)); grid-template-rows: auto auto 1fr; max-width: 1480px; }
+  .title, .sliders, .proved { grid-column: 1; }
+  .error, .pictures { grid-column: 2 / 4; }
+  .pictures { grid-row: 2 / 4; }
+  .proved { grid-row: 3 / 5; }
+  .estimated { grid-area: 4 / 2; }
+  .part { grid-area: 4 / 3; }
+  .atlas { grid-column: 1 / 4; }
+}
+"""
+"""Cells of the page by their classes.  The room of an error is there without one: what is below does not move."""
 
 
 def swatch(face: str, hatch: str = " ") -> str:
@@ -221,8 +238,9 @@ p { margin: 0.2rem 0; font-size: 0.9rem; line-height: 1.35; }
 .wrong { overflow-wrap: anywhere; }
 .how { color: #555; font-size: 0.8rem; }
 .said { border-collapse: collapse; font-size: 0.85rem; width: 100%; }
-.said th { text-align: left; font-weight: 600; vertical-align: top; padding: 0.2rem 0.6rem 0.2rem 0; width: 30%; }
+.said th { text-align: left; font-weight: 600; vertical-align: top; padding: 0.2rem 0.6rem 0.2rem 0; width: 38%; }
 .said td { vertical-align: top; padding: 0.2rem 0; overflow-wrap: anywhere; }
+progress { width: 5rem; accent-color: #0072B2; }
 .swatch { display: inline-block; width: 1.1em; height: 0.8em; border: 1px solid #444; margin-right: 0.3em; }
 """
 
@@ -282,7 +300,7 @@ class Sliders:
             )  # fmt: skip
             field = pn.widgets.TextInput(
                 label=f"{knob.words}, typed", value=_text(knob, knob.value),
-                width=128, stylesheets=[SLIDER, HIDDEN_LABEL],
+                width=128, margin=(5, 0, 5, 10), stylesheets=[SLIDER, HIDDEN_LABEL],
             )  # fmt: skip
             bar.param.watch(lambda event, name=knob.name: self._slid(name, event.new), "value")
             field.param.watch(lambda event, knob=knob: self._typed(knob, event.new), "value")

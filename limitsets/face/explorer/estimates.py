@@ -19,9 +19,11 @@ from limitsets.base.arrays import Array
 from limitsets.face.plot.basin import strips_of
 from limitsets.feeder.geometry import side_ends
 from limitsets.feeder.geometry.polygon import above_side
+from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scene import Scene
-from limitsets.feeder.scene.quantities import STANDARD_GRAVITY, find, text_at, unit_read
-from limitsets.feeder.scene.units import convert, parse, written
+from limitsets.feeder.scene.quantities import STANDARD_GRAVITY, replaced, text_at
+from limitsets.feeder.scene.scene import in_unit_of, unit_of
+from limitsets.feeder.scene.units import UNITS, convert, exact_factor, parse, written
 from limitsets.systems.cells import Domain, grid
 from limitsets.systems.graph import transitions
 from limitsets.systems.maps import Orbit, critical_points, has_slope, kind_of, orbit
@@ -39,6 +41,10 @@ MOST_POINTS = 3
 STEPS = 400
 # Ends of the slider of a point mass, as factors: a mass cannot be 0.
 LIGHTEST, HEAVIEST = 0.1, 3.0
+# Digits of the ends of sliders: what a conversion of units adds behind them is no end that people read.
+DIGITS = 12
+GOAL_X = "goal.x"
+"""The knob of a goal's x, which is no quantity: it has no margin, and no axis of an atlas."""
 
 
 class Knob(NamedTuple):
@@ -47,7 +53,7 @@ class Knob(NamedTuple):
     Attributes
     ----------
     name : str
-        The quantity of the scene, or the field of the map's parameters.
+        The quantity of the scene, `GOAL_X`, or the field of the map's parameters.
     words : str
         The name on the page.
     unit : str
@@ -89,7 +95,8 @@ class Knob(NamedTuple):
         except ValueError:
             if not self.unit:
                 raise LimitsetsError(self.words, shown(words), "a number", "correct it") from None
-            value = convert(parse(words, find(self.name).dimension, key=self.name), self.unit)
+            dimension = next(each for each, units in UNITS.items() if self.unit in units)
+            value = convert(parse(words, dimension, key=self.name), self.unit)
         if not math.isfinite(value):
             raise LimitsetsError(self.words, shown(words), "a finite number", "correct it")
         return value
@@ -101,28 +108,46 @@ class Knob(NamedTuple):
 
 
 def knobs_of(scene: Scene) -> tuple[Knob, ...]:
-    """List the knobs of a scene: centre of mass or point masses, speed, height, tilt.
+    """List the knobs of a scene, each in the unit in which the scene writes its number.
 
     Examples
     --------
     >>> import limitsets as ls
-    >>> [knob.words for knob in knobs_of(ls.load("paper-designed"))]
-    ['centre of mass, along', 'centre of mass, above', 'speed', 'height of the surface', 'tilt']
+    >>> [knob.words for knob in knobs_of(ls.load("paper-designed"))][2:]
+    ['speed', 'height of the surface', 'tilt', 'length of the arm', 'X of the goal']
     """
     if scene.gravity is None:
-        kappa = scene.kappa
-        throw = Knob("throw.kappa", "kappa", scene.unit, kappa, 0.5 * kappa, 1.5 * kappa)
+        throw = _knob(scene, "throw.kappa", "kappa", scene.kappa, (0.5 * scene.kappa, 1.5 * scene.kappa))
     else:
-        speed = math.degrees(scene.value("throw.speed"))
-        throw = Knob("throw.speed", "speed", "deg/s", speed, 0.7 * speed, 1.3 * speed)
-    height, reach = scene.surface_height, 0.05 * scene.arm_length
-    ends = min(-reach, 1.5 * height), max(reach, 1.5 * height)
-    surface = Knob("arm.surface_height", "height of the surface", scene.unit, height, *ends)
-    return (*_of_mass(scene), throw, surface, *_of_gravity(scene))
+        speed = scene.value("throw.speed")
+        throw = _knob(scene, "throw.speed", "speed", speed, (0.7 * speed, 1.3 * speed))
+    height, end = scene.surface_height, scene.arm_length
+    heights = min(-0.05 * end, 1.5 * height), max(0.05 * end, 1.5 * height)
+    arm = (
+        _knob(scene, "arm.surface_height", "height of the surface", height, heights),
+        *_of_gravity(scene),
+        _knob(scene, "arm.length", "length of the arm", end, (0.7 * end, 1.3 * end)),
+    )
+    return (*_of_mass(scene), throw, *arm, *_of_goal(scene))
+
+
+def _knob(scene: Scene, name: str, words: str, value: float, ends: tuple[float, float]) -> Knob:
+    """Give the knob of a quantity whose value and ends are in the scene's units (`Scene.value`)."""
+    numbers = (float(f"{in_unit_of(scene, name, each):.{DIGITS}g}") for each in (value, *ends))
+    return Knob(name, words, unit_of(scene, name), *numbers)
+
+
+def _of_goal(scene: Scene) -> list[Knob]:
+    """Give X of a goal that has one; parts rest below the arm's length."""
+    if not isinstance(scene.goal, OrientedBeyond | Reaches):
+        return []
+    given = parse(scene.text["goal"][scene.goal.kind]["x"], "length")
+    end = 0.99 * scene.arm_length * float(exact_factor(scene.unit, given.unit))
+    return [Knob(GOAL_X, "X of the goal", given.unit, float(given.number), 0.0, float(f"{end:.{DIGITS}g}"))]
 
 
 def _of_mass(scene: Scene) -> list[Knob]:
-    unit, tree = scene.unit, scene.text
+    tree = scene.text
     if text_at(tree, "part.mass.center.along") is not None:
         along, above = (scene.value(f"part.mass.center.{word}") for word in ("along", "above"))
         side = tree["part"]["mass"]["center"]["side"]
@@ -130,17 +155,11 @@ def _of_mass(scene: Scene) -> list[Knob]:
         measured = [
             above_side(scene.vertices[left], scene.vertices[right], corner) for corner in scene.vertices
         ]
-        reach = [float(each[0]) for each in measured]
+        reach, heights = ([float(each[axis]) for each in measured] for axis in (0, 1))
+        ends = min(reach), max(reach)
         return [
-            Knob("part.mass.center.along", "centre of mass, along", unit, along, min(reach), max(reach)),
-            Knob(
-                "part.mass.center.above",
-                "centre of mass, above",
-                unit,
-                above,
-                0.0,
-                float(max(m[1] for m in measured)),
-            ),
+            _knob(scene, "part.mass.center.along", "centre of mass, along", along, ends),
+            _knob(scene, "part.mass.center.above", "centre of mass, above", above, (0.0, max(heights))),
         ]
     knobs = []
     lo, hi = scene.vertices.min(axis=0), scene.vertices.max(axis=0)
@@ -148,11 +167,10 @@ def _of_mass(scene: Scene) -> list[Knob]:
         for axis, word in enumerate("xy"):
             name = f"part.mass.points[{k}].{word}"
             ends = float(lo[axis]), float(hi[axis])
-            knobs.append(Knob(name, f"point mass {k}, {word}", unit, scene.value(name), *ends))
+            knobs.append(_knob(scene, name, f"point mass {k}, {word}", scene.value(name), ends))
         name = f"part.mass.points[{k}].mass"
-        text, own = text_at(tree, name), unit_read(tree, unit, name)
-        mass = convert(parse(text, "mass"), own)
-        knobs.append(Knob(name, f"point mass {k}, mass", own, mass, LIGHTEST * mass, HEAVIEST * mass))
+        mass = scene.value(name)
+        knobs.append(_knob(scene, name, f"point mass {k}, mass", mass, (LIGHTEST * mass, HEAVIEST * mass)))
     return knobs
 
 
@@ -163,7 +181,8 @@ def _of_gravity(scene: Scene) -> list[Knob]:
     sine = scene.gravity / convert(parse(STANDARD_GRAVITY, "acceleration"), f"{scene.unit}/s^2")
     if sine > 1.0 + 1e-9:
         return []
-    return [Knob("gravity.tilt", "tilt", "deg", math.degrees(math.asin(min(sine, 1.0))), 5.0, 90.0)]
+    ends = math.radians(5.0), math.radians(90.0)
+    return [_knob(scene, "gravity.tilt", "tilt", math.asin(min(sine, 1.0)), ends)]
 
 
 def scene_with(scene: Scene, knobs: tuple[Knob, ...], values: Mapping[str, float]) -> Scene:
@@ -186,13 +205,21 @@ def scene_with(scene: Scene, knobs: tuple[Knob, ...], values: Mapping[str, float
     moved = [knob for knob in knobs if values.get(knob.name, knob.value) != knob.value]
     texts = {knob.name: written(values[knob.name], knob.unit) for knob in moved}
     if "gravity.tilt" in texts and "throw.speed" not in texts:
-        speed = next(knob.value for knob in knobs if knob.name == "throw.speed")
-        texts["throw.speed"] = written(speed, "deg/s")
-    return scene.with_values(texts) if texts else scene
+        speed = next(knob for knob in knobs if knob.name == "throw.speed")
+        texts["throw.speed"] = written(speed.value, speed.unit)
+    if not texts:
+        return scene
+    x = texts.pop(GOAL_X, None)
+    tree = replaced(scene.text, scene.unit, scene.file, texts)
+    if x is not None and scene.goal is not None:
+        tree["goal"][scene.goal.kind]["x"] = x
+    return Scene.of(tree, scene.file)  # of all numbers at once: an arm and an X may be possible only together
 
 
 def centre_at(scene: Scene, x: float, y: float) -> dict[str, float]:
     """Say where a point of the part's frame is along and above the side from which the scene gives its centre of mass.
+
+    The values are in the units of the knobs.
 
     Examples
     --------
@@ -203,7 +230,8 @@ def centre_at(scene: Scene, x: float, y: float) -> dict[str, float]:
     """
     left, right = side_ends(len(scene.vertices), scene.text["part"]["mass"]["center"]["side"])
     along, above, _ = above_side(scene.vertices[left], scene.vertices[right], (x, y))
-    return {"part.mass.center.along": float(along), "part.mass.center.above": float(above)}
+    places = {"part.mass.center.along": float(along), "part.mass.center.above": float(above)}
+    return {name: in_unit_of(scene, name, value) for name, value in places.items()}
 
 
 def knobs_of_map(params: Any) -> tuple[Knob, ...]:

@@ -10,6 +10,7 @@ import io
 import time
 from typing import Any
 
+import numpy as np
 import panel as pn
 
 from limitsets.base import LimitsetsError
@@ -26,8 +27,9 @@ from limitsets.face.explorer.answers import (
     proof_words,
 )
 from limitsets.face.explorer.atlas_page import AtlasPage, Background
-from limitsets.face.explorer.canvas import SLIDER, Hand, Sliders, Words, said
+from limitsets.face.explorer.canvas import GRID, SLIDER, Hand, Sliders, Words, said
 from limitsets.face.explorer.estimates import (
+    GOAL_X,
     centre_at,
     estimate,
     estimate_of_map,
@@ -52,7 +54,7 @@ class Page:
     """What the pages of one visitor have in common: sliders, a line for errors, and texts that change now and then."""
 
     def __init__(self) -> None:
-        self._error = Words(error_line(""))
+        self._error = Words(error_line(""), css_classes=["error"])
         self.sliders = Sliders(self._moved, self.say)
         self._dirty = self._refit = self._told = True
         self._wrote = -1.0
@@ -74,9 +76,9 @@ class Page:
         return due
 
 
-def _part(room: str, *shown: Any) -> pn.Column:
-    """Put things into a column that takes so much room (flex of CSS)."""
-    return pn.Column(*shown, styles={"flex": room, "min-width": "0"}, **WIDE)
+def _cell(called: str, *shown: Any) -> pn.Column:
+    """Put things into a cell of the page, whose place is in `GRID`."""
+    return pn.Column(*shown, css_classes=[called], **WIDE)
 
 
 # ----------------------------------------------------------------
@@ -104,9 +106,9 @@ class MapPage(Page):
         assert shown is not None  # it is one of the two
         self._canvas = shown.canvas
         self.beat()
-        title = Words(f"<h1>limitsets: {type(params).__name__}</h1>")
-        columns = _part("1 1 300px", self.sliders.column), _part("3 1 330px", self._canvas, self._said)
-        self.layout = pn.Column(title, self._error, pn.FlexBox(*columns, **WIDE), **WIDE)
+        title = Words(f"<h1>limitsets: {type(params).__name__}</h1>", css_classes=["title"])
+        cells = _cell("sliders", self.sliders.column), _cell("pictures", self._canvas, self._said)
+        self.layout = pn.Column(title, self._error, *cells, stylesheets=[GRID], **WIDE)
 
     def beat(self) -> None:
         """Draw the changes."""
@@ -146,9 +148,9 @@ RESTS = 0.6
 
 
 THROWS, FPS, SLOW = 6, 20.0, 2.0
-BEING = "being computed; the first proof on a machine also compiles, for a minute or more"
-MARGINS = "margins are being computed"
-SAVE: dict[str, Any] = {"stylesheets": [SLIDER], **WIDE}
+COMPILING = "the first proof on a machine also compiles, for a minute or more"
+BEING = f"being computed; {COMPILING}"
+BUTTON: dict[str, Any] = {"stylesheets": [SLIDER], "margin": (4, 0), **WIDE}
 
 
 class ScenePage(Page):
@@ -173,14 +175,17 @@ class ScenePage(Page):
         self.lanes = LanesPicture(self._on_lanes)
         self.opening = Opening(self.open, self._draw, self.say)
         self.atlas = AtlasPage(self._at_point, self.say, atlas)
-        self._title, self._careful, self._estimated, self._proved = (Words() for _ in range(4))
-        self._x = pn.widgets.FloatInput(label="start x", value=0.0, width=110, stylesheets=[SLIDER])
-        self._side = pn.widgets.Select(label="side", options=[0], width=80, stylesheets=[SLIDER])
+        self._title = Words(css_classes=["title"])
+        self._careful, self._estimated, self._proved = (Words() for _ in range(3))
+        beside: dict[str, Any] = {"margin": (4, 10, 4, 0), "stylesheets": [SLIDER]}
+        self._x = pn.widgets.FloatInput(label="start x", value=0.0, width=110, **beside)
+        self._side = pn.widgets.Select(label="side", options=[0], width=80, **beside)
+        self._throw = pn.widgets.Button(label="Throw", color="primary", width=80, align="end", **beside)
         self._toml = pn.widgets.FileDownload(
             callback=lambda: io.StringIO(dump(self.scene)),
             filename="scene.toml",
             label="Save the scene (TOML)",
-            **SAVE,
+            **BUTTON,
         )
         self.open(scene)
         self.beat()
@@ -189,31 +194,21 @@ class ScenePage(Page):
     # ------------------------------------------------------------ what is shown
 
     def _laid_out(self) -> pn.viewable.Viewable:
-        throw = pn.widgets.Button(label="Throw", color="primary", width=80, align="end", stylesheets=[SLIDER])
-        throw.on_click(lambda _: self.throw(self._x.value, self._side.value))
-        reset = pn.widgets.Button(label="Back to the first scene", stylesheets=[SLIDER])
+        self._throw.on_click(lambda _: self.throw(self._x.value, self._side.value))
+        reset = pn.widgets.Button(label="Back to the first scene", **BUTTON)
         reset.on_click(lambda _: self.open(self._first))
         svg = pn.widgets.FileDownload(
-            callback=self._svg, filename="limit-set.svg", label="Save the figure (SVG)", **SAVE
+            callback=self._svg, filename="limit-set.svg", label="Save the figure (SVG)", **BUTTON
         )
-        start = pn.Row(self._x, self._side, throw)
-        rows = (
-            (
-                _part("1 1 300px", self.sliders.column, start),
-                _part("2 1 340px", self.lanes.canvas, Words(KEY)),
-            ),
-            (
-                _part("2 1 330px", self.arm.canvas),
-                _part("1 1 220px", self.part.canvas),
-                _part("1 1 300px", reset, self._toml, svg, self.opening.column),
-            ),
-            (  # a line that appears or disappears does not shift the controls under the visitor's hand
-                _part("1 1 330px", self._careful, self._estimated),
-                _part("1 1 330px", self._proved),
-            ),
+        cells = (  # texts that grow and shrink do not move what a finger drags: they stand below it
+            _cell("sliders", self.sliders.column, pn.Row(self._x, self._side, self._throw)),
+            _cell("pictures", self.lanes.canvas, Words(KEY), self.arm.canvas),
+            _cell("part", self.part.canvas, self.opening.column, reset, self._toml, svg),
+            _cell("proved", self._proved),
+            _cell("estimated", self._careful, self._estimated),
+            _cell("atlas", self.atlas.column),
         )
-        boxes = (pn.FlexBox(*row, gap="0 18px", **WIDE) for row in rows)
-        return pn.Column(self._title, self._error, *boxes, self.atlas.column, **WIDE)
+        return pn.Column(self._title, self._error, *cells, stylesheets=[GRID], **WIDE)
 
     @property
     def _of(self) -> str:
@@ -260,8 +255,10 @@ class ScenePage(Page):
         answer = estimate(scene)
         self.scene = scene
         self.say()
+        # the part as it was opened: the axis follows the arm's length, and stays where the centre of mass moves
+        size = float(np.hypot(*(self.base.vertices - self.base.centre).T).max())
+        self.lanes.frame(answer, scene.unit, size)
         if self._refit:
-            self.lanes.frame(answer, scene.unit)
             # a name of letters, digits, dots and dashes
             self._title.object = f"<h1>limitsets: {scene.name}</h1>"
             self._refit = False
@@ -273,7 +270,7 @@ class ScenePage(Page):
             self._x.value, self._side.value = round(self.start[0], 3), side
         assert self.start is not None  # just chosen
         self.part.show(scene)
-        self.arm.rest(scene, *self.start)
+        self.arm.rest(scene, *self.start, self.lanes.canvas.view["x"])
         self.lanes.mark(*self.start)
         self.lanes.show(answer, scene)
         self._found, self._told = answer, False
@@ -291,16 +288,18 @@ class ScenePage(Page):
         self._asked, self._lines = True, []
         self.opening.show(self.scene)
         self._toml.filename = f"{self.scene.name}.toml"
-        self.atlas.follow(self.scene, knobs_of(self.scene))
+        quantities = tuple(knob for knob in knobs_of(self.scene) if knob.name != GOAL_X)
+        self.atlas.follow(self.scene, quantities)
         self._proved.object = proof_words([], (), BEING, self._of)
-        names = [knob.name for knob in self.sliders.knobs]
+        names = [knob.name for knob in quantities]
         self._proofs.ask({"what": "proof", "scene": dump(self.scene), "margins": names})
 
     def _tell(self, lines: list[dict[str, Any]]) -> None:
         if lines:
-            self._lines += lines
-            claimed = any("claim" in line for line in self._lines)
-            state = "" if "done" in self._lines[-1] else MARGINS if claimed else BEING
+            # a step is over once another line is there
+            kept = [line for line in self._lines if "step" not in line]
+            self._lines = kept + [line for line in lines[:-1] if "step" not in line] + lines[-1:]
+            state = "" if "done" in lines[-1] else COMPILING
             self._proved.object = proof_words(self._lines, self.sliders.knobs, state, self._of)
 
     def throw(self, x: float, side: int) -> None:
@@ -325,7 +324,7 @@ class ScenePage(Page):
             last = film.rests[-1]
             # the part has not left: show the arm close up again
             if film.position[number].tolist() == [last.x, last.side]:
-                self.arm.rest(self.scene, last.x, last.side)
+                self.arm.rest(self.scene, last.x, last.side, self.lanes.canvas.view["x"])
 
     def _on_lanes(self, hand: Hand) -> None:
         if hand.what == "tap":

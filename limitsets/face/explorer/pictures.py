@@ -119,25 +119,36 @@ class ArmPicture:
             Layer("words", "sides", size=12, **NUMBERS),
             Layer("marks", "joint", shape="circle", size=9, **WHITE),
         ]
-        self.canvas = Canvas("the arm", layers, 250, margins=BARE, equal=True)
+        margins = (*MARGINS[:2], *BARE[2:])  # as wide as the lanes
+        self.canvas = Canvas("the arm", layers, None, margins=margins, equal=True)
         self.canvas.put("joint", [(0.0, 0.0)])
 
-    def rest(self, scene: Scene, x: float, side: int) -> None:
-        """Draw the part at rest."""
+    def rest(self, scene: Scene, x: float, side: int, across: Sequence[float]) -> None:
+        """Draw the part at rest, between the ends of the axis of the lanes: a place is below its x there."""
         height, end = scene.surface_height, scene.arm_length
         words = f"the arm, {end:g} {scene.unit}; x = {x:.2f} on side {side}"
         still = rest_leg(scene, x, side, seconds=0.0, caption=words)
         self.frame(cut(scene, [still], Pace(1.0, 1.0), title=scene.name, lanes=None), 0)
-        tall = float(np.ptp(scene.vertices, axis=0).max())
-        _see(self.canvas, np.array([[0.0, height - THICK * end], [end, max(height, 0.0) + 1.2 * tall]]))
+        low = min(height, 0.0) - 2.0 * THICK * end
+        high = max(height, 0.0) + 1.2 * float(np.ptp(scene.vertices, axis=0).max())
+        self.canvas.view |= {
+            "x": list(across),
+            "y": [low, high],
+            "tall": (high - low) / (across[1] - across[0]),
+        }
 
     def begin(self, film: Film) -> None:
         """Choose the view for a whole film."""
         assert film.surface is not None  # of throws on the arm
         places = film.poses[:, 0, :2]
         size = float(np.hypot(*film.outlines[0].T).max())
-        (height, end), low, high = film.surface, places.min(axis=0) - size, places.max(axis=0) + size
-        _see(self.canvas, np.array([low, high, (0.0, height), (end, 0.0)]))
+        low, high = places.min(axis=0) - size, places.max(axis=0) + size
+        first, last = self.canvas.view["x"]
+        ground = min(film.surface[0], 0.0) - 2.0 * THICK * film.surface[1]
+        self.canvas.view |= {
+            "x": [min(first, low[0]), max(last, high[0])],
+            "y": [min(ground, low[1]), high[1]],
+        }
 
     def frame(self, film: Film, number: int) -> None:
         """Draw a frame of a film."""
@@ -191,12 +202,12 @@ class LanesPicture:
         ]
         self.canvas = Canvas("lanes", layers, 285, touched, margins=MARGINS, across="x", up="", lanes=[])
 
-    def frame(self, estimate: Estimate, unit: str) -> None:
-        """Set axes and lanes."""
+    def frame(self, estimate: Estimate, unit: str, beyond: float = 0.0) -> None:
+        """Set axes and lanes; a part is so much `beyond` the farthest place of its centre of mass."""
         count, lo, hi = len(estimate.lo), min(estimate.lo), max(estimate.hi)
         room = 0.01 * (hi - lo)
         self.canvas.view |= {
-            "x": [min(lo, 0.0) - room, hi + room],
+            "x": [min(lo, 0.0) - room, hi + max(room, beyond)],
             "y": [0.1 - count, 0.85],
             "across": f"x [{unit}]" if unit else "x",
             "lanes": [f"side {side}" for side in range(count)],

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from limitsets.base import LimitsetsError, SceneError
+from limitsets.base import LimitsetsError, Progress, SceneError, silent
 from limitsets.feeder.geometry import convex_polygon, plate_with_points
 from limitsets.feeder.geometry.polygon import above_side
 from limitsets.feeder.scene import Scene, load
@@ -119,8 +120,8 @@ def _sides_in(goal: Any) -> list[int]:
 MOST_SHOWN = 48
 
 
-def answers(question: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Answer a question, line by line.
+def answers(question: Mapping[str, Any], tell: Progress = silent) -> Iterator[dict[str, Any]]:
+    """Answer a question, line by line; `tell` is told of the way to the next line.
 
     Examples
     --------
@@ -132,29 +133,33 @@ def answers(question: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     scene = scene_from(question["scene"])
     try:
         if question["what"] == "proof":
-            yield from _proofs(scene, question["margins"])
+            yield from _proofs(scene, question["margins"], tell)
         else:
-            yield _atlas(scene, question["x"], question["y"])
+            yield _atlas(scene, question["x"], question["y"], tell)
     except LimitsetsError as error:
         yield {"error": str(error)}
 
 
-def _proofs(scene: Scene, margins: list[str]) -> Iterator[dict[str, Any]]:
+def _proofs(scene: Scene, margins: list[str], tell: Progress) -> Iterator[dict[str, Any]]:
     """Prove what `certify` proves, then the goal's margin in each quantity."""
     from limitsets.feeder.scene import WITHOUT_SCATTER
     from limitsets.parameters.margins.margin_result import bound
     from limitsets.parameters.margins.single import margin
     from limitsets.proofs.prover.certifying import certify
 
-    proof = certify(scene)
+    proof = certify(scene, progress=tell)
     for claim in proof.claims:
         told = {"starts": claim.starts, "share": claim.shares.get("share"), "note": claim.note}
         yield {"claim": claim.claim, "verdict": claim.verdict, "reason": claim.reason, **told}
     if scene.goal is None or not proof.proved:
         return
-    for name in margins:
+    for number, name in enumerate(margins):
+
+        def among(step: str, _: int, __: int, number: int = number) -> None:
+            tell(step.replace(" fixed,", ","), number, len(margins))  # the only reading that is asked for
+
         try:
-            (bracket,) = margin(scene, name, reading="fixed")
+            (bracket,) = margin(scene, name, reading="fixed", progress=among)
         except LimitsetsError as error:
             yield {"margin": name, "error": str(error)}
             continue
@@ -167,10 +172,10 @@ def _proofs(scene: Scene, margins: list[str]) -> Iterator[dict[str, Any]]:
         }
 
 
-def _atlas(scene: Scene, x: str, y: str) -> dict[str, Any]:
+def _atlas(scene: Scene, x: str, y: str, tell: Progress) -> dict[str, Any]:
     from limitsets.parameters.atlas import atlas
 
-    return table_of(atlas(scene, x, y, variables=["class"]).dataset)
+    return table_of(atlas(scene, x, y, variables=["class"], progress=tell).dataset)
 
 
 def table_of(data: xr.Dataset) -> dict[str, Any]:
@@ -201,9 +206,21 @@ def table_of(data: xr.Dataset) -> dict[str, Any]:
     return {"axes": axes, "numbers": numbers.tolist(), "classes": entries}
 
 
+# Seconds between two lines that tell of progress: people read no faster.
+TOLD = 0.2
+
+
 def main() -> None:
-    """Answer the question on standard input."""
-    for line in answers(json.load(sys.stdin)):
+    """Answer the question on standard input, with lines that tell of progress between the answers."""
+    last = -TOLD
+
+    def tell(step: str, done: int, of: int) -> None:
+        nonlocal last
+        if time.monotonic() - last >= TOLD:
+            last = time.monotonic()
+            print(json.dumps({"step": step, "number": min(done + 1, of), "of": of}), flush=True)
+
+    for line in answers(json.load(sys.stdin), tell):
         print(json.dumps(line), flush=True)
 
 
