@@ -67,7 +67,11 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"effects/landings": True}, "effects.landings", "did you mean 'landing'"),
     ({"arm/length": GONE}, "arm.length", "required key is 'missing'"),
     # tray
-    ({"tray": TRAY | {"rows": 1}}, "tray.rows", "agitation, depression_depth, depression_width, pitch, wash"),
+    (
+        {"tray": TRAY | {"rows": 1}},
+        "tray.rows",
+        "agitation, depression_depth, depression_width, outline, pitch, play",
+    ),
     (
         {"tray": TRAY | {"depression_width": "6.7 in"}},
         "tray.depression_width",
@@ -154,7 +158,11 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"goal": {"flip_order": [0, 3]}}, "goal.flip_order[1]", "0 to 2"),
     ({"goal": {"flip_order": []}}, "goal.flip_order", "at least 1"),
     # cavity
-    ({"cavity": CAVITY | {"size": "1 in"}}, "cavity.size", "angle, depth, position, tips, width"),
+    (
+        {"cavity": CAVITY | {"size": "1 in"}},
+        "cavity.size",
+        "angle, depth, outline, play, position, side, tips, vertices, width",
+    ),
     ({"cavity": CAVITY | {"position": "28.001 in"}}, "cavity.position", "up to the arm's length, 28 in"),
     ({"cavity": CAVITY | {"position": "4.2 in"}}, "cavity.position", "the part resting on side 2 needs"),
     ({"cavity": CAVITY | {"width": "6.7 in"}}, "cavity.width", "at least 6.75 in, the length of side 2"),
