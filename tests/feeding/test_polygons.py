@@ -28,6 +28,8 @@ TRAY = {"pitch": "14.04 in", "agitation": "0.4 in", "wash": "1 in"}
 RECTANGLE = TRAY | {"depression_width": "7.02 in", "depression_depth": "1.53 in"}
 # a bump on the floor, a step in the far wall, the last edge aslant
 BUMPY = ((0.0, 0.0), (4.0, -3.0), (5.0, -6.0), (6.5, -3.5), (8.0, -6.0), (8.5, -6.0), (8.5, -2.0), (9.5, 1.0))
+# a step at the foot of the ramp, over which a part's front may lean
+STEPPED = ((0.0, 0.0), (6.0, -4.5), (6.0, -3.5), (9.5, -3.5), (9.5, 0.0))
 
 
 def texts(corners):
@@ -124,15 +126,16 @@ def test_the_first_contact_is_where_points_of_the_part_come_to_the_ground(side):
 
 
 @pytest.mark.parametrize("side", range(3))
-def test_a_part_slides_until_its_points_come_to_the_ground(side):
-    scene = by_polygon(BUMPY)
+@pytest.mark.parametrize("ground", [BUMPY, STEPPED])
+def test_a_part_slides_until_its_points_come_to_the_ground(side, ground):
+    scene = by_polygon(ground)
     angle = scene.cavity.angle
     down = np.array([math.cos(angle), -math.sin(angle)])
     corners = turned(on_side(scene, side), -angle)
     way = way_down(scene.cavity, corners)
     points = along(corners)
-    assert depth_in(points + (way - 0.02) * down + np.array([0.0, 1e-6]), BUMPY) < 0.0
-    assert depth_in(points + (way + 0.02) * down + np.array([0.0, 1e-6]), BUMPY) > 0.0
+    assert depth_in(points + (way - 0.02) * down + np.array([0.0, 1e-6]), ground) < 0.0
+    assert depth_in(points + (way + 0.02) * down + np.array([0.0, 1e-6]), ground) > 0.0
 
 
 def test_a_ground_is_cut_into_convex_pieces_that_are_all_of_it():
@@ -210,6 +213,15 @@ def test_the_corners_of_a_depression_say_what_its_sizes_say():
     for before, after in zip(one.plate.ground(), two.plate.ground(), strict=True):
         np.testing.assert_array_equal(after, before)
     assert (two.tray.floor, two.to_json()) == (one.tray.floor, one.to_json())
+
+
+@pytest.mark.parametrize("side", range(3))
+def test_a_depression_of_the_parts_outline_has_a_level_floor_for_it(side):
+    """Turned onto a side, both of its ends have the same height, in spite of rounding."""
+    tray = TRAY | {"outline": "part", "play": "0.1 in", "depression_depth": "1.5 in", "side": side}
+    scene = ls.load({**ls.load("paper-designed").as_dict(), "tray": tray, "goal": {"attracts_all": True}})
+    lo, hi = scene.tray.floor
+    assert hi - lo > float(scene.sides.length[side])
 
 
 def test_a_part_stays_in_a_depression_with_slanted_walls():

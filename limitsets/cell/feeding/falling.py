@@ -264,19 +264,16 @@ def _on_side(scene: Scene, side: int) -> list[tuple[float, float]]:
 
 def _first_meeting(cavity: Cavity, corners: Array, a: float) -> float:
     """Give the first e, up to a, at which a part with these corners at e = 0 meets the ground as it turns."""
+    from scipy.optimize import brentq
 
-    def meets(e: float) -> bool:
-        return first_contact(cavity, corners + np.array([e, 0.0])) < cavity.angle * (1.0 - FLUSH)
+    def room(e: float) -> float:
+        return first_contact(cavity, corners + np.array([e, 0.0])) - cavity.angle * (1.0 - FLUSH)
 
     tried = np.linspace(0.0, a, PLACES).tolist()
-    first = next((k for k, e in enumerate(tried) if meets(e)), PLACES)
+    first = next((k for k, e in enumerate(tried) if room(e) < 0.0), PLACES)
     if first in (0, PLACES):
         return a if first else 0.0
-    lo, hi = tried[first - 1], tried[first]
-    for _ in range(40):
-        middle = 0.5 * (lo + hi)
-        lo, hi = (lo, middle) if meets(middle) else (middle, hi)
-    return float(lo)
+    return float(brentq(room, tried[first - 1], tried[first], xtol=1e-13 * a))
 
 
 def first_contact(cavity: Cavity, corners: Array) -> float:

@@ -125,8 +125,7 @@ def way_down(cavity: Cavity, corners: Points, end: tuple[float, float] = (0.0, 0
     over = (line - end) @ (-down[1], down[0])  # over the ramp's line
     ways = [math.inf]
     for (start, stop), most in zip(pairwise(line[1:]), over[2:], strict=True):
-        falls = down[0] * (stop - start)[1] - down[1] * (stop - start)[0]
-        if falls > 0.0 and most > 0.0:  # an edge that faces the part
+        if most > 0.0:  # an edge below that line is not met, nor the back of a bump
             ways += [_ahead(corner, [start, stop], down) for corner in corners]
     ways += [
         _ahead(corner, corners, -down)

@@ -97,13 +97,13 @@ def room_of(
     outward = np.stack([ways[:, 1], -ways[:, 0]], axis=1) / np.hypot(*ways.T)[:, None]
     before = np.roll(outward, 1, axis=0)
     corners = vertices + play * (outward + before) / (1.0 + (outward * before).sum(axis=1))[:, None]
-    along, up = vertices[right] - vertices[left]
-    turn = -angle - math.atan2(up, along)
+    turn = -angle - math.atan2(*(vertices[right] - vertices[left])[::-1])
     cos, sin = math.cos(turn), math.sin(turn)
     corners = np.roll(corners, -right, axis=0) @ np.array([[cos, sin], [-sin, cos]])
     corners -= corners[0]  # its right end, and up from there
     if depth is not None:
         corners[:, 1] -= depth
+        corners[-1, 1] = -depth  # the floor is level, to the last digit
         walls = _upward(corners[::-1] * (-1.0, 1.0)), _upward(corners)
         way = [(-x, y) for x, y in reversed(walls[0])] + walls[1]
         return tuple((x - way[0][0], y) for x, y in way)
