@@ -205,7 +205,7 @@ def read_end(cavity: object, unit: Fraction) -> Fraction | None:
     """Read where the arm ends, in the unit of arm.length; what the cavity is like beyond is not looked at."""
     if cavity is None:
         return None
-    known = table(cavity, "cavity", "position width depth angle", "tips")
+    known = table(cavity, "cavity", "position", "width depth angle vertices outline play side tips")
     end = quantity(known["position"], "length", "cavity.position")
     require(end.lo == end.hi > 0, "cavity.position is not one number above 0")
     return end.lo / unit

@@ -269,7 +269,7 @@ def keys(table, path=""):
 
 
 def test_the_example_loads_and_has_a_margin_of_its_own():
-    text, _ = re.findall(r"```toml\n(.*?)```", PAGE, re.S)
+    text, *_ = re.findall(r"```toml\n(.*?)```", PAGE, re.S)
     scene = ls.load(tomllib.loads(text))
     assert (scene.unit, scene.sides.a.size) == ("mm", 4)
     path = ls.orbit(scene.map, 300.0, 0, 1000)

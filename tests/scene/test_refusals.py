@@ -32,6 +32,8 @@ from tests.scene.test_load import BOTH as BOTH_REMEDIES, chamfered
 GONE = object()
 TRAY = {"depression_width": "7.02 in", "depression_depth": "1.53 in", "pitch": "14.04 in"}
 TRAY |= {"agitation": "0.4 in", "wash": "1 in"}
+LOOSE_TRAY = {key: TRAY[key] for key in ("pitch", "agitation", "wash")}
+DEEP = [["0 in", "0 in"], ["4 in", "-3 in"], ["9 in", "-3 in"], ["9 in", "0 in"]]
 CAVITY = {"position": "20 in", "width": "9.3 in", "depth": "5.8633 in", "angle": "32.23 deg"}
 BOTH = {"sides": ["3 in", "4 in", "5 in"], "vertices": [["0 in", "0 in"], ["1 in", "0 in"], ["0 in", "1 in"]]}
 
@@ -67,13 +69,30 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"effects/landings": True}, "effects.landings", "did you mean 'landing'"),
     ({"arm/length": GONE}, "arm.length", "required key is 'missing'"),
     # tray
-    ({"tray": TRAY | {"rows": 1}}, "tray.rows", "agitation, depression_depth, depression_width, pitch, wash"),
+    (
+        {"tray": TRAY | {"rows": 1}},
+        "tray.rows",
+        "agitation, depression_depth, depression_width, outline, pitch, play",
+    ),
     (
         {"tray": TRAY | {"depression_width": "6.7 in"}},
         "tray.depression_width",
         "at least 6.75 in, the length of",
     ),
     ({"tray": TRAY | {"depression_depth": "3.07 in"}}, "tray.depression_depth", "deeper than the part"),
+    *(
+        ({"tray": LOOSE_TRAY | tray}, f"tray.{key}", words)
+        for tray, key, words in [
+            ({"vertices": [*DEEP[:2], ["9 in", "1 in"]]}, "vertices[2].y", "allowed: 0;"),
+            ({"vertices": [*DEEP[:2], ["9 in", "0 in"]]}, "vertices", "level floor of a depression"),
+            ({"depression_width": "7.02 in"}, "depression_depth", "depression_width needs it"),
+            (
+                {"outline": "part", "play": "1 mm", "depression_depth": "4 in"},
+                "depression_depth",
+                "deeper than",
+            ),
+        ]
+    ),
     ({"tray": TRAY | {"pitch": "7.02 in"}}, "tray.pitch", "above the width of a depression, 7.02 in"),
     ({"tray": TRAY | {"agitation": "0 in"}}, "tray.agitation", "above 0"),
     # feedback
@@ -154,7 +173,34 @@ TABLE: list[tuple[dict[str, Any], str, str]] = [
     ({"goal": {"flip_order": [0, 3]}}, "goal.flip_order[1]", "0 to 2"),
     ({"goal": {"flip_order": []}}, "goal.flip_order", "at least 1"),
     # cavity
-    ({"cavity": CAVITY | {"size": "1 in"}}, "cavity.size", "angle, depth, position, tips, width"),
+    *(
+        ({"cavity": {"position": "20 in"} | cavity}, f"cavity{key}", words)
+        for cavity, key, words in [
+            ({}, "", "neither width nor vertices nor outline"),
+            ({"vertices": DEEP, "width": "9 in"}, "", "width and vertices"),
+            ({"vertices": DEEP, "angle": "30 deg"}, ".angle", "beside vertices"),
+            ({"vertices": DEEP, "side": 1}, ".side", "beside vertices"),
+            ({"width": "9 in", "depth": "2 in"}, ".angle", "width needs it"),
+            ({"outline": "part", "angle": "30 deg"}, ".play", "outline needs it"),
+            ({"outline": "part", "angle": "90 deg", "play": "1 mm"}, ".angle", "below 90 deg"),
+            ({"outline": "part", "angle": "9 deg", "play": "1 mm", "side": 3}, ".side", "0 to 2"),
+            ({"vertices": DEEP[:2]}, ".vertices", "at least 3"),
+            ({"vertices": DEEP[1:]}, ".vertices[0]", "where the ground begins to fall"),
+            ({"vertices": [*DEEP[:2], ["3 in", "-4 in"], *DEEP[3:]]}, ".vertices[2].x", "overhangs"),
+            ({"vertices": [*DEEP, ["9 in", "1 in"]]}, ".vertices[3].y", "below 0"),
+            ({"vertices": DEEP[:3]}, ".vertices[2].y", "0 or above"),
+            (
+                {"vertices": [DEEP[0], ["0 in", "-3 in"], *DEEP[2:]]},
+                ".vertices[1].x",
+                "the first edge is the ramp",
+            ),
+        ]
+    ),
+    (
+        {"cavity": CAVITY | {"size": "1 in"}},
+        "cavity.size",
+        "angle, depth, outline, play, position, side, tips, vertices, width",
+    ),
     ({"cavity": CAVITY | {"position": "28.001 in"}}, "cavity.position", "up to the arm's length, 28 in"),
     ({"cavity": CAVITY | {"position": "4.2 in"}}, "cavity.position", "the part resting on side 2 needs"),
     ({"cavity": CAVITY | {"width": "6.7 in"}}, "cavity.width", "at least 6.75 in, the length of side 2"),

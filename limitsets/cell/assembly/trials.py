@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from limitsets.cell.assembly.pairing import Draws, Pair, Start, are_apart, meet, seats_of, way_of
+from limitsets.cell.feeding.crowd import FRICTION
 from limitsets.cell.feeding.falling import FATES, ArmEnd
 from limitsets.feeder.engine import Crowd, Recording, Rest
 from limitsets.feeder.engine.depression import SEATED, off_seat
@@ -125,8 +126,6 @@ def _thrown(end: ArmEnd, params: Any, start: Start, shift: float) -> tuple[Start
 
 
 MOST_THROWS = 500
-FRICTION = 0.5
-"""On the arm, of scenes that give none: unilateral contact, and parts that are struck where they lie, need one."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ fates, and finds the noise at which success falls to a share.  `crowd` throws ma
 `feeding_run` joins them (`limitsets.feed`).
 """
 
-from limitsets.cell.feeding.falling import FATES, clear_beyond, time_to_tip
+from limitsets.cell.feeding.falling import FATES, clear_beyond, proposed_cavity, time_to_tip
 from limitsets.cell.feeding.feeding_run import Feeding, feed
 
 __all__ = [
@@ -14,5 +14,6 @@ __all__ = [
     "Feeding",
     "clear_beyond",
     "feed",
+    "proposed_cavity",
     "time_to_tip",
 ]

@@ -20,6 +20,7 @@ from limitsets.base.arrays import Array, Ints, Mask
 from limitsets.base.campaign import in_order
 from limitsets.cell.feeding.falling import FATES, ArmEnd
 from limitsets.feeder.engine import Crowd, Rest
+from limitsets.feeder.engine.depression import SEATED, off_seat, seat_of
 from limitsets.feeder.scattering import Gaussian, Law, Scattering, Uniform
 from limitsets.parameters.noise.sampling import binomial_interval
 
@@ -29,6 +30,8 @@ MOST_THROWS = 300
 PATIENCE = 20.0
 # So often a place on the arm is drawn for a part before it is dropped from above.
 DRAWS = 50
+FRICTION = 0.5
+"""On the arm, of scenes that give none: unilateral contact, and parts that are struck where they lie, need one."""
 LAWS = (Gaussian, Uniform, type(None))
 
 
@@ -107,6 +110,40 @@ class CrowdTrials:
             thrown=self.thrown,
             seconds_per_part_and_throw=self.seconds / max(self.thrown, 1),
         )
+
+
+def after_next_throw(end: ArmEnd) -> str | None:
+    """Say where a part that lies in the cavity on the wanted side is after one more throw; sampled in the engine.
+
+    Parameters
+    ----------
+    end : ArmEnd
+        The end of the arm: its cavity is thrown with the arm, which stops at once.
+
+    Returns
+    -------
+    str or None
+        "seated": its corners are in their seat again; "moved": it lies in the cavity otherwise; "left": out of it, or
+        in motion still. None where the part has no seat below the arm's surface, or without pymunk.
+    """
+    scene = end.scene
+    cavity, friction = scene.cavity, scene.world.friction
+    assert cavity is not None  # an ArmEnd has one
+    try:
+        seat = seat_of(scene, end.side)
+        crowd = Crowd([scene], friction=FRICTION if friction is None else friction)
+    except AnswerError:
+        return None
+    member = crowd.members[0]
+    angle = member.flat[end.side] - cavity.angle
+    radius, phase = member.polar[0]
+    x, y = seat[0] - radius * np.array([math.cos(angle + phase), math.sin(angle + phase)])
+    crowd.drop(0, (float(x), float(y), angle))
+    crowd.settle()
+    (rest,) = crowd.throw()
+    if off_seat(member.world(), seat) <= SEATED * cavity.width:
+        return "seated"
+    return "moved" if rest.where == "cavity" else "left"
 
 
 def run_crowd(

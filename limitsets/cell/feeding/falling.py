@@ -225,28 +225,87 @@ FATES = ("right", "wrong", "wall", "edge", "left", "never")
 still tipping at the next throw); it is thrown from so near before the end that the throw acts beyond the end, which is
 not simulated: it is assumed not to be fed; it leaves the arm otherwise; it is still on the arm when throwing ends."""
 
-# Places between which the time to tip is searched for the dwell.
+# Places between which the time to tip is searched for the dwell, and the first contact with a ground by polygon.
 PLACES = 200
+# A side that lies along the ramp to this share of its angle has met nothing before.
+FLUSH = 1e-12
+# Of the ramp of a cavity that is proposed [deg]: a part slides down where friction is below its tangent, 0.58.
+RAMP = 30.0
 
 
 def farthest_clear(scene: Scene, cavity: Cavity, side: int) -> float:
     """Give the largest e at which no vertex meets the far wall or the floor while the part tips [length].
 
     The wall has no upper end here.  A vertex p right of the hinge and q above it is at p cos theta + q sin theta at
-    most hypot(p, q), where it is as high as the hinge; that grows with p, as its depth below the arm does.
+    most hypot(p, q), where it is as high as the hinge; that grows with p, as its depth below the arm does.  Over a
+    ground by polygon it is the first e at which the part meets the ground as it turns.
     """
     cos, sin = math.cos(cavity.angle), math.sin(cavity.angle)
-    corners = [(float(x), float(y)) for x, y in scene.vertices]
-    left, right = side_ends(len(corners), side)
+    places = _on_side(scene, side)
+    if cavity.outline:
+        return _first_meeting(cavity, np.array(places), float(scene.sides.a[side]))
     most = math.inf
-    for corner in corners:
-        along, above, _ = above_side(corners[left], corners[right], corner)
-        q = max(above, 0.0)  # on the side itself, to rounding
+    for p, q in places:
         near = q <= cavity.width * sin
         wall = math.sqrt(cavity.width**2 - q**2) if near else (cavity.width - q * sin) / cos
         floor = (cavity.depth + q * cos) / sin
-        most = min(most, min(wall, floor) - (along - float(scene.sides.a[side])))
+        most = min(most, min(wall, floor) - p)
     return most
+
+
+def _on_side(scene: Scene, side: int) -> list[tuple[float, float]]:
+    """Give the corners of a part on a side, from the foot of its centre of mass."""
+    corners, a = [(float(x), float(y)) for x, y in scene.vertices], float(scene.sides.a[side])
+    left, right = side_ends(len(corners), side)
+    measured = (above_side(corners[left], corners[right], corner) for corner in corners)
+    # on the side itself, to rounding
+    return [(along - a, max(above, 0.0)) for along, above, _ in measured]
+
+
+def _first_meeting(cavity: Cavity, corners: Array, a: float) -> float:
+    """Give the first e, up to a, at which a part with these corners at e = 0 meets the ground as it turns."""
+    from scipy.optimize import brentq
+
+    def room(e: float) -> float:
+        return first_contact(cavity, corners + np.array([e, 0.0])) - cavity.angle * (1.0 - FLUSH)
+
+    tried = np.linspace(0.0, a, PLACES).tolist()
+    first = next((k for k, e in enumerate(tried) if room(e) < 0.0), PLACES)
+    if first in (0, PLACES):
+        return a if first else 0.0
+    return float(brentq(room, tried[first - 1], tried[first], xtol=1e-13 * a))
+
+
+def first_contact(cavity: Cavity, corners: Array) -> float:
+    """Angle by which a part turns about the end of the arm until it meets the ground, at most that of the ramp [rad].
+
+    Parameters
+    ----------
+    cavity : Cavity
+        With an outline.
+    corners : ndarray, shape (n, 2)
+        The part's, counterclockwise, from the end of the arm [length].
+    """
+    far, top = cavity.outline[-1]
+    ground = np.array([*cavity.outline[1:], (far, top + 2.0 * float(np.ptp(corners)))])
+    part = np.concatenate([corners, corners[:1]])
+    up = np.array([1.0, -1.0])  # as the part sees it, the ground turns the other way
+    return min(cavity.angle, _turn_to(part, ground), _turn_to(ground * up, part * up))
+
+
+def _turn_to(points: Array, line: Array) -> float:
+    """Angle by which points turn clockwise about the origin until one of them meets a line; infinite if none does."""
+    start, way = line[:-1], np.diff(line, axis=0)
+    # where on each edge is as far from the origin as each point: |start + s way| = r
+    square, half = (way**2).sum(axis=1), (start * way).sum(axis=1)
+    rest = (start**2).sum(axis=1) - (points**2).sum(axis=1)[:, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        root = np.sqrt(half**2 - square * rest)
+        share = (np.stack([-root, root]) - half) / square
+        met = start + share[..., None] * way
+        turned = np.arctan2(points[:, 1], points[:, 0])[:, None] - np.arctan2(met[..., 1], met[..., 0])
+        turned = np.where((share >= 0.0) & (share <= 1.0), turned % math.tau, np.inf)
+    return float(turned.min())
 
 
 def clear_beyond(scene: Scene, side: int) -> tuple[tuple[float, float], ...]:
@@ -302,15 +361,66 @@ def clear_beyond(scene: Scene, side: int) -> tuple[tuple[float, float], ...]:
     return tuple(zip(ends[::2], ends[1::2], strict=True))
 
 
-def _cavity_of(scene: Scene) -> Cavity:
+def _cavity_of(scene: Scene, side: int | None = None) -> Cavity:
     if scene.cavity is None:
         require_rests(scene)
-        at = f"{getattr(scene.goal, 'x', 0.7 * scene.arm_length):.6g} {scene.unit}"
-        remedy = (
-            f'add [cavity] with position, width, depth and angle: position = "{at}" is where the arm ends'
-        )
+        text = proposed_cavity(scene, side)
+        remedy = "add [cavity] with position, width, depth and angle"
+        if text:
+            rule = f"2 % wider than the least that feeds the side wanted down a ramp of {RAMP:g} deg"
+            remedy += f"; this one is {rule}:\n\n{text}"
         raise AnswerError("the scene", "without [cavity]", "one with a cavity", remedy)
     return scene.cavity
+
+
+def proposed_cavity(scene: Scene, side: int | None = None) -> str:
+    """Propose a cavity that feeds a side, as TOML to add to the scene.
+
+    The ramp falls by 30 degrees to the foot of the far wall.  The width is 2 % above the least for which a part on that
+    side clears the wall wherever it comes to rest with the end of the arm below that side, and has its seat below the
+    arm's surface; rounded up to three digits.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a goal at a place, where the arm will end; without one it ends at 0.7 of its length.
+    side : int, optional
+        The side wanted; default the goal's.
+
+    Returns
+    -------
+    str
+        Empty where no side is wanted, or where a part needs the arm beyond that place.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> print(proposed_cavity(ls.load("paper-designed")))
+    [cavity]
+    position = "20 in"
+    width = "6.89 in"
+    depth = "3.97794 in"
+    angle = "30 deg"
+    <BLANKLINE>
+    """
+    wanted = getattr(scene.goal, "side", None) if side is None else side
+    x = float(getattr(scene.goal, "x", 0.7 * scene.arm_length))
+    if wanted is None or not 0 <= wanted < len(scene.sides) or x <= float(scene.sides.a.max()):
+        return ""
+    tan, a = math.tan(math.radians(RAMP)), float(scene.sides.a[wanted])
+    beyond, places = min(a, scene.arm_length - x), np.array(_on_side(scene, wanted))
+    clear = float(np.hypot(places[:, 0] + beyond, places[:, 1]).max())
+    cos, sin = math.cos(math.radians(RAMP)), math.sin(math.radians(RAMP))
+    foot = places[side_ends(len(places), wanted)[1]]
+    lying = (places - foot) @ np.array([[cos, -sin], [sin, cos]])
+    seated = float(lying[:, 0].max() + max(lying[:, 1].max(), 0.0) / tan)
+    least = 1.02 * max(clear, seated)
+    unit = 10.0 ** (math.floor(math.log10(least)) - 2)
+    width = unit * math.ceil(least / unit)
+    depth = 1e-3 * unit * math.floor(width * tan / (1e-3 * unit))  # no longer than the cavity is wide
+    sizes = {"position": x, "width": width, "depth": depth}
+    lines = [f'{name} = "{size:.9g} {scene.unit}"' for name, size in sizes.items()]
+    return "\n".join(["[cavity]", *lines, f'angle = "{RAMP:g} deg"', ""])
 
 
 @dataclass(frozen=True, eq=False)
@@ -378,7 +488,7 @@ def arm_end_of(scene: Scene, side: int | None = None, laid: LaidLike | None = No
     AnswerError
         For a scene without a cavity or a wanted side, or an arm on which no landing beyond its end is known.
     """
-    x = _cavity_of(scene).position
+    x = _cavity_of(scene, side).position
     if side is None and isinstance(scene.goal, OrientedBeyond | Reaches):
         side = scene.goal.side
     if side is None or not 0 <= side < len(scene.sides):

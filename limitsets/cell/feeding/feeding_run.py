@@ -21,7 +21,7 @@ from limitsets.base import (
     picked,
     shown_in_notebooks,
 )
-from limitsets.cell.feeding.crowd import BATCHES, CrowdTrials, run_crowd
+from limitsets.cell.feeding.crowd import BATCHES, CrowdTrials, after_next_throw, run_crowd
 from limitsets.cell.feeding.drawn import Drawn, drawn_trials
 from limitsets.cell.feeding.falling import ArmEnd, arm_end_of, clear_beyond, tipping_times
 from limitsets.cell.feeding.paths import Fed, Safe, without_scatter
@@ -148,6 +148,11 @@ class Feeding(Saved):
         near = enumerate(0.01 * scene.sides.a)
         return {side: float(tipping_times(scene, side)(np.array([e]))[0]) for side, e in near}
 
+    @cached_property
+    def next_throw(self) -> str | None:
+        """Where a part that is seated rightly is after the next throw: "seated", "moved" or "left"; sampled."""
+        return after_next_throw(self.end)
+
     @property
     def proved(self) -> bool:
         """Whether it is proved that only the wanted side is fed, and that every or almost every start is."""
@@ -221,6 +226,7 @@ class Feeding(Saved):
             throw_rate=rate,
             clear=self.clear,
             tipping=self.tipping,
+            next_throw=self.next_throw,
             vacuous=self.vacuous,
             model=self.model,
             safety=self.safe,

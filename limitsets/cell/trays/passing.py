@@ -84,7 +84,7 @@ class Passes:
         """Give what was drawn, and with which contact."""
         plate = self.plate
         return as_table(
-            **vars(self.tray),
+            **{name: size for name, size in vars(self.tray).items() if name != "outline"},
             friction=plate.friction,
             restitution=plate.restitution,
             contact="unilateral",
@@ -104,7 +104,9 @@ def passes_of(scene: Scene, side: int | None, step: float) -> Passes:
     tray = scene.tray
     if tray is None:
         require_rests(scene)
-        remedy = "add [tray] with depression_width, depression_depth, pitch, agitation and wash"
+        remedy = (
+            "add [tray] with depression_width and depression_depth, or vertices, pitch, agitation and wash"
+        )
         raise refuse("the scene", "without [tray]", "one with a tray", remedy, key="tray")
     if not scene.effects.contact:
         remedy = "a part in a depression touches its walls: write contact = true in [effects]"
@@ -119,7 +121,7 @@ def passes_of(scene: Scene, side: int | None, step: float) -> Passes:
         allowed = f"0 to {len(scene.sides) - 1}"
         remedy = "pass side= (--side), or give the scene a goal with a side"
         raise refuse("the side wanted", wanted, allowed, remedy, key="goal")
-    if tray.depression_width < scene.sides.length[wanted]:
+    if tray.floor[1] - tray.floor[0] < scene.sides.length[wanted]:
         allowed = f"at least {scene.sides.length[wanted]:.6g} {scene.unit}, the length of side {wanted}"
         remedy = "the part cannot lie in it: widen it"
         raise refuse("the width", tray.depression_width, allowed, remedy, key="tray.depression_width")
@@ -131,8 +133,8 @@ def passes_of(scene: Scene, side: int | None, step: float) -> Passes:
     if not 0.0 < step <= 0.02:
         raise AnswerError("the engine's step", step, "above 0 and at most 0.02", "pass step=4e-3")
     friction, restitution = float(facts["friction"] or 0.0), float(facts["restitution"] or 0.0)
-    plate = Plate(scene, tray.depression_width, tray.depression_depth, friction, restitution, step)
-    return Passes(plate, tray, wanted)
+    sizes = scene, tray.depression_width, tray.depression_depth, friction, restitution, step
+    return Passes(Plate(*sizes, outline=tray.outline), tray, wanted)
 
 
 # ----------------------------------------------------------------
@@ -261,7 +263,8 @@ def count(
     for rest in rests:
         poses.setdefault(rest.state, []).append(rest.pose)
     if not poses[passes.right]:
-        poses[passes.right] = [passes.plate.seated(passes.side)]
+        middle = 0.5 * sum(passes.tray.floor) - 0.5 * passes.plate.width
+        poses[passes.right] = [passes.plate.seated(passes.side, middle)]
     waiting = [k for k in sorted(poses) if k > EMPTY]
     while waiting:
         state = waiting.pop(0)

@@ -116,7 +116,7 @@ class _Strewn:
             restitution=plate.restitution,
             step=plate.step,
             patience=plate.patience,
-            depressions=[(left, plate.width, plate.depth) for left in lefts],
+            depressions=[(left, plate.width, plate.outline or plate.depth) for left in lefts],
         )
         self.lies: dict[int, tuple[int, int]] = {}  # by part the depression in which it lies, and how
         self.seen = [self.states()]

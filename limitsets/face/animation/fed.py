@@ -17,7 +17,7 @@ import numpy as np
 
 from limitsets.base import AnswerError
 from limitsets.base.arrays import Array, Ints
-from limitsets.cell.feeding.falling import ArmEnd, rate_about_end
+from limitsets.cell.feeding.falling import ArmEnd, first_contact, rate_about_end
 from limitsets.face.animation.film import Asked, Film, Leg, Mark, Pace, cut, labels_of, require_length
 from limitsets.face.animation.legs import (
     LOWERS,
@@ -43,6 +43,7 @@ from limitsets.face.plot.throwing import (
     throws_of,
     turned,
 )
+from limitsets.feeder.engine.depression import way_down
 from limitsets.feeder.engine.member import Recording, ground_of
 from limitsets.feeder.scene import Cavity, Scene
 from limitsets.feeder.thrower import trace
@@ -187,7 +188,8 @@ def _falls(end: ArmEnd, scene: Scene, throw: Throw, fate: int, pace: Pace) -> li
         f"It tips over the end: {words}",
         begins=True,
     )
-    slide = _slide(cavity, about_end) if most >= cavity.angle else 0.0
+    flush = turned(about_end, -cavity.angle)
+    slide = max(0.0, way_down(cavity, flush)) if most >= cavity.angle else 0.0
     cos, sin = math.cos(cavity.angle), math.sin(cavity.angle)
     slides = leg(
         math.sqrt(2.0 * slide / (gravity * sin)) * pace.unit,
@@ -206,6 +208,9 @@ def _first_contact(cavity: Cavity, about_end: Array) -> float:
     """Angle at which a corner meets the far wall or the floor, or the side the ramp [rad]."""
     from scipy.optimize import brentq
 
+    if cavity.outline:
+        return first_contact(cavity, about_end)
+
     def room(tipped: float) -> float:
         corners = turned(about_end, -tipped)
         return float(min((cavity.width - corners[:, 0]).min(), (corners[:, 1] + cavity.depth).min()))
@@ -215,14 +220,6 @@ def _first_contact(cavity: Cavity, about_end: Array) -> float:
         if room(after) < 0.0:
             return float(brentq(room, before, after)) if room(before) > 0.0 else before
     return cavity.angle
-
-
-def _slide(cavity: Cavity, about_end: Array) -> float:
-    """Distance that the part slides down the ramp until a corner meets the wall or the floor [length]."""
-    corners = turned(about_end, -cavity.angle)
-    wall = (cavity.width - corners[:, 0]) / math.cos(cavity.angle)
-    floor = (cavity.depth + corners[:, 1]) / math.sin(cavity.angle)
-    return max(0.0, float(min(wall.min(), floor.min())))
 
 
 # ----------------------------------------------------------------

@@ -11,6 +11,7 @@ import math
 import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -384,11 +385,16 @@ def cavity_pieces(scene: Scene, wall: float) -> tuple[Array, ...]:
     cavity, top = scene.cavity, scene.surface_height
     if cavity is None:
         return ()
-    end, low, thick = cavity.position, top - cavity.depth, THICK * cavity.position / 28.0
-    foot, far = end + cavity.depth / math.tan(cavity.angle), end + cavity.width
-    corners = [
-        [(end, top - thick), (foot, low - thick), (foot, low), (end, top)],
-        [(foot, low - thick), (far, low - thick), (far, low), (foot, low)],
-        [(far, low - thick), (far + thick, low - thick), (far + thick, top + wall), (far, top + wall)],
-    ]
-    return tuple(np.array(each) for each in corners if each[1][0] - each[0][0] > 1e-6 * cavity.width)
+    thick, end = THICK * cavity.position / 28.0, np.array([cavity.position, top])
+    (before, _), (far, height) = cavity.line[-2:]
+    line = [*cavity.line[: None if before < far else -1], (far, max(height, wall))]
+    corners = []
+    for (x, y), (past, over) in pairwise(line):
+        if past - x > 1e-6 * cavity.width:
+            corners.append([(x, y - thick), (past, over - thick), (past, over), (x, y)])
+        elif (
+            over != y
+        ):  # upright: the ground lies outward of an edge that rises, and inward of one that falls
+            left, low, high = x - thick * (over < y), min(y, over) - thick, max(y, over)
+            corners.append([(left, low), (left + thick, low), (left + thick, high), (left, high)])
+    return tuple(np.array(each) + end for each in corners)

@@ -36,6 +36,13 @@ UNFED = {"left": "leave the arm otherwise", "never": "stay on it"}
 # Reasons why the throws of a part end without it being fed.
 ENDED = {"left": "leaves the arm", "edge": "comes to lie where its throw acts beyond the end"}
 
+# Where a seated part is after one more throw.
+NEXT_THROW = {
+    "seated": "lies there again after the next throw",
+    "moved": "lies otherwise in the cavity after the next throw",
+    "left": "is out of the cavity after the next throw",
+}
+
 # Smaller shares are rounding errors of 0.
 NOTHING = 1e-9
 
@@ -166,6 +173,8 @@ def _words_of_feeding(feeding: Feeding) -> Iterator[str | Table]:
             f"throws until a part {' or '.join(['is fed', *ended])}: "
             f"{mean:.1f} in the mean{in_time(mean, throw_rate)}{until}"
         )
+    if feeding.next_throw is not None:
+        yield f"a part that lies in its seat {NEXT_THROW[feeding.next_throw]} (one throw in the engine, not proved)"
     rate = feeding.shares.per_minute(throw_rate)
     if rate is not None:
         yield f"{rate:.2f} parts per minute are fed on the wanted side, one after the other"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -67,15 +66,7 @@ def _cavity(axes: Axes, answer: Feeding) -> None:
     scene = answer.end.scene
     cavity = scene.cavity
     assert cavity is not None  # `feed` refuses a scene without a cavity
-    ramp = cavity.depth / math.tan(cavity.angle)
-    ground = [
-        (-8.0, 0.0),
-        (0.0, 0.0),
-        (ramp, -cavity.depth),
-        (cavity.width, -cavity.depth),
-        (cavity.width, 0.0),
-    ]
-    axes.plot(*zip(*ground, strict=True), color=style.INK, lw=1.6)
+    axes.plot(*zip((-8.0, 0.0), *cavity.line, strict=True), color=style.INK, lw=1.6)
     a, d = (float(of_sides[answer.end.side]) for of_sides in (scene.sides.a, scene.sides.d))
     about_end = outline(scene, answer.end.side) + np.array([0.25 * a, d])
     for share, alpha in ((0.0, 1.0), (0.5, 0.6), (1.0, 1.0)):

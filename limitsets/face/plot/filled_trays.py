@@ -71,12 +71,10 @@ def _poses(axes: Axes, filling: TrayFill) -> None:
         column, row = number % 2, number // 2
         at = np.array([column * wide, -row * tall])
         half, edge = 0.5 * plate.width, 0.46 * wide
+        square = [(0.0, 0.0), (0.0, -plate.depth), (2 * half, -plate.depth), (2 * half, 0.0)]
         line = [
             (-edge, 0.0),
-            (-half, 0.0),
-            (-half, -plate.depth),
-            (half, -plate.depth),
-            (half, 0.0),
+            *((x - half, y) for x, y in plate.outline or square),
             (edge, 0.0),
         ]
         axes.plot(*(np.array(line) + at).T, color=style.INK, lw=1.4)

@@ -17,6 +17,7 @@ from limitsets.feeder.engine.member import (
     HINGED,
     LOOSE,
     OUT,
+    Depression,
     Film,
     Member,
     Recording,
@@ -285,7 +286,7 @@ class Crowd:
         patience: float = 60.0,
         record: bool = False,
         wall: float | None = None,
-        depressions: Sequence[tuple[float, float, float]] = (),
+        depressions: Sequence[Depression] = (),
     ) -> None:
         scene = scenes[0]
         mu = scene.world.friction if friction is None else friction

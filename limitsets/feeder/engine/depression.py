@@ -21,7 +21,8 @@ from limitsets.feeder.engine.stage import IDLE, LEANING, Stage, nearest, pymunk_
 from limitsets.feeder.geometry import side_ends
 
 if TYPE_CHECKING:
-    from limitsets.feeder.scene import Scene
+    from limitsets.feeder.scene import Cavity, Scene
+    from limitsets.feeder.scene.surroundings import Outline
 
 
 # ----------------------------------------------------------------
@@ -79,8 +80,7 @@ def seat_of(scene: Scene, side: int, below: Sequence[Points] = ()) -> Points:
     down = np.array([math.cos(cavity.angle), -math.sin(cavity.angle)])
     size = 2.0 * float(np.hypot(*np.ptp(scene.vertices, axis=0)))
     corners += np.array([cavity.position, scene.surface_height]) - size * down
-    wall, floor = cavity.position + cavity.width, scene.surface_height - cavity.depth
-    way = [float(((wall - corners[:, 0]) / down[0]).min()), float(((floor - corners[:, 1]) / down[1]).min())]
+    way = [way_down(cavity, corners, (cavity.position, scene.surface_height))]
     for other in below:
         way += [_ahead(corner, other, down) for corner in corners]
         way += [_ahead(corner, corners, -down) for corner in other]
@@ -91,6 +91,48 @@ def seat_of(scene: Scene, side: int, below: Sequence[Points] = ()) -> Points:
         thing = f"the part on side {side} in the cavity"
         raise AnswerError(thing, f"standing out by {out:.4g} {scene.unit}", "a part that fits", remedy)
     return seated
+
+
+def way_down(cavity: Cavity, corners: Points, end: tuple[float, float] = (0.0, 0.0)) -> float:
+    """Say how far a part that lies on the ramp's line can slide down it until it meets the ground.
+
+    Parameters
+    ----------
+    cavity : Cavity
+        Of which the ground is.
+    corners : ndarray, shape (n, 2)
+        Of the part [length].
+    end : (float, float)
+        Where the arm ends [length].
+
+    Examples
+    --------
+    >>> from limitsets.feeder.scene import Cavity
+    >>> corners = np.array([[0.0, 0.0], [1.0, -1.0], [1.0, 0.0]])
+    >>> chain = (0.0, 0.0), (4.0, -4.0), (4.0, 0.0)
+    >>> ways = [way_down(Cavity(9.0, 4.0, 4.0, np.pi / 4, outline=line), corners) for line in ((), chain)]
+    >>> np.round(ways, 12).tolist()
+    [4.242640687119, 4.242640687119]
+    """
+    down = np.array([math.cos(cavity.angle), -math.sin(cavity.angle)])
+    if not cavity.outline:
+        wall, floor = end[0] + cavity.width, end[1] - cavity.depth
+        return min(
+            float(((wall - corners[:, 0]) / down[0]).min()), float(((floor - corners[:, 1]) / down[1]).min())
+        )
+    # the wall goes on upwards, higher than the part can be
+    line = np.array([*cavity.outline, (cavity.outline[-1][0], 1e3 * float(np.ptp(corners)))]) + end
+    over = (line - end) @ (-down[1], down[0])  # over the ramp's line
+    ways = [math.inf]
+    for (start, stop), most in zip(pairwise(line[1:]), over[2:], strict=True):
+        if most > 0.0:  # an edge below that line is not met, nor the back of a bump
+            ways += [_ahead(corner, [start, stop], down) for corner in corners]
+    ways += [
+        _ahead(corner, corners, -down)
+        for corner, high in zip(line, over, strict=True)
+        if high > 1e-9 * over.max()
+    ]
+    return min(ways)
 
 
 @arguments_checked
@@ -118,7 +160,7 @@ def off_seat(corners: Sequence[tuple[float, float]], seat: Points) -> float:
     return float(np.hypot(*(np.asarray(corners) - seat).T).max())
 
 
-def _ahead(point: Points, outline: Points, way: Points) -> float:
+def _ahead(point: Points, outline: Sequence[Points] | Points, way: Points) -> float:
     """How far a point can go this way until it meets an outline."""
     nearest = math.inf
     for one, two in pairwise([*outline, outline[0]]):
@@ -197,6 +239,8 @@ class Plate:
         The part; of its arm and throw nothing is used.
     width, depth : float
         Of the depression [length].
+    outline : tuple of (float, float)
+        Of the depression, from its left edge, where it is a polygon [length].
     friction, restitution : float
         Of the engine's contact: Coulomb's law, and Newton's restitution.
     step, patience : float
@@ -210,6 +254,7 @@ class Plate:
     restitution: float
     step: float = 4e-3
     patience: float = 60.0
+    outline: Outline = ()
 
     @property
     def size(self) -> float:
@@ -220,7 +265,7 @@ class Plate:
         """Give the polygons of the plate: left and right of the depression, and its floor."""
         far = FAR * self.size
         level = replace(self.part, surface_height=0.0, arm_length=2.0 * far, cavity=None)
-        hollow = (far - 0.5 * self.width, self.width, self.depth)
+        hollow = (far - 0.5 * self.width, self.width, self.outline or self.depth)
         return tuple(corners - (far, 0.0) for corners in ground_of(level, depressions=[hollow]).polygons)
 
     def lowered(self, x: float, angle: float, height: float) -> Pose:

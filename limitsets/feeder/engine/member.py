@@ -8,8 +8,10 @@ in the common one would spoil what its solver remembers of the other contacts.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise, repeat
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from limitsets.feeder.geometry import side_ends
 
 if TYPE_CHECKING:
     from limitsets.feeder.scene import Cavity, Scene
+    from limitsets.feeder.scene.surroundings import Outline
 
 
 # ----------------------------------------------------------------
@@ -37,7 +40,8 @@ class Piece:
     Attributes
     ----------
     name : str
-        "arm", "ramp", "floor", "wall", or "depression": the bottom of one.
+        "arm", "ramp", "floor", "wall", or "depression": the bottom of one. Of a cavity by polygon the first edge is the
+        ramp, the last the wall, and all between are floor.
     corners : ndarray, shape (m, 2)
         Counterclockwise [length].
     """
@@ -86,9 +90,16 @@ class Ground:
         return made
 
 
-def ground_of(
-    scene: Scene, *, depressions: Sequence[tuple[float, float, float]] = (), wall: float | None = None
-) -> Ground:
+Depression = tuple[float, float, "float | Outline"]
+"""Where a depression begins, its width, and its depth, with upright walls and a level bottom, or its outline."""
+
+
+def depth_of(hollow: float | Outline) -> float:
+    """Give how deep a depression is, by its depth or its outline."""
+    return hollow if isinstance(hollow, float | int) else -min(y for _, y in hollow)
+
+
+def ground_of(scene: Scene, *, depressions: Sequence[Depression] = (), wall: float | None = None) -> Ground:
     """Lay out the ground of a scene.
 
     Parameters
@@ -96,8 +107,9 @@ def ground_of(
     scene : Scene
         The arm goes up to its cavity, or else to its length; towards the joint it goes on by a part's size, so that
         parts that have come off the working range lie there.
-    depressions : sequence of (float, float, float)
-        Where each begins, its width and its depth, upright walls and a level bottom [length].
+    depressions : sequence of (float, float, float or tuple of (float, float))
+        Where each begins, its width, and its depth, with upright walls and a level bottom, or its outline from where it
+        begins [length].
     wall : float, optional
         How high the cavity's far wall stands over the arm's surface; default as far as the arm reaches, higher than
         parts fly [length].
@@ -122,30 +134,39 @@ def ground_of(
     cavity, height = scene.cavity, scene.surface_height
     thick = 2.0 * float(np.hypot(*np.ptp(scene.vertices, axis=0)))
     end = scene.arm_length if cavity is None else cavity.position
-    deep = max([0.0 if cavity is None else cavity.depth, *(depth for _, _, depth in depressions)])
+    deep = max([0.0 if cavity is None else cavity.depth, *(depth_of(hollow) for _, _, hollow in depressions)])
     low = height - deep - thick
+    # depth and width are rounded where the ramp meets the wall
+    least = 0.0 if cavity is None else 1e-6 * cavity.width
 
     def block(name: str, left: float, right: float, top: float) -> Piece:
         return Piece(name, np.array([[left, low], [right, low], [right, top], [left, top]]))
 
+    def slabs(names: Iterable[str], start: float, outline: Outline) -> Iterator[Piece]:
+        """Cut the ground below an outline between its corners, upright."""
+        for name, ((left, y1), (right, y2)) in zip(names, pairwise(outline), strict=False):
+            if right - left > least:
+                corners = [[left, low], [right, low], [right, height + y2], [left, height + y1]]
+                yield Piece(name, np.array(corners) + np.array([start, 0.0]))
+
     pieces, at = [], -thick
-    for left, width, depth in sorted(depressions):
+    for left, width, hollow in sorted(depressions, key=itemgetter(0)):
+        depth = depth_of(hollow)
         if not (left >= at and width > 0.0 and depth > 0.0 and left + width <= end):
             allowed = f"one after the other, from the joint to the arm's end at {end:g} {scene.unit}"
             raise AnswerError("a depression (from, width, depth)", (left, width, depth), allowed, "move it")
         if left > at:
             pieces.append(block("arm", at, left, height))
-        pieces.append(block("depression", left, left + width, height - depth))
+        outline = ((0.0, -depth), (width, -depth)) if isinstance(hollow, float | int) else hollow
+        pieces += slabs(repeat("depression"), left, outline)
         at = left + width
     if at < end:
         pieces.append(block("arm", at, end, height))
     if cavity is not None:
-        foot, far = end + cavity.depth / math.tan(cavity.angle), end + cavity.width
-        ramp = [[end, low], [foot, low], [foot, height - cavity.depth], [end, height]]
-        pieces.append(Piece("ramp", np.array(ramp)))
-        if far - foot > 1e-6 * cavity.width:  # depth and width are rounded where the ramp meets the wall
-            pieces.append(block("floor", foot, far, height - cavity.depth))
-        pieces.append(block("wall", far, far + thick, height + (end if wall is None else wall)))
+        line, past = cavity.line, end if wall is None else wall
+        pieces += slabs(["ramp", *["floor"] * (len(line) - 3), "wall"], end, line)
+        far, top = end + line[-1][0], height + line[-1][1]
+        pieces.append(block("wall", far, far + thick, top + past))
     return Ground(tuple(pieces), height, end, low)
 
 

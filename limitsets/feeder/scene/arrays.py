@@ -250,10 +250,13 @@ class _Arrays(Unchecked):
         if tray is not None:  # so are depressions that the part does not fit in, or that are deeper than it
             heights = heights_over_sides(self.shape.vertices, np.sqrt, np.maximum)
             highest = functools.reduce(np.maximum, heights) if wanted is None else heights[wanted]
-            self.require((tray.depression_width >= fitted) & (tray.depression_depth < highest))
+            if "outline" not in self.tree["tray"]:  # that grows with the part
+                self.require(tray.floor[1] - tray.floor[0] >= fitted)
+            self.require(tray.depression_depth < highest)
         if cavity is not None:  # so is one that the arm overlaps, or that the part does not fit in
             self.require((cavity.position <= arm_length) & (cavity.position > a.max(axis=-1)))
-            self.require(cavity.width >= fitted)
+            if not cavity.outline:
+                self.require(cavity.width >= fitted)
         by_name = {
             "kappa": kappa,
             "surface_height": self.number("arm.surface_height"),

@@ -148,8 +148,7 @@ def resolved(structure: object, file: str | None) -> dict[str, Any]:
     if "goal" in tree:
         goal = resolve_goal(tree["goal"], body.sides.rests.tolist(), arm_length, resolver)
     if "cavity" in tree:
-        feet, lengths = body.sides.a.tolist(), body.sides.length.tolist()
-        cavity = resolve_cavity(feet, lengths, arm_length, goal, resolver)
+        cavity = resolve_cavity(body.vertices, body.sides, arm_length, goal, resolver)
     if "tray" in tree:
         tray = resolve_tray(body.vertices, body.sides.length, goal, resolver)
     effects = resolve_effects(tree.get("effects", {}), world, model["flight"], resolver)

@@ -46,10 +46,10 @@ class Key(NamedTuple):
 
 
 class Either(NamedTuple):
-    """Two keys of which a table has one: what they are about, the two, and what is allowed."""
+    """Keys of which a table has one: what they are about, the keys, and what is allowed."""
 
     thing: str
-    words: tuple[str, str]
+    words: tuple[str, ...]
     allowed: str
 
 
@@ -308,21 +308,44 @@ CAVITY = Section(
             "20 in",
             needed=True,
         ),
-        "width": Key(LENGTH, "from the end of the arm to the far wall", "8 in", needed=True),
-        "depth": Key(LENGTH, "of the floor below the arm's surface", "2 in", needed=True),
-        "angle": Key(ANGLE, "of the ramp from the end of the arm to the floor", "30 deg", needed=True),
+        "width": Key(LENGTH, "from the end of the arm to the far wall; with depth and angle", "8 in"),
+        "depth": Key(LENGTH, "of the floor below the arm's surface", "2 in"),
+        "angle": Key(ANGLE, "of the ramp from the end of the arm to the floor", "30 deg"),
+        "vertices": Key(
+            Several(Several(LENGTH, 2, 2), 3),
+            "instead of these: [x, y] of each corner of the ground, from the end of the arm outward and upward",
+            [["0 in", "0 in"], ["6 in", "-4 in"], ["9 in", "-4 in"], ["9 in", "0 in"]],
+        ),
+        "outline": Key(
+            word("part"), "instead of width and depth: the part itself, its wanted side on the ramp", "part"
+        ),
+        "play": Key(LENGTH, "with outline: between the part and the ground, all around", "0.5 mm"),
+        "side": Key(SIDE, "with outline: the side on the ramp; default: that of the goal", 2),
         "tips": Key(
             word("moving", "rest"),
             'how a part begins to tip over the end: "moving", as it came down, or "rest"',
             "moving",
         ),
     },
+    Either(
+        "the cavity",
+        ("width", "vertices", "outline"),
+        "width, depth and angle, or vertices, or outline, angle and play",
+    ),
 )
 TRAY = Section(
     "A plate with equal depressions.",
     {
-        "depression_width": Key(LENGTH, "of each depression", "7 in", needed=True),
-        "depression_depth": Key(LENGTH, "of each depression", "1 in", needed=True),
+        "depression_width": Key(LENGTH, "of each depression; with depression_depth", "7 in"),
+        "depression_depth": Key(LENGTH, "of each depression", "1 in"),
+        "vertices": Key(
+            Several(Several(LENGTH, 2, 2), 3),
+            "instead of both: [x, y] of each corner of a depression, from its left edge at 0, 0 to its right one",
+            [["0 in", "0 in"], ["1 in", "-1 in"], ["8 in", "-1 in"], ["8 in", "0 in"]],
+        ),
+        "outline": Key(word("part"), "instead of depression_width: the part itself, lying on a side", "part"),
+        "play": Key(LENGTH, "with outline: between the part and the walls", "0.5 mm"),
+        "side": Key(SIDE, "with outline: the side on the floor; default: that of the goal", 2),
         "pitch": Key(LENGTH, "from one depression to the next", "9 in", needed=True),
         "agitation": Key(
             LENGTH, "how high a kick of one standard deviation throws a part", "0.3 in", needed=True
@@ -331,7 +354,21 @@ TRAY = Section(
             LENGTH, "a fall from this height ends at the largest speed along the plate", "2 in", needed=True
         ),
     },
+    Either(
+        "a depression",
+        ("depression_width", "vertices", "outline"),
+        "depression_width and depression_depth, or vertices, or outline, depression_depth and play",
+    ),
 )
+FORMS: dict[str, dict[str, tuple[str, ...]]] = {
+    "cavity": {"width": ("depth", "angle"), "vertices": (), "outline": ("angle", "play")},
+    "tray": {
+        "depression_width": ("depression_depth",),
+        "vertices": (),
+        "outline": ("depression_depth", "play"),
+    },
+}
+"""By table the ways to give its shape, and the keys that each of them needs; the other keys here it may not have."""
 EFFECTS = Section(
     "What is simulated beyond the minimal model: effects of those declared.",
     {

@@ -164,7 +164,8 @@ def _example(key: Key) -> Any:
         return key.example
     made = {word: _example(each) for word, each in inner.keys.items()}
     if inner.either is not None:
-        made.pop(inner.either.words[1])  # one of two ways to say it
+        for word in inner.either.words[1:]:  # one of several ways to say it
+            made.pop(word)
     return [made] if isinstance(key.of, Several) else made
 
 

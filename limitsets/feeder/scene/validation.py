@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple, TypeAlias
 
 from limitsets.base import SceneError, shown
-from limitsets.feeder.scene.schema import ByName, Section, Several, schema
+from limitsets.feeder.scene.schema import FORMS, ByName, Section, Several, schema
 from limitsets.feeder.scene.units import UNITS
 from limitsets.feeder.world import FACTS
 
@@ -170,7 +170,7 @@ def _wrong_in_table(table: Tree, section: Section, key: str, file: str | None) -
     if section.either is not None:
         thing, words, allowed = section.either
         given = [word for word in words if word in table]
-        said = " and ".join(given) or f"neither {words[0]} nor {words[1]}"
+        said = " and ".join(given) or f"neither {' nor '.join(words)}"
         remedy = "give one of them, not both" if given else "give one of them"
         if len(given) != 1:
             yield Wrong(3, SceneError(thing, said, allowed, remedy, key=key, file=file))
@@ -211,11 +211,33 @@ def _contradictions(tree: Tree, file: str | None) -> Iterator[SceneError]:
         remedy = "a throw given by its speed needs it; add [gravity], or give throw.kappa"
         allowed = "acceleration or tilt in [gravity]"
         yield SceneError("gravity", "missing", allowed, remedy, key="throw.speed", file=file)
+    for name, forms in FORMS.items():
+        if isinstance(tree.get(name), dict):
+            yield from _contradictions_of_form(name, tree[name], forms, file)
     part = tree["part"] if isinstance(tree.get("part"), dict) else {}
     mass, holes = part.get("mass"), part.get("holes")
     if isinstance(mass, dict):
         yield from _contradictions_of_mass(mass, file)
         yield from _contradictions_of_holes(holes if isinstance(holes, list) else [], mass, file)
+
+
+def _contradictions_of_form(
+    name: str, table: Tree, forms: dict[str, tuple[str, ...]], file: str | None
+) -> Iterator[SceneError]:
+    """Refuse the shape of a cavity or a depression that lacks a key, or has one of another way to give it."""
+    given = [form for form in forms if form in table]
+    if len(given) != 1:  # refused already
+        return
+    needed = forms[given[0]]
+    for word in (word for word in needed if word not in table):
+        remedy = f"{given[0]} needs it: add it"
+        yield SceneError(
+            "a required key", "missing", "a value for it", remedy, key=f"{name}.{word}", file=file
+        )
+    known = {"side", *(word for words in forms.values() for word in words)}
+    for word in sorted(known & {*table} - {*needed} - ({"side"} if given == ["outline"] else set())):
+        said, allowed = f"beside {given[0]}", " and ".join([given[0], *needed])
+        yield SceneError("this key", said, allowed, "leave it out", key=f"{name}.{word}", file=file)
 
 
 def _contradictions_of_mass(mass: Tree, file: str | None) -> Iterator[SceneError]:
