@@ -268,7 +268,7 @@ def test_a_level_is_bracketed():
 
 KEYS = {
     "scene", "unit", "position", "side", "starts_from", "laid", "throw_rate", "clear", "tipping", "safety", "vacuous",
-    "model", "next_throw",
+    "model", "next_throw", "machines",
     "progress", "noise", "scatter", "brackets", "crowds",
     "probabilities", "throws", "right_per_minute", "success", "trials",
 }  # fmt: skip
