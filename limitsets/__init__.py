@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from limitsets.parameters.atlas import atlas as atlas
     from limitsets.parameters.continuation import continuation as continuation
     from limitsets.parameters.design import design as design, robust_design as robust_design
+    from limitsets.parameters.discrepancy import discrepancy as discrepancy
     from limitsets.parameters.fitting import fit as fit
     from limitsets.parameters.margins.single import margin as margin
     from limitsets.parameters.noise import noise_statistics as noise_statistics
@@ -81,6 +82,7 @@ _PUBLIC = {
     "critical_points": "systems.maps:critical_points",
     "cycles": "systems.sets:cycles",
     "design": "parameters.design:design",
+    "discrepancy": "parameters.discrepancy:discrepancy",
     "dump": "feeder.scene:dump",
     "explore": "face.explorer:explore",
     "feed": "cell.feeding:feed",

@@ -29,6 +29,7 @@ GIVEN_BY = {
     "Basins": "limitsets.basins(graph, limitsets.attractors(graph))",
     "Continuation": "limitsets.continuation(scene, path)",
     "Design": "limitsets.design(scene, ...)",
+    "Discrepancy": "limitsets.discrepancy(scene)",
     "Domain": "limitsets.grid([(0, 1)]).domain",
     "DiGraph": "limitsets.morse_graph(graph)",
     "Feeding": "limitsets.feed(scene)",

@@ -1,4 +1,4 @@
-"""`limitsets analyse`, `audit` and `fit`: where the throws lead, what the model leaves out, the model from a film."""
+"""`limitsets analyse`, `audit`, `discrepancy`, `fit`: where throws lead, what the model omits, a film fitted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import limitsets as ls
 from limitsets.base import Table
 from limitsets.face import report
 from limitsets.face.cli.arguments import number
-from limitsets.face.cli.commands import Answer, Run, Scene, command, limits
+from limitsets.face.cli.commands import Answer, Run, Scene, Seed, Words, command, limits
 
 if TYPE_CHECKING:
     from limitsets.parameters.analysis import Analysis, Plan
@@ -146,6 +146,47 @@ def audit(run: Run, scene: Scene) -> Answer:
         lambda: [Table(writing.HEADS, writing.lines_of(findings)), *writing.summary(findings)],
         findings.table,
     )
+
+
+# ----------------------------------------------------------------
+# `limitsets discrepancy`: the minimal model against the machine.
+
+
+@command(form=True, html=True)
+def discrepancy(
+    run: Run,
+    scene: Scene,
+    *,
+    effect: Words = None,
+    throws: Annotated[int, limits(min=1)] = 100_000,
+    seed: Seed = 0,
+) -> Answer:
+    """Ask whether the feeder works on the machine: how far friction, rebound, ... move a landing, and what survives.
+
+    Exit 1 where the effects are not covered by what is proved of the minimal model, or the goal does not survive them.
+
+    Parameters
+    ----------
+    effect : EFFECT
+        An effect to compare with, repeatable; by default those that the scene calls for and whose facts it states.
+    throws : N
+        How many throws are simulated in each place.
+    out : DIR
+        Write report.md, discrepancy.json and a figure there.
+    """
+    chosen = run.opened(scene)
+    found = ls.discrepancy(chosen, effect or None, throws=throws, seed=seed, progress=run.tell)
+    if run.out is not None:
+        run.files = report.machine_page.write_machine(found, run.out, run.form, html=run.html)
+    code = 1 if found.effects and not (found.enough or (found.margin is None and found.covered)) else 0
+
+    def words() -> Iterator[str | Table]:
+        yield from found.tables()
+        yield found.sentence
+        yield from found.advice
+        yield from (f"not simulated: {name}: {why}" for name, why in found.left_out.items())
+
+    return Answer(found, words, found.table, code=code)
 
 
 # ----------------------------------------------------------------

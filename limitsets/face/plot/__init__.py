@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from limitsets.face.plot.atlas_surfaces import atlas_surface, bifurcation
     from limitsets.face.plot.basin import basins, morse
     from limitsets.face.plot.designs import design, robust_design
+    from limitsets.face.plot.discrepancies import discrepancy
     from limitsets.face.plot.fed_parts import assembly, feeding
     from limitsets.face.plot.filled_trays import tray
     from limitsets.face.plot.films import film_rests
@@ -33,8 +34,8 @@ if TYPE_CHECKING:
     from limitsets.face.plot.tipping import resting_sides
 
 __all__ = [
-    "assembly", "atlas", "atlas_surface", "audit", "basins", "bifurcation", "counterexample", "design", "feeding",
-    "film_rests", "fit_residuals", "flight", "limit_set", "map", "margin_curve", "morse", "noise_arrivals",
+    "assembly", "atlas", "atlas_surface", "audit", "basins", "bifurcation", "counterexample", "design", "discrepancy",
+    "feeding", "film_rests", "fit_residuals", "flight", "limit_set", "map", "margin_curve", "morse", "noise_arrivals",
     "noise_density", "noise_levels", "part", "policy", "regions", "resting_sides", "robust_design", "tolerance_box",
     "tornado", "tray",
 ]  # fmt: skip
@@ -44,6 +45,7 @@ _FILES = {
     "atlas_surfaces": ("atlas_surface", "bifurcation"),
     "basin": ("basins", "morse"),
     "designs": ("design", "robust_design"),
+    "discrepancies": ("discrepancy",),
     "fed_parts": ("assembly", "feeding"),
     "filled_trays": ("tray",),
     "films": ("film_rests",),

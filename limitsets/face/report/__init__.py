@@ -10,10 +10,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from limitsets.face.report import pages as pages, robust_pages as robust_pages, writing as writing
+    from limitsets.face.report import (
+        machine_page as machine_page,
+        pages as pages,
+        robust_pages as robust_pages,
+        writing as writing,
+    )
 else:
 
     def __getattr__(name: str) -> Any:
-        if name not in ("pages", "robust_pages", "writing"):
+        if name not in ("machine_page", "pages", "robust_pages", "writing"):
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return import_module(f"{__name__}.{name}")

@@ -384,7 +384,7 @@ class EffectChoice:
         )
 
 
-def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
+def hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
     """Why an effect that is called for, or may be, cannot be switched on beside others; empty if it can."""
     from limitsets.feeder.thrower.effects import EFFECTS
 
@@ -406,7 +406,7 @@ def _hindrance(scene: Scene, finding: Finding, others: tuple[str, ...]) -> str:
     return f"called for, but it cannot be simulated together with {' and '.join(barred)}" if barred else ""
 
 
-def _with(scene: Scene, effects: tuple[str, ...]) -> Scene:
+def with_effects(scene: Scene, effects: tuple[str, ...]) -> Scene:
     """Switch effects on, and `auto` off."""
     from limitsets.feeder.thrower.effects import EFFECTS
 
@@ -443,14 +443,14 @@ def choose_effects(scene: Scene) -> EffectChoice:
     if not scene.effects.auto:
         return EffectChoice(scene, (), {})
     chosen: list[str] = []
-    now = _with(scene, ())
+    now = with_effects(scene, ())
     while True:
         wanted: list[str] = []
         left: dict[str, str] = {}
         for finding in audit(now).on("limit-set"):
             if finding.called_for is False or finding.simulated or finding.effect in wanted:
                 continue
-            reason = _hindrance(now, finding, (*now.effects.on(), *wanted))
+            reason = hindrance(now, finding, (*now.effects.on(), *wanted))
             if reason:
                 left[finding.effect] = left.get(finding.effect) or reason
             else:
@@ -458,4 +458,4 @@ def choose_effects(scene: Scene) -> EffectChoice:
         if not wanted:
             return EffectChoice(now, tuple(chosen), left)
         chosen += wanted
-        now = _with(scene, tuple(chosen))
+        now = with_effects(scene, tuple(chosen))
