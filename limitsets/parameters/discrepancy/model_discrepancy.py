@@ -17,7 +17,7 @@ from limitsets.base import (
     arguments_checked,
 )
 from limitsets.feeder.scene import Scene, load
-from limitsets.parameters.discrepancy.discrepancy_result import Discrepancy, best_of
+from limitsets.parameters.discrepancy.discrepancy_result import BY, Discrepancy, best_of
 from limitsets.parameters.discrepancy.measuring import ENCLOSED, Moved, arrivals, enclosed, sampled
 from limitsets.parameters.margins.single import margin
 from limitsets.proofs.auditing import Audit, audit
@@ -163,6 +163,9 @@ def discrepancy(
         raise AnswerError(
             "the part", loaded.name, "one that rests on every side", "the minimal model has no other"
         )
+    for effect in effects or ():
+        if effect not in BY:
+            raise AnswerError("the effect", effect, ", ".join(BY), "name some of these")
     plain = load({**loaded.as_dict(), "effects": {}})
     judged = audit(plain)
     asked = _called_for(plain, judged)
