@@ -194,8 +194,8 @@ def _hidden(words: Mapping[str, str]) -> bool:
     return words.get("display") == "none" or words.get("visibility") in ("hidden", "collapse")
 
 
-def _link(words: Mapping[str, str]) -> str | None:
-    return words.get("href", words.get(_LINK))
+def _link(words: Mapping[str, str]) -> str:
+    return words.get("href", words.get(_LINK, ""))
 
 
 def _round(words: Mapping[str, str], layer: str) -> Iterator[Curve]:
