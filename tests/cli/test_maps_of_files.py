@@ -5,6 +5,7 @@ import re
 import sys
 from functools import partialmethod
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
@@ -180,6 +181,13 @@ def test_other_commands_take_scenes_alone(capfd):
     code, _, err = run(capfd, "analyse mymap.py:henon")
     assert code == 2
     assert "certify, atlas and explore take a map" in err
+
+
+def test_explore_without_a_scene_opens_paper_designed(capfd, monkeypatch):
+    shown = []
+    monkeypatch.setattr("limitsets.explore", lambda scene, **_: shown.append(scene) or mock.MagicMock())
+    assert run(capfd, "explore --no-show")[0] == 0
+    assert [scene.name for scene in shown] == ["paper-designed"]
 
 
 @pytest.mark.sweep

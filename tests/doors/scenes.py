@@ -52,7 +52,9 @@ def scenes() -> dict[str, tuple[Any, str]]:
         "with bounded spread": (
             _world(designed, {"scatter": {"speed": "0.05 %"}}, effects=spread), KAPPA,
         ),
-        "with an effect": (_of(designed, effects={"landing": True, "roll": True}), HEIGHT),
+        "with an effect": (
+            _of(designed, effects={"landing": True, "roll": True}, goal=_goal("21 in", 2)), HEIGHT,
+        ),
         "a lead plate": (LEAD_QUAD, SPEED),
         "a steel plate": (plate(more='[goal]\noriented_beyond = { x = "250 mm", side = 0 }\n'), SPEED),
     }  # fmt: skip

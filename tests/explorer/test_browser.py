@@ -36,8 +36,12 @@ CELLS = {
 
 
 @pytest.fixture(scope="module")
-def address():
-    with served() as found:
+def address(tmp_path_factory):
+    """Serve paper-designed with a goal that is refuted at once: proofs go on behind each page until it is forgotten."""
+    tree = ls.load("paper-designed").as_dict() | {"goal": {"oriented_beyond": {"x": "18 in", "side": 2}}}
+    file = tmp_path_factory.mktemp("served") / "paper-designed.toml"
+    file.write_text(ls.dump(ls.load(tree)), encoding="utf-8")
+    with served(str(file)) as found:
         yield found
 
 

@@ -133,7 +133,7 @@ HISTORIES = 10
 
 @pytest.fixture(scope="module")
 def ran_tray_study(tmp_path_factory):
-    return of_study("14_tray", tmp_path_factory, seed=7, drops=1200, histories=HISTORIES)
+    return of_study("14_tray", tmp_path_factory, seed=7, drops=800, histories=HISTORIES)
 
 
 def interval(count, of):
@@ -188,8 +188,8 @@ def test_the_tables_are_written(ran_tray_study):
 def test_many_parts_stand_beside_the_chain(tmp_path, monkeypatch):
     study = load_study("14_tray", "many_parts")
     monkeypatch.setattr(study, "BATCHES", {(10, 20): 2, (40, 20): 2})
-    monkeypatch.setattr(study, "DROPS", 500)
-    monkeypatch.setattr(study, "PASSES", 12)
+    monkeypatch.setattr(study, "DROPS", 300)
+    monkeypatch.setattr(study, "PASSES", 8)
     numbers = study.main(seed=7, out=tmp_path)
     for each in numbers.values():
         passing, chain = each["passing"], each["chain"]

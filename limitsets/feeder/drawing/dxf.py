@@ -70,6 +70,7 @@ def _sheet(document: Any, states_unit: bool, layers: Sequence[str]) -> Sheet:
     wanted = {name.lower() for name in layers}
     curves: list[Curve] = []
     left_out: Counter[str] = Counter()
+    require_few(_unfolded(document.modelspace(), {}))
     for count, (entity, layer, matrix) in enumerate(_entities(document.modelspace(), np.eye(4), "")):
         require_few(count + len(curves))
         known.setdefault(layer.lower(), layer)
@@ -89,6 +90,19 @@ def _sheet(document: Any, states_unit: bool, layers: Sequence[str]) -> Sheet:
     left_out["in paper space"] += sum(entity.dxftype() != "VIEWPORT" for entity in on_paper)
     code = document.header.get("$INSUNITS", 0) if states_unit else 0
     return Sheet(curves, left_out, _UNITS.get(code), np.ones(2))
+
+
+def _unfolded(layout: Any, known: dict[str, int], depth: int = 0) -> int:
+    """Count the entities that `_entities` walks, each block once, before it walks them one by one."""
+    require_few(0, depth)
+    count = 0
+    for entity in layout:
+        count += 1
+        if entity.dxftype() == "INSERT" and (block := entity.block()) is not None:
+            if block.name not in known:
+                known[block.name] = _unfolded(block, known, depth + 1)
+            count += max(entity.mcount, 1) * known[block.name]
+    return count
 
 
 def _entities(layout: Any, matrix: Array, outer: str, depth: int = 0) -> Iterator[tuple[Any, str, Array]]:

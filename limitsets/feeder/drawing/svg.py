@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -80,6 +80,7 @@ def read_svg(path: Path, layers: Sequence[str]) -> Sheet:
         if root.tag not in ("svg", f"{_SVG}svg"):
             raise ValueError(f"its first element is {root.tag!r}")
         walk = _Walk(elements, root, layers)
+        require_few(walk.unfolded(root, {}))
         walk.element(root, np.diag([1.0, -1.0, 1.0]), "", not layers, 0)
         require_known([name for name in layers if name not in walk.names], walk.names)
         return Sheet(walk.curves, walk.left_out, *_stated(root.attrib))
@@ -120,15 +121,13 @@ class _Walk:
         """
         self.count += 1
         require_few(self.count + len(self.curves), depth)
-        tag = element.tag.removeprefix(_SVG)
-        pairs = [each.partition(":") for each in element.get("style", "").split(";")]
-        words = element.attrib | {name.strip(): value.strip() for name, _, value in pairs}
+        tag, words = _words(element)
         m = self.elements.Matrix(words.get("transform", ""))
         matrix = matrix @ np.array([[m.a, m.c, m.e], [m.b, m.d, m.f], [0.0, 0.0, 1.0]], float)
         if "{" in tag or tag in _SILENT:
             self.left_out["style sheet"] += tag == "style"  # it may hide shapes
             return
-        if words.get("display") == "none" or words.get("visibility") in ("hidden", "collapse"):
+        if _hidden(words):
             self.left_out["hidden"] += 1
         elif tag in _GROUPS or element is self.root:
             names = {words[key] for key in ("id", _LABEL) if key in words}
@@ -137,12 +136,26 @@ class _Walk:
                 self.element(
                     inner, matrix, words.get(_LABEL, layer), chosen or bool(names & self.wanted), depth + 1
                 )
-        elif tag == "use" and (link := words.get("href", words.get(_LINK))) in self.by_id:
+        elif tag == "use" and (cloned := self.by_id.get(_link(words))) is not None:
             shift = np.eye(3)
             shift[:2, 2] = _user_units(words, "x"), _user_units(words, "y")
-            self.element(self.by_id[link], matrix @ shift, layer, chosen, depth + 1)
+            self.element(cloned, matrix @ shift, layer, chosen, depth + 1)
         elif chosen:
             self._shape(tag, words, matrix, layer)
+
+    def unfolded(self, element: ET.Element, known: dict[ET.Element, int], depth: int = 0) -> int:
+        """Count the elements that `element` reads, each that is cloned once, before it reads them one by one."""
+        require_few(0, depth)
+        if element not in known:
+            tag, words = _words(element)
+            inner: Iterable[ET.Element] = ()
+            if not ("{" in tag or tag in _SILENT or _hidden(words)):
+                if tag in _GROUPS or element is self.root:
+                    inner = element
+                elif tag == "use" and (cloned := self.by_id.get(_link(words))) is not None:
+                    inner = (cloned,)
+            known[element] = 1 + sum(self.unfolded(each, known, depth + 1) for each in inner)
+        return known[element]
 
     def _shape(self, tag: str, words: Mapping[str, str], matrix: Array, layer: str) -> None:
         """Keep the lines of a shape, and count what is no shape, or cut off by another one."""
@@ -168,6 +181,21 @@ class _Walk:
                 yield Curve(control, layer, knots=np.concatenate([0.0 * ends, ends]), weights=ends)
             elif kind != "Move" and segment.start is not None:
                 yield Curve(np.array([tuple(segment.start), tuple(segment.end)]), layer)
+
+
+def _words(element: ET.Element) -> tuple[str, dict[str, str]]:
+    """Give the tag of an element and its attributes, with those in its style."""
+    pairs = [each.partition(":") for each in element.get("style", "").split(";")]
+    words = element.attrib | {name.strip(): value.strip() for name, _, value in pairs}
+    return element.tag.removeprefix(_SVG), words
+
+
+def _hidden(words: Mapping[str, str]) -> bool:
+    return words.get("display") == "none" or words.get("visibility") in ("hidden", "collapse")
+
+
+def _link(words: Mapping[str, str]) -> str:
+    return words.get("href", words.get(_LINK, ""))
 
 
 def _round(words: Mapping[str, str], layer: str) -> Iterator[Curve]:
