@@ -166,51 +166,52 @@ def test_a_side_that_comes_down_slides_by_the_closed_form():
 def test_a_covered_scene_says_so():
     """The seventh feeder's limit set ends on side 3 alone: friction moves its landings by less than that survives."""
     goal = {"oriented_beyond": {"x": "25.252 in", "side": 3}}
-    found = ls.discrepancy({**feeder(TEN[6]).as_dict(), "goal": goal}, EFFECTS, throws=20_000)
-    best, covered = found.row("limit-set"), found.covered["limit-set"]
+    compared = ls.discrepancy({**feeder(TEN[6]).as_dict(), "goal": goal}, EFFECTS, throws=20_000)
+    best, covered = compared.row("limit-set"), compared.covered["limit-set"]
     assert best.how == "proved"
     assert 0.05 < best.most <= covered < 0.07
-    assert 0.27 < found.margin.proved < 0.28
-    assert found.enough
+    assert 0.27 < compared.margin.proved < 0.28
+    assert compared.enough
     moves = (
         "friction and rolling and another corner that lands first move a landing by up to 0.0607 in (proved)"
     )
-    assert found.sentence.startswith(f"{moves}; the goal survives 0.27")
-    assert found.left_out["pivot"] == "called for, but not asked for"
+    assert compared.sentence.startswith(f"{moves}; the goal survives 0.27")
+    assert compared.left_out["pivot"] == "called for, but not asked for"
 
 
 @pytest.mark.parametrize(
-    "row", [pytest.param(row, marks=[pytest.mark.repeats] * (number % 8 > 0)) for number, row in enumerate(TEN)]
+    "row",
+    [pytest.param(row, marks=[pytest.mark.repeats] * (number % 8 > 0)) for number, row in enumerate(TEN)],
 )
 def test_with_restitution_the_sentence_says_what_simulations_do(row):
     """Sampled, not covered if a side changes; the share that arrives is that of other starts, within chance."""
     scene = feeder(row, restitution=0.3, bounce_threshold="0.01 in")
     text = {**scene.as_dict(), "goal": {"stays_on_arm": True}}
-    found = ls.discrepancy(text, ("slip", "bounce", "roll"), throws=5000)
-    best = found.row("limit-set")
+    compared = ls.discrepancy(text, ("slip", "bounce", "roll"), throws=5000)
+    best = compared.row("limit-set")
     assert best.how == "sampled"
-    assert f"(sampled, {best.throws:.0e} throws)".replace("e+0", "e") in found.sentence
+    assert f"(sampled, {best.throws:.0e} throws)".replace("e+0", "e") in compared.sentence
     full = with_effects(scene, ("slip", "bounce", "roll"))
     generator, stays, starts = np.random.default_rng(99), 0, 1000
     lo, hi = full.domain.lo[:, 0], full.domain.hi[:, 0]
     side = generator.choice(lo.size, starts, p=(hi - lo) / (hi - lo).sum())
     x = lo[side] + (hi - lo)[side] * generator.random(starts)
     stays = int((ls.maps.advance(full.map, x, side, 500)[2] >= 0).sum())
-    share = found.arrive["effects"].share
+    share = compared.arrive["effects"].share
     assert abs(stays / starts - share) <= 4.0 * math.sqrt(max(share * (1 - share), 1e-3) / starts)
     if best.changed or best.unknown:
-        assert "not covered" in found.sentence
-        assert "limit-set" not in found.covered
+        assert "not covered" in compared.sentence
+        assert "limit-set" not in compared.covered
 
 
 def test_what_is_called_for_is_asked_by_itself():
     """Facts that are missing are named; a scene without facts is compared with what needs none."""
-    found = ls.discrepancy(plain("paper-designed"), throws=2000)
-    assert found.effects == ("landing",)
-    assert found.left_out["slip"] == "world.friction is missing: cannot tell"
-    assert found.left_out["pivot"] == "called for, but world.friction missing"
-    assert found.row("limit-set").most == 0.0
-    assert found.enough
+    compared = ls.discrepancy(plain("paper-designed"), throws=2000)
+    assert compared.effects == ("landing",)
+    assert compared.left_out["slip"] == "world.friction is missing: cannot tell"
+    assert compared.left_out["pivot"] == "called for, but world.friction missing"
+    assert compared.row("limit-set").most == 0.0
+    assert compared.enough
 
 
 def test_the_command_and_its_page(capfd, tmp_path):

@@ -175,18 +175,22 @@ def discrepancy(
         Write report.md, discrepancy.json and a figure there.
     """
     chosen = run.opened(scene)
-    found = ls.discrepancy(chosen, effect or None, throws=throws, seed=seed, progress=run.tell)
+    compared = ls.discrepancy(chosen, effect or None, throws=throws, seed=seed, progress=run.tell)
     if run.out is not None:
-        run.files = report.machine_page.write_machine(found, run.out, run.form, html=run.html)
-    code = 1 if found.effects and not (found.enough or (found.margin is None and found.covered)) else 0
+        run.files = report.machine_page.write_machine(compared, run.out, run.form, html=run.html)
+    code = (
+        1
+        if compared.effects and not (compared.enough or (compared.margin is None and compared.covered))
+        else 0
+    )
 
     def words() -> Iterator[str | Table]:
-        yield from found.tables()
-        yield found.sentence
-        yield from found.advice
-        yield from (f"not simulated: {name}: {why}" for name, why in found.left_out.items())
+        yield from compared.tables()
+        yield compared.sentence
+        yield from compared.advice
+        yield from (f"not simulated: {name}: {why}" for name, why in compared.left_out.items())
 
-    return Answer(found, words, found.table, code=code)
+    return Answer(compared, words, compared.table, code=code)
 
 
 # ----------------------------------------------------------------

@@ -17,12 +17,12 @@ CHANGED: dict[str, Any] = {"facecolor": "#F3D9CB", "edgecolor": "#8A2F00", "hatc
 
 
 @arguments_checked
-def discrepancy(found: Discrepancy) -> Figure:
+def discrepancy(compared: Discrepancy) -> Figure:
     """Draw how far effects move a landing, by where the throw starts, and where they change the side.
 
     Parameters
     ----------
-    found : Discrepancy
+    compared : Discrepancy
         From `limitsets.discrepancy`.
 
     Returns
@@ -43,22 +43,22 @@ def discrepancy(found: Discrepancy) -> Figure:
     >>> [axes.get_title(loc="left") for axes in figure.axes]
     ['on side 0', 'on side 1', 'on side 2']
     """
-    scene, unit = found.scene, found.scene.unit
-    if len(found.scenes) < 2:
+    scene, unit = compared.scene, compared.scene.unit
+    if len(compared.scenes) < 2:
         raise AnswerError(
             "the effects", "none", "at least one", "name some: limitsets.discrepancy(scene, [...])"
         )
     count = len(scene.sides)
     below = f"x before the throw [{unit}]"
     figure, panels = style.panels(count, min(count, 3), (3.1, 2.5), (0.9, 1.15), below)
-    survives = 0.0 if found.margin is None else found.margin.proved
-    first = found.scenes[0], found.scenes[1]
+    survives = 0.0 if compared.margin is None else compared.margin.proved
+    first = compared.scenes[0], compared.scenes[1]
     moved = [along_arm(first, side) for side in range(count)]
     reach = max([1.5 * survives, *(1.08 * np.nanmax(np.abs(each), initial=0.0) for _, each in moved), 1e-9])
     other = any(bool(np.isnan(each).any()) for _, each in moved)
     for side, axes in enumerate(panels):
         x, each = moved[side]
-        for lo, hi in found.audit.extents.get(side, ()):
+        for lo, hi in compared.audit.extents.get(side, ()):
             axes.axvspan(lo, hi, facecolor="#EEF2F6", edgecolor="none", zorder=0, gid="limit set")
         axes.axhspan(-survives, survives, facecolor="#CFE3D4", edgecolor="none", zorder=1, gid="survives")
         axes.fill_between(
@@ -75,6 +75,6 @@ def discrepancy(found: Discrepancy) -> Figure:
         if survives
         else None,
         Patch(label="another side, or outside the model", **CHANGED) if other else None,
-        Patch(facecolor="#EEF2F6", label="limit set without effects") if found.audit.extents else None,
+        Patch(facecolor="#EEF2F6", label="limit set without effects") if compared.audit.extents else None,
     ]
-    return style.finished(figure, f"{scene.name}: landings with {', '.join(found.effects)}", handles, 2)
+    return style.finished(figure, f"{scene.name}: landings with {', '.join(compared.effects)}", handles, 2)

@@ -15,7 +15,7 @@ from limitsets.parameters.discrepancy.model_discrepancy import STARTS
 from limitsets.parameters.margins.margin_result import bound
 
 
-def alarms_of(found: Discrepancy) -> list[str]:
+def alarms_of(compared: Discrepancy) -> list[str]:
     """Say what speaks against the machine, or is not known.
 
     Examples
@@ -26,27 +26,27 @@ def alarms_of(found: Discrepancy) -> list[str]:
     'with these effects 72.4 % of the starts arrive, without them 100 %'
     """
     lines = []
-    if found.effects and found.arrive["effects"].share < found.arrive["minimal"].share:
-        with_them, without = (percent(found.arrive[name].share) for name in ("effects", "minimal"))
+    if compared.effects and compared.arrive["effects"].share < compared.arrive["minimal"].share:
+        with_them, without = (percent(compared.arrive[name].share) for name in ("effects", "minimal"))
         lines.append(f"with these effects {with_them} of the starts arrive, without them {without}")
-    if found.effects and "limit-set" not in found.covered:
+    if compared.effects and "limit-set" not in compared.covered:
         lines.append("what is proved of the minimal model does not cover these effects")
-    elif found.effects and "starts" not in found.covered:
+    elif compared.effects and "starts" not in compared.covered:
         lines.append("the limit set is covered; starts elsewhere on the arm are not")
-    if found.enough is False and found.margin is not None:
-        proved = bound(found.margin.proved, found.margin.unit)
+    if compared.enough is False and compared.margin is not None:
+        proved = bound(compared.margin.proved, compared.margin.unit)
         lines.append(f"landings are moved farther than the goal is proved to survive, {proved}")
-    if found.left_out:
-        lines.append(f"not simulated: {', '.join(found.left_out)} (reasons below)")
+    if compared.left_out:
+        lines.append(f"not simulated: {', '.join(compared.left_out)} (reasons below)")
     return lines
 
 
-def machine_page(found: Discrepancy, figures: Mapping[str, str] | None = None) -> str:
+def machine_page(compared: Discrepancy, figures: Mapping[str, str] | None = None) -> str:
     """Write the page.
 
     Parameters
     ----------
-    found : Discrepancy
+    compared : Discrepancy
         From `limitsets.discrepancy`.
     figures : mapping of str to str, optional
         File names of the pictures by kind: "discrepancy".
@@ -56,10 +56,10 @@ def machine_page(found: Discrepancy, figures: Mapping[str, str] | None = None) -
     str
         Markdown.
     """
-    unit, rate = found.scene.unit, found.scene.world.throw_rate
-    names = {"minimal": "minimal model (hinge, no rebound)", "effects": f"with {', '.join(found.effects)}"}
-    columns = [(names[each], found.arrive[each]) for each in names if each in found.arrive]
-    survives = "-" if found.margin is None else bound(found.margin.proved, found.margin.unit)
+    unit, rate = compared.scene.unit, compared.scene.world.throw_rate
+    names = {"minimal": "minimal model (hinge, no rebound)", "effects": f"with {', '.join(compared.effects)}"}
+    columns = [(names[each], compared.arrive[each]) for each in names if each in compared.arrive]
+    survives = "-" if compared.margin is None else bound(compared.margin.proved, compared.margin.unit)
     rows: list[list[str]] = [
         ["starts that arrive (simulated)", *(percent(each.share) for _, each in columns)],
         ["throws until a part is there (simulated)", *(_number(each.throws) for _, each in columns)],
@@ -74,13 +74,13 @@ def machine_page(found: Discrepancy, figures: Mapping[str, str] | None = None) -
             f"{each.lo:.4g} to {each.hi:.4g}" if each.lo <= each.hi else "-",
             percent(each.changed),
             percent(each.unknown),
-            _number(found.covered.get(each.place)),
+            _number(compared.covered.get(each.place)),
         )
-        for each in found.rows
+        for each in compared.rows
     ]
     told = {
-        "found": found,
-        "alarms": alarms_of(found),
+        "compared": compared,
+        "alarms": alarms_of(compared),
         "heads": ["", *(name for name, _ in columns)],
         "rows": rows if columns else [],
         "places": places,
@@ -104,14 +104,14 @@ def _per_minute(arrivals: Arrivals, rate: float | None) -> str:
 
 
 def write_machine(
-    found: Discrepancy, folder: str | Path, form: str = "png", *, html: bool = False
+    compared: Discrepancy, folder: str | Path, form: str = "png", *, html: bool = False
 ) -> list[Path]:
     """Write report.md, discrepancy.json and the figure into a folder, all of them or none."""
-    drawn = [("discrepancy", plot.discrepancy(found))] if found.effects else []
+    drawn = [("discrepancy", plot.discrepancy(compared))] if compared.effects else []
     return laid(
         folder,
         drawn,
-        lambda figures: {"report.md": machine_page(found, figures), "discrepancy.json": as_json(found)},
+        lambda figures: {"report.md": machine_page(compared, figures), "discrepancy.json": as_json(compared)},
         form,
         html=html,
     )

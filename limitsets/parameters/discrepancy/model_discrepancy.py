@@ -97,8 +97,8 @@ class _Comparison:
         grid = self.attraction(0.0).cover.grid
         rows = self.on("starts", ~CellSet.of(grid, []))
         deviation = best_of(rows).most
-        found = self.attraction(deviation)
-        ranked = CellSet(found.cover.grid, found.basin.rank >= 0)
+        trapped = self.attraction(deviation)
+        ranked = CellSet(trapped.cover.grid, trapped.basin.rank >= 0)
         if not len(ranked):
             return rows, None
         kept = best_of(self.on("starts", ranked))
@@ -154,8 +154,8 @@ def discrepancy(
     --------
     >>> import limitsets as ls
     >>> text = ls.load("paper-designed").as_dict() | {"world": {"friction": 1.3}}
-    >>> found = ls.discrepancy(text, ["slip"])
-    >>> found.row("limit-set").how, found.row("limit-set").most, found.covered["limit-set"]
+    >>> compared = ls.discrepancy(text, ["slip"])
+    >>> compared.row("limit-set").how, compared.row("limit-set").most, compared.covered["limit-set"]
     ('proved', 0.0, 0.0)
     """
     loaded = load(scene)
