@@ -225,7 +225,7 @@ def test_analyse_says_in_its_first_line_what_it_switched_on(capfd):
     out = prints(capfd, "analyse chamfered.toml --cells 512 -o found")
     assert out.splitlines()[0] == f"{FIRST} landing = true and roll = true in [effects]"
     page = Path("found/report.md").read_text(encoding="utf-8")
-    assert "**Switched on landing and roll: the part cannot rest on side 3" in page.split("\n\n")[1]
+    assert "**Switched on landing and roll: the part cannot rest on side 3" in page.split("\n\n")[2]
     record = json.loads(Path("found/analysis.json").read_text(encoding="utf-8"))
     assert record["scene"]["effects"] == BOTH
     assert record["effects"]["tipping"] == ["landing", "roll"]
