@@ -47,7 +47,7 @@ def test_summaries_of_the_help_are_whole(capfd, monkeypatch):
     _, out, _ = run(capfd, "--help")
     assert "..." not in out.partition("Commands:")[2]
     for summary in (
-        "Find limit sets, basins and critical points, and write report.md, analysis.json and figures.",
+        "Find limit sets, basins and critical points, and write report.md, report.html, JSON and figures.",
         "Check a certificate by other code and in other arithmetic",
     ):
         assert summary in " ".join(out.split())

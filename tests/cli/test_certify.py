@@ -57,6 +57,13 @@ def test_shares_of_the_starts_are_rounded_to_the_safe_side(capfd):
     assert rest >= 100.0 * record["open"]
 
 
+def test_of_a_goal_that_asks_nothing_it_is_said_what_it_could_ask(capfd):
+    file = written("paper-designed", goal={"oriented_beyond": {"x": "24 in", "side": 2}})
+    out = prints(capfd, f"certify {file} --claim goal --no-recheck")
+    assert "the goal asks nothing of them" in out
+    assert "\nchoose X between 19.753 and 23.383 in for side 2: " in out
+
+
 def test_two_basins_in_words(capfd):
     """With h = 0.1 in the jog's fixed points lie at 3.16349, 3.19076 and 4.80947 in: see test_fixed_point.py."""
     above = written(file="above.toml", values={"arm.surface_height": 0.1})

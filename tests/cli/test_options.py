@@ -66,7 +66,7 @@ def test_throws_in_full(capfd):
 
 
 def test_limit_sets_in_full_and_figures_of_another_form(capfd):
-    record = json_of(capfd, "analyse paper-designed --cells 512 --csv sets.csv --format svg --html")
+    record = json_of(capfd, "analyse paper-designed --cells 512 --csv sets.csv --format svg")
     keys_of_an_analysis(record)
     (found,) = record["attractors"]
     bands = [(int(side), *part) for side, parts in found["extents"].items() for part in parts]
@@ -77,9 +77,15 @@ def test_limit_sets_in_full_and_figures_of_another_form(capfd):
     assert not list(folder.glob("*.png"))
     page = (folder / "report.md").read_text(encoding="utf-8")
     assert "](map.svg)" in page
-    for name in re.findall(r"\]\(([^)]+)\)", page):
+    for name in re.findall(r"\]\(([^#)]+)\)", page):
         assert (folder / name).is_file()
     assert (folder / "report.html").is_file()
+
+
+def test_a_page_can_be_left_out(capfd):
+    prints(capfd, "analyse paper-designed --cells 64 -o out --no-html")
+    assert Path("out/report.md").is_file()
+    assert not Path("out/report.html").exists()
 
 
 def test_a_page_links_to_figures_that_it_cannot_show(capfd):

@@ -4,6 +4,8 @@ import base64
 import json
 import math
 import re
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +17,18 @@ from jinja2 import UndefinedError
 import limitsets as ls
 from limitsets.base.errors import AnswerError, LimitsetsError
 from limitsets.base.files import as_json, as_table, replaced
-from limitsets.face.report.pages import as_html, bands, page, starts_words, verdict_of, void_of, words
+from limitsets.cell.feeding import proposed_cavity
+from limitsets.face.report.pages import (
+    EXPLAINED,
+    as_html,
+    bands,
+    explained,
+    page,
+    starts_words,
+    verdict_of,
+    void_of,
+    words,
+)
 from limitsets.face.report.writing import FIGURES, audit_page, write, write as write_report
 from limitsets.feeder.goals import OrientedBeyond
 from limitsets.feeder.scattering import Gaussian, Scattering
@@ -33,7 +46,7 @@ from tests.plates import left_by_some
 SCENES = Path(__file__).parents[1] / "analysis"
 SOURCES = ["paper-designed", "paper-initial", SCENES / "four-sides.toml", SCENES / "five-sides.toml"]
 PICTURES = {f"{kind}.png" for kind in ("part", "limit-set", "map", "basins", "morse", "flight")}
-FILES = PICTURES | {"report.md", "analysis.json"}
+FILES = PICTURES | {"report.md", "report.html", "analysis.json"}
 
 
 @lru_cache(maxsize=8)
@@ -48,9 +61,9 @@ def asking(goal, **tables):
 @pytest.mark.parametrize("figures", [{}, {"limit-set": "a.png", "flight": "b.png"}])
 def test_a_paragraph_is_a_line_and_one_without_sentences_is_none(figures):
     blocks = page(analysed("paper-designed"), figures).removesuffix("\n").split("\n\n")
-    assert all(block == block.strip() != "" for block in blocks)
-    assert all("  " not in block for block in blocks)
-    assert {block[0] for block in blocks if "\n" in block} == {"|"}
+    assert all(block.strip("\n") == block.rstrip() == block != "" for block in blocks)
+    assert all("  " not in block.strip() for block in blocks if block[0] != " ")
+    assert {block[0] for block in blocks if "\n" in block} == {"|", " "}  # tables, the cavity
     pictures = [block for block in blocks if block[0] == "!"]
     assert [re.search(r"\((.*)\)$", each)[1] for each in pictures] == list(figures.values())
 
@@ -88,6 +101,8 @@ def test_the_page_has_the_numbers(source):
     for word in ("nan", "None", "inf ", "{", "}"):
         assert word not in text
 
+
+CLEAR = "Nothing here calls for attention. `limitsets audit` says whether the scene breaks assumptions of the model."
 
 # Exponent and flips per throw: bounds on 128 000 cells, made apart from this package, and 6e7 throws in floats.
 KNOWN = {"lyapunov": 0.205679, "flips_per_throw": 0.319163}
@@ -133,7 +148,7 @@ def test_the_goal_in_words():
     assert f"{asked}. **It holds of the limit set** (sampled: no proof)" in text
     assert "from x = 19.753 in on" in text
     assert "does not hold" in page(analysed("paper-initial"), {})
-    assert "But no part gets there" in page(analysed(SCENES / "five-sides.toml"), {})
+    assert "(sampled, not proved): no part gets there" in page(analysed(SCENES / "five-sides.toml"), {})
     assert "## The goal" not in page(analysed(SCENES / "four-sides.toml"), {})
 
 
@@ -152,7 +167,7 @@ def test_goals_of_other_kinds(goal):
     assert "None" not in text
     assert "from_anywhere = true asks it of every start" not in text
     if goal == {"stays_on_arm": True, "from_anywhere": True}:
-        assert "The goal **holds** (sampled" in text
+        assert "The [goal](#the-goal) **holds** (sampled" in text
         # no throw leads out of any limit set
         assert "from_anywhere = true asks it of every start" in page(asking({"stays_on_arm": True}), {})
 
@@ -160,7 +175,7 @@ def test_goals_of_other_kinds(goal):
 def test_of_a_goal_it_is_said_from_which_starts_parts_come_to_where_it_holds():
     """ "holds" stood beside "proved for some starts only": of this feeder 3.5 % of the starts leave."""
     text = page(ls.analyse(left_by_some(), 1024), {})
-    holds = r"The goal \*\*holds of the limit set, to which (\S+) % of all starts come\*\* \(sampled"
+    holds = r"The \[goal\]\(#the-goal\) \*\*holds of the limit set, to which (\S+) % of all starts come\*\* \(sampled"
     said = re.search(holds, text)
     assert float(said[1]) == pytest.approx(96.5, abs=0.3)
 
@@ -180,6 +195,13 @@ def test_of_thousands_of_recurrent_sets_the_largest_are_named():
     assert f"; the largest have {', '.join(map(str, cells))} cells." in text
 
 
+def alarms(text):
+    """Give what calls for attention: the list between the title and the contents."""
+    top = text.split("**Contents:** ")[0].split("\n\n")
+    assert (len(top), top[1]) in ((3, CLEAR), (4, "**Calls for attention:**"))
+    return [line for line in top[2].splitlines() if line.startswith("* ")]
+
+
 def section(text, name):
     return text.split(f"## {name}\n")[1].split("\n## ")[0]
 
@@ -189,9 +211,9 @@ def test_a_goal_that_no_part_gets_to_holds_vacuously(side):
     """tests/test_paper.py: the limit set ends at 23.383 in."""
     found = asking({"oriented_beyond": {"x": "25 in", "side": side}})
     text = page(found, {})
-    assert "The goal **holds vacuously** (sampled" in text.split("##")[0]
+    short = "no part gets there: the limit set ends at x = 23.383 in, before x = 25 in."
+    assert f"The [goal](#the-goal) **holds vacuously** (sampled, not proved): {short}" in alarms(text)[0]
     assert "**It holds vacuously** (sampled" in text
-    assert "But no part gets there: the limit set ends at x = 23.383 in, before x = 25 in." in text
     assert found.to_json()["goal_vacuous"] is True
     assert analysed("paper-designed").to_json()["goal_vacuous"] is False
     assert "vacuously" not in page(analysed("paper-designed"), {})
@@ -201,7 +223,7 @@ def test_a_goal_is_vacuous_also_where_parts_never_lie_on_another_side():
     """Thrown so fast the part jogs about x = 8.98 in on side 2: nothing was said of the 20 in that it never gets to."""
     text = page(asking({"oriented_beyond": {"x": "20 in", "side": 2}}, throw={"kappa": "4 in"}), {})
     assert "It holds vacuously" in section(text, "The goal")
-    assert "the limit set ends at x = 8.976 in, before x = 20 in" in section(text, "The goal")
+    assert "the limit set ends at x = 8.976 in, before x = 20 in" in alarms(text)[0]
 
 
 def test_what_is_asked_from_anywhere_is_not_answered_by_where_the_limit_set_ends():
@@ -258,8 +280,48 @@ def test_flags_and_assumptions_in_words():
 def test_a_flag_on_the_limit_set_is_said_at_the_top():
     found = replace(analysed("paper-designed"), other_vertex_first={0: [(19.0, 28.0)], 1: [], 2: []})
     text = page(found, {})
-    assert "another vertex lands first: the model does not describe" in text.split("##")[0]
-    assert "This touches the limit set: side 0: 19.000 to 19.753 in" in text
+    (alarm,) = alarms(text)
+    assert "another vertex lands first: the model does not describe" in alarm
+    assert "It is side 0: 19.000 to 19.753 in" in alarm
+    assert "lands first" not in text.split("## ")[1]
+
+
+def test_where_nothing_calls_for_attention_a_line_says_so_and_the_contents_follow():
+    text = page(analysed("paper-designed"), {})
+    assert text.split("\n\n")[1] == CLEAR
+    links = re.findall(r"\[(.*?)\]\(#(.*?)\)", text.split("\n\n")[2])
+    assert [head for head, _ in links] == re.findall(r"^## (.*)$", text, re.MULTILINE)
+    assert all(name == head.lower().replace(" ", "-") for head, name in links)
+    assert len(alarms(page(ls.analyse(left_by_some(), 1024), {}))) > 1
+    assert "**Some starts leave the arm**: inward " in page(ls.analyse(left_by_some(), 1024), {})
+
+
+def test_words_are_explained_where_they_first_stand():
+    text = "# My basin\n\n| basins |\n\nTwo basins, `--cells`:\n\nThe basin, cells\n* of a cell"
+    basin, cell = EXPLAINED["basins?"], EXPLAINED["[Cc]ells?"]
+    told = text.replace("Two", f"*{basin}* Two").replace("The basin, cells", f"The basin, cells *{cell}*")
+    assert explained(text) == told
+    text = page(analysed("paper-designed"), {})
+    for sentence in EXPLAINED.values():
+        assert text.count(sentence) == 1
+
+
+def test_a_cavity_is_proposed_where_the_goal_holds_and_there_is_none():
+    """The one that `feed` proposes, and nothing that feeds is loaded for it."""
+    text = page(analysed("paper-designed"), {})
+    lines = proposed_cavity(ls.load("paper-designed")).splitlines()
+    assert "\n".join(f"    {line}" for line in lines) in section(text, "The goal")
+    without = (
+        ls.load("paper-initial"),
+        with_cavity(),
+        {**ls.load("paper-designed").as_dict(), "goal": {"attracts_all": True}},
+    )
+    for scene in without:
+        assert "[cavity]" not in page(ls.analyse(scene, 512), {})
+    code = "from limitsets.face.report.pages import cavity_for\nimport limitsets as ls, sys\n"
+    code += "assert cavity_for(ls.analyse('paper-designed', 64))\n"
+    code += "assert 'limitsets.cell.feeding.feeding_run' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_nothing_stays():
@@ -274,7 +336,9 @@ def test_nothing_stays():
 
 def test_what_is_not_settled_is_said():
     text = page(ls.analyse("paper-initial", 20), {})
-    assert "**Not settled:**" in text
+    assert any("**Not settled:**" in alarm for alarm in alarms(text))
+    assert any("**Undecided**" in alarm and "--cells 80" in alarm for alarm in alarms(text))
+    assert text.count("Not settled") == 1
     assert "ended where their cells say" in page(analysed("paper-designed"), {})
 
 
@@ -341,7 +405,7 @@ def test_a_proved_share_is_rounded_down():
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("report")
-    write(ls.analyse("paper-designed", cells=512), place, html=True)
+    write(ls.analyse("paper-designed", cells=512), place)
     return place
 
 
@@ -350,17 +414,18 @@ def test_it_stands_alone_and_has_all_figures(folder):
     links = [
         attributes[name] for _, attributes in page.tags for name in ("href", "src") if name in attributes
     ]
-    assert all(link.startswith("data:") for link in links)
+    sections = {f"#{attributes['id']}" for tag, attributes in page.tags if tag == "h2"}
+    assert {link for link in links if not link.startswith("data:")} == sections
     images = [attributes for tag, attributes in page.tags if tag == "img"]
     assert len(images) == len(FIGURES)
     for image in images:
         assert image["alt"]
-        assert b"<svg" in base64.b64decode(image["src"].partition(",")[2])
+        assert base64.b64decode(image["src"].partition(",")[2]).startswith(b"\x89PNG")
 
 
 def test_it_says_what_the_markdown_says(folder):
     html = Page((folder / "report.html").read_text(encoding="utf-8"))
-    page = re.sub(r"!\[.*?\]\(.*?\)", "", (folder / "report.md").read_text(encoding="utf-8"))
+    page = re.sub(r"!\[.*?\]\(.*?\)|\]\(#.*?\)", "", (folder / "report.md").read_text(encoding="utf-8"))
 
     def words(text):
         return re.findall(r"[\w.]+", text)

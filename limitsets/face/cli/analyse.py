@@ -30,7 +30,7 @@ def analyse(
     cells: Annotated[int | None, limits(min=1, max=10_000_000)] = None,
     error: float | None = None,
 ) -> Answer:
-    """Find limit sets, basins and critical points, and write report.md, analysis.json and figures.
+    """Find limit sets, basins and critical points, and write report.md, report.html, JSON and figures.
 
     Parameters
     ----------

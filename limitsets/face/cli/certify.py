@@ -147,6 +147,8 @@ def _of_scene(
         yield from said_of(written, missing, partly=not proof.proved)
         if not proof.proved:
             yield f"next: {report.pages.after_unproved(proof)}"
+        if any(claim.claim == "goal" and claim.note for claim in proof.claims):  # it holds vacuously
+            yield from report.pages.choice_for(chosen, [proof.scene.goal])
 
     code, about = 0 if proof.proved else 1, run.about(proof.model, chosen)
     return Answer(records_of(proof, written), words, proof.table, code=code, about=about)

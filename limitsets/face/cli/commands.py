@@ -72,7 +72,7 @@ Seed = Annotated[int, limits(min=0)]
 _OUT = Parameter("out", Parameter.KEYWORD_ONLY, annotation=Path | None, default=None)
 _SHARED = {
     "out": _OUT,
-    "html": _OUT.replace(name="html", annotation=bool, default=False),
+    "html": _OUT.replace(name="html", annotation=bool, default=True),
     "form": _OUT.replace(name="form", annotation=Form, default=Form.PNG),
     "csv": _OUT.replace(name="csv", annotation=Annotated[Path | None, {"callback": _require_file}]),
     "json": _OUT.replace(name="json", annotation=bool, default=False),
@@ -80,6 +80,7 @@ _SHARED = {
 
 _FLAGS = {
     "out": ("--out", "-o"),
+    "html": ("--html/--no-html",),
     "form": ("--format",),
     "from_": ("--from",),
     "set_": ("--set",),
@@ -94,7 +95,7 @@ _LAID = (
 _DOCUMENTED = {
     "scene": ("SCENE", "A built-in name (see: limitsets scenes) or a TOML file."),
     "out": ("FILE", "Write the JSON to this file as well."),
-    "html": ("", "Write report.html too: the report in one file, figures inside."),
+    "html": ("", "Write report.html beside report.md: one file that stands alone, figures inside."),
     "form": ("FORMAT", "Of the figures: png, svg or pdf."),
     "csv": ("FILE", "Write the table as CSV: units in the head, numbers in full."),
     "json": ("", "Print JSON, and nothing else, on stdout."),
@@ -185,7 +186,7 @@ class Run:
     form : str
         Of --format.
     html, json : bool
-        Whether --html and --json are given.
+        Whether report.html is written, and whether --json is given.
     csv : Path or None
         Of --csv.
     files : list of Path
@@ -197,7 +198,7 @@ class Run:
     tell: Progress
     out: Path | None = None
     form: str = Form.PNG
-    html: bool = False
+    html: bool = True
     csv: Path | None = None
     json: bool = False
     files: list[Path] = field(default_factory=list)

@@ -122,12 +122,14 @@ def _text(given: SceneOf, margins: tuple[Margin, ...]) -> Iterator[str | Table]:
         low, high = bound(each.proved, unit), failing(each.refuted, unit, each.direction)
         rows.append((each.quantity, report.robust_pages.READINGS[each.reading], low, high))
     yield Table(HEADS, rows)
-    for each in margins:
-        void = void_of(each.goals, reach_of(each.pieces), scene.unit)
+    voids = [void_of(each.goals, reach_of(each.pieces), scene.unit) for each in margins]
+    for each, void in zip(margins, voids, strict=True):
         if void:
             yield f"{each.quantity}: what is proved holds vacuously, {void}"
         if each.reason:
             yield f"{each.quantity}: {each.reason}"
+    if any(voids):
+        yield from report.pages.choice_for(given, goals)
 
 
 # ----------------------------------------------------------------

@@ -6,11 +6,10 @@ of the page.  A paragraph without any sentence left is dropped.
 
 from __future__ import annotations
 
-import base64
-import io
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from math import isfinite
@@ -33,7 +32,6 @@ from limitsets.proofs.prover.parameters import simulated
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from matplotlib.figure import Figure
 
     from limitsets.feeder.scene import Scene
     from limitsets.parameters.fitting import Fit
@@ -356,12 +354,59 @@ def choice_of(analysis: Analysis) -> list[str]:
     return lines or ["no X is right: of no side do all limit sets get farther than on the others"]
 
 
+def choice_for(scene: Scene, goals: Sequence[Goal]) -> list[str]:
+    """Say the same for goals that another answer shows to fail, or to hold vacuously; the scene is analysed for it."""
+    from limitsets.parameters.analysis import analyse  # imported here, because only empty promises need it
+
+    goal = next((goal for goal in goals if isinstance(goal, OrientedBeyond)), None)
+    return [] if goal is None else choice_of(analyse(replace(scene, goal=goal)))
+
+
+def cavity_for(analysis: Analysis) -> list[str]:
+    """Propose a cavity, as lines of TOML, where the goal holds and the scene has none; else empty.
+
+    Examples
+    --------
+    >>> import limitsets as ls
+    >>> cavity_for(ls.analyse("paper-designed", 1024))[:2]
+    ['[cavity]', 'position = "20 in"']
+    """
+    from limitsets.cell.feeding import proposed_cavity  # imported here, because only some reports need it
+
+    scene, outcome = analysis.scene, analysis.goal
+    fails = outcome is None or not outcome.holds or outcome.vacuous
+    if fails or scene.cavity is not None or not scene.sides.rests.all():
+        return []
+    return proposed_cavity(scene).splitlines()
+
+
 # ----------------------------------------------------------------
 # The pages: an answer in the words of someone who builds a feeder.
 
 
-# Blocks that begin with these signs keep their line breaks: headings, tables, lists, commands.
-LINES = ("#", "|", "* ", "    ")
+# Blocks that begin with these signs keep their line breaks: headings, tables, commands; lists those between entries.
+LINES = ("#", "|", "    ")
+
+# Lines without sentences, which explain no word; the contents are one of them.
+CONTENTS = "**Contents:** "
+NO_SENTENCES = (*LINES, "!", "[", CONTENTS)
+
+# Sentences that explain words of a page, by patterns of these words.
+EXPLAINED = {
+    r"[Pp]roved|[Ss]ampled": (
+        "Proved is what enclosures of all throws show for the model; sampled is what some computed throws show."
+    ),
+    "limit sets?": "A limit set is the places and sides to which a part comes back for ever: an attractor.",
+    "basins?": "The basin of a limit set is all starts from which parts come to it.",
+    "jogs?": "After a jog the part lies on the same side as before, after a flip on another one.",
+    "critical points?": "At a critical point a part stops jogging and begins to flip, or the reverse.",
+    "[Cc]ells?": "A cell is a short interval of x on one side.",
+    "Morse graph": (
+        "A set of cells is recurrent if throws lead from each of its cells back to it; the Morse graph shows which of"
+        " these sets lead to which."
+    ),
+    "[Mm]argins?|Least room": "A margin is how far a quantity may be off before the goal fails.",
+}
 
 
 @cache
@@ -394,6 +439,9 @@ def environment() -> Environment:
         "verdict_of": verdict_of,
         "void_of": void_of,
         "choice_of": choice_of,
+        "after_undecided": after_undecided,
+        "cavity_for": cavity_for,
+        "contents": contents,
     }
     return templates
 
@@ -425,8 +473,50 @@ def words(template: str, figures: Mapping[str, str] | None = None, **answers: An
     text = environment().get_template(f"{template}.md.j2").render(figure=figure, **answers)
     blocks = [block.strip("\n") for block in re.split(r"\n\s*\n", text)]
     return "\n\n".join(
-        block if block.startswith(LINES) else re.sub(r"\s*\n\s*", " ", block) for block in blocks if block
+        block if block.startswith(LINES) else re.sub(r"\s*\n(?!\* )\s*", " ", block)
+        for block in blocks
+        if block
     )
+
+
+def anchor(heading: str) -> str:
+    """Name a heading in links, as code hosts do.
+
+    Examples
+    --------
+    >>> anchor("Limit set 0, and more")
+    'limit-set-0-and-more'
+    """
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
+def contents(text: str) -> str:
+    r"""Link to the sections of a page.
+
+    Examples
+    --------
+    >>> contents("## The goal\n\n## Noise")
+    '**Contents:** [The goal](#the-goal) · [Noise](#noise)'
+    """
+    heads = (line[3:].strip() for line in text.splitlines() if line.startswith("## "))
+    return CONTENTS + " · ".join(f"[{head}](#{anchor(head)})" for head in heads)
+
+
+def explained(text: str) -> str:
+    """Explain words where they first stand in a page: at the end of the line, before it where a table follows.
+
+    Examples
+    --------
+    >>> explained("It has two basins.")
+    'It has two basins. *The basin of a limit set is all starts from which parts come to it.*'
+    """
+    lines, left = [], dict(EXPLAINED)
+    for line in text.split("\n"):
+        prose = "" if line.startswith(NO_SENTENCES) else line
+        new = [word for word in left if re.search(rf"(?<![-\w])(?:{word})\b", prose)]
+        notes = [f"*{' '.join(left.pop(word) for word in new)}*"] if new else []
+        lines.append(" ".join([*notes, line] if line.endswith(":") else [line, *notes]))
+    return "\n".join(lines)
 
 
 def page(
@@ -465,18 +555,11 @@ def page(
     assumed.insert(0 if effects.drive else 1, "it does not tip the part")
     broken = in_limit_sets(analysis.other_vertex_first, analysis.extents)
     told = {"analysis": analysis, "broken": broken, "assumed": assumed, "averages": averages}
-    return words("report", figures, **told) + "\n"
+    return explained(words("report", figures, **told)) + "\n"
 
 
 # ----------------------------------------------------------------
 # A page as one file of HTML that stands alone: the Markdown of the report, with its figures inside.
-
-
-def as_uri(figure: Figure) -> str:
-    """Write a figure as SVG into a `data:` address."""
-    stream = io.BytesIO()
-    figure.savefig(stream, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode("ascii")
 
 
 def as_html(text: str, images: Mapping[str, str]) -> str:
@@ -491,7 +574,7 @@ def as_html(text: str, images: Mapping[str, str]) -> str:
 
     Examples
     --------
-    >>> "<h1>Throws &amp; flips</h1>" in as_html("# Throws & flips", {})
+    >>> ">Throws &amp; flips</h1>" in as_html("# Throws & flips", {})
     True
     """
     from markdown_it import MarkdownIt  # imported here, because only this page needs it
@@ -501,6 +584,9 @@ def as_html(text: str, images: Mapping[str, str]) -> str:
     for image in (each for block in blocks for each in block.children or () if each.type == "image"):
         source = str(image.attrs["src"])
         image.attrs["src"] = images.get(source, source)
+    for opening, heading in pairwise(blocks):
+        if opening.type == "heading_open":
+            opening.attrs["id"] = anchor(heading.content)
     body = reader.renderer.render(blocks, reader.options, {})
     title = text.split("\n", 1)[0].lstrip("# ")
     return environment().get_template("page.html.j2").render(title=title, body=body) + "\n"

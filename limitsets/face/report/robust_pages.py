@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from limitsets.base import as_json
 from limitsets.face import plot
-from limitsets.face.report.pages import in_time, words
+from limitsets.face.report.pages import explained, in_time, words
 from limitsets.face.report.writing import laid
 from limitsets.feeder.goals import OrientedBeyond, Reaches
 from limitsets.feeder.scattering import Gaussian, Law, Uniform
@@ -93,7 +93,7 @@ def robustness_page(sheet: Robustness, figures: Mapping[str, str]) -> str:
         files=list(dict.fromkeys(name for margin in sheet.entries for name in margin.files)),
         proved_some=any(margin.holds for margin in sheet.entries),
     )
-    return f"{page}\n"
+    return f"{explained(page)}\n"
 
 
 def answer(sheet: Robustness) -> str:
@@ -334,9 +334,9 @@ def _noise(sheet: Robustness) -> Iterator[tuple[str, Figure]]:
 
 
 def write_robustness(
-    sheet: Robustness, folder: str | Path, form: str = "png", *, html: bool = False
+    sheet: Robustness, folder: str | Path, form: str = "png", *, html: bool = True
 ) -> list[Path]:
-    """Write report.md, robustness.json and the figures into a folder, all of them or none; report.html where asked for.
+    """Write report.md, report.html, robustness.json and the figures into a folder, all of them or none.
 
     Raises
     ------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -13,12 +14,16 @@ from matplotlib.figure import Figure
 from limitsets.base import AnswerError, LimitsetsError, Progress, as_json, replaced
 from limitsets.face import plot
 from limitsets.face.plot.style import stretch
-from limitsets.face.report.pages import as_html, as_uri, page, percent, words
+from limitsets.face.report.pages import as_html, page, percent, words
 from limitsets.parameters.analysis import Analysis, proved_averages
 from limitsets.proofs.auditing import Audit, Finding
 from limitsets.systems.maps import FLIP
 
 DPI = 150
+
+# Kinds of pictures that stand within report.html, by form; to others it links.
+WITHIN = {"png": "image/png", "svg": "image/svg+xml"}
+
 FIGURES = ("part", "limit-set", "map", "basins", "morse", "flight")
 
 
@@ -124,7 +129,7 @@ def laid(
     form : str
         Of the figures: "png", "svg" or "pdf".
     html : bool
-        Whether to write report.html too: report.md in one file that stands alone, figures inside.
+        Whether to write report.html too: report.md in one file that stands alone, the figures' files inside.
 
     Returns
     -------
@@ -137,13 +142,14 @@ def laid(
         The folder cannot be written.
     """
     figures: dict[str, str] = {}
-    inside: dict[str, str] = {}
+    inside: dict[str, str] = {}  # the files once more: drawn anew as SVG they took half a second
     with filled(folder) as draft:
         for kind, figure in drawn:
             figures[kind] = f"{kind}.{form}"
             figure.savefig(draft / figures[kind], dpi=DPI)
-            if html:
-                inside[figures[kind]] = as_uri(figure)
+            if html and form in WITHIN:
+                image = base64.b64encode((draft / figures[kind]).read_bytes()).decode("ascii")
+                inside[figures[kind]] = f"data:{WITHIN[form]};base64,{image}"
         told = texts(figures)
         if html:
             told["report.html"] = as_html(told["report.md"], inside)
@@ -157,10 +163,10 @@ def write(
     folder: str | Path,
     *,
     form: str = "png",
-    html: bool = False,
+    html: bool = True,
     progress: Progress | None = None,
 ) -> list[Path]:
-    """Write report.md, analysis.json and the figures into a folder.
+    """Write report.md, report.html, analysis.json and the figures into a folder.
 
     Existing files are replaced after all new ones are written, each in one step.
 
@@ -173,7 +179,7 @@ def write(
     form : str
         Of the figures: "png", "svg" or "pdf".
     html : bool
-        Whether to write report.html too: one file that stands alone, figures inside.
+        Whether to write report.html: one file that stands alone, figures inside (PDF: links to them).
     progress : callable, optional
         Called as ``progress(file, done, of)`` before each file.
 

@@ -142,7 +142,8 @@ class Discrepancy(Tabled):
         """Give it as a plain table for JSON."""
         margin = None if self.margin is None else {"proved": self.margin.proved, "unit": self.margin.unit}
         return as_table(
-            **picked(self, "effects", "left_out", "covered", "sentence", "enough", "advice"),
+            **picked(self, "effects", "left_out", "covered", "enough"),
+            **picked(self, "sentence", "advice"),
             places=[each.to_json() for each in self.rows],
             margin=margin,
             arrive={name: each._asdict() for name, each in self.arrive.items()},

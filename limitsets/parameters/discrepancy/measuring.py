@@ -107,7 +107,7 @@ def enclosed(place: str, cells: CellSet, box: ParameterBox, scene: Scene, effect
             middle = first + 0.5 * (last - first)
             first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
     changed, unknown = (lengths[kind] / total for kind in (Compared.CHANGED, Compared.UNKNOWN))
-    return Moved(place, effects, "proved", least, greatest, changed, unknown)
+    return Moved(place, effects, "proved", lo=least, hi=greatest, changed=changed, unknown=unknown)
 
 
 def sampled(
@@ -130,8 +130,9 @@ def sampled(
         moved = (with_them.x - without.x)[~outside & ~other]
         least, greatest = min(least, moved.min(initial=np.inf)), max(greatest, moved.max(initial=-np.inf))
         made, changed, unknown = made + count, changed + int(other.sum()), unknown + int(outside.sum())
+    ends = {"lo": float(least), "hi": float(greatest)}
     return Moved(
-        place, effects, "sampled", float(least), float(greatest), changed / made, unknown / made, made
+        place, effects, "sampled", **ends, changed=changed / made, unknown=unknown / made, throws=made
     )
 
 

@@ -179,7 +179,9 @@ def discrepancy(
             progress(steps[number], number, len(steps))
 
     if not asked[0]:
-        return Discrepancy(loaded, *asked, (), {}, None, {}, judged, (plain,))
+        return Discrepancy(
+            loaded, *asked, rows=(), covered={}, margin=None, arrive={}, audit=judged, scenes=(plain,)
+        )
     comparison = _Comparison(plain, asked[0], throws, seed)
     rows: list[Moved] = []
     covered = {}
