@@ -156,6 +156,7 @@ __all__ = [
     "critical_points",
     "cycles",
     "design",
+    "discrepancy",
     "dump",
     "engine",
     "entropy",

@@ -99,6 +99,8 @@ def test_enclosures_hold_simulated_landings(row):
         ("paper-quadrilateral", ("landing", "roll"), {Compared.SAME: 0.2, Compared.CHANGED: 0.3}),
         ("paper-initial", ("slip",), {Compared.SAME: 0.5}),
         ("paper-designed", ("slip", "roll"), {Compared.SAME: 0.5}),
+        ("paper-initial", ("slip", "roll"), {Compared.SAME: 0.3}),
+        ("paper-quadrilateral", ("slip", "roll"), {Compared.SAME: 0.1}),
     ],
 )
 def test_enclosures_hold_where_another_corner_lands_and_parts_roll(name, effects, least):
@@ -225,7 +227,7 @@ def test_the_command_and_its_page(capfd, tmp_path):
     assert set(answer) == documented("discrepancy")
     assert answer["arrive"]["minimal"]["share"] == 1.0
     page = (out / "report.md").read_text()
-    assert page.startswith("# paper-designed: will it work on my machine?\n\n* **")
+    assert page.startswith("# paper-designed: will it work on my machine?\n\n**Calls for attention:**")
     assert f"| parts per minute | {60.0 / answer['arrive']['minimal']['throws']:.3g} |" in page
     assert answer["sentence"][1:] in page
     assert (out / "discrepancy.png").stat().st_size > 10_000

@@ -80,7 +80,7 @@ def machine_page(compared: Discrepancy, figures: Mapping[str, str] | None = None
     ]
     told = {
         "compared": compared,
-        "alarms": alarms_of(compared),
+        "lines": alarms_of(compared),
         "heads": ["", *(name for name, _ in columns)],
         "rows": rows if columns else [],
         "places": places,
