@@ -21,6 +21,9 @@ T = TypeVar("T")
 # What takes longer than this says what it is doing [s].
 PATIENCE = 2.0
 
+# Where more time than this is left, the answer is told to take so long [s].
+WORTH = 10.0
+
 # A note on Ctrl-C where answers are kept as they come.
 GOES_ON = "what is done is kept, the same command goes on with the rest"
 
@@ -64,15 +67,33 @@ def _number(done: int, of: int) -> int:
     return min(done + 1, max(of, 1))
 
 
+class _Clock:
+    """How long a count that is on its way still lasts, if all its parts take as long as those that are done."""
+
+    def __init__(self) -> None:
+        self.begun, self.share = time.monotonic(), 0.0
+
+    def left(self, done: int, of: int) -> str:
+        """Give the time left in words, empty below `WORTH` seconds and where nothing is done yet."""
+        now, share = time.monotonic(), min(done / max(of, 1), 1.0)
+        if share <= 0.0 or share < self.share:  # it counts anew
+            self.begun = now
+        self.share = share
+        seconds = (now - self.begun) * (1.0 - share) / share if share else 0.0
+        if seconds < WORTH:
+            return ""
+        return f", about {seconds:.0f} s left" if seconds < 100.0 else f", about {seconds / 60.0:.0f} min left"
+
+
 class _Lines:
     """A line for a step that lasts: at once where the last line is two seconds old, else as soon as it is."""
 
     def __init__(self) -> None:
-        self.last, self.timer = time.monotonic(), threading.Timer(0.0, print)
+        self.last, self.timer, self.clock = time.monotonic(), threading.Timer(0.0, print), _Clock()
 
     def tell(self, step: str, done: int, of: int) -> None:
         self.stop()
-        text = f"limitsets: {step} ({_number(done, of)} of {max(of, 1)})"
+        text = f"limitsets: {step}{self.clock.left(done, of)} ({_number(done, of)} of {max(of, 1)})"
         self.timer = threading.Timer(max(self.last + PATIENCE - time.monotonic(), 0.0), self._say, (text,))
         self.timer.daemon = True
         self.timer.start()
@@ -91,7 +112,7 @@ class _Notebook:
     """A bar under the cell, from the second second on until the answer is there."""
 
     def __init__(self) -> None:
-        self.begun, self.state = time.monotonic(), ("", 0, 1)
+        self.begun, self.clock, self.state = time.monotonic(), _Clock(), ("", 0, 1, "")
         self.handle: Any = None
         self.painted, self.over, self.lock = 0.0, False, threading.Lock()
         self.timer = threading.Timer(PATIENCE, self._paint)
@@ -99,7 +120,7 @@ class _Notebook:
         self.timer.start()
 
     def tell(self, step: str, done: int, of: int) -> None:
-        self.state = (step, done, of)
+        self.state = (step, done, of, self.clock.left(done, of))
         if self.handle is not None and time.monotonic() - self.painted > PAINTED:
             self._paint()
 
@@ -113,11 +134,11 @@ class _Notebook:
     def _paint(self) -> None:
         from IPython.display import display
 
-        step, done, of = self.state
+        step, done, of, left = self.state
         seconds = time.monotonic() - self.begun
         text = (
             f'<progress value="{done}" max="{max(of, 1)}"></progress> '
-            f"{escape(step)} ({_number(done, of)} of {max(of, 1)}), {seconds:.0f} s"
+            f"{escape(step)} ({_number(done, of)} of {max(of, 1)}), {seconds:.0f} s{left}"
         )
         with self.lock:
             self.painted = time.monotonic()
@@ -174,9 +195,11 @@ def _on_terminal() -> Iterator[Progress]:
         BarColumn(),
         TextColumn("{task.fields[number]} of {task.total:.0f}"),
         TimeElapsedColumn(),
+        TextColumn("{task.fields[left]}"),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        tasks, so_far = [shown.add_task("reading", total=1, number=1)], 0.0
+        tasks, so_far = [shown.add_task("reading", total=1, number=1, left="")], 0.0
+        clock = _Clock()
 
         def tell(step: str, done: int, of: int) -> None:
             nonlocal so_far
@@ -185,9 +208,9 @@ def _on_terminal() -> Iterator[Progress]:
             share = min(done / total, 1.0)
             if share < so_far:  # a step that counts anew has a bar of its own, under those that are over
                 ended = shown.tasks[-1].total
-                shown.update(tasks[-1], completed=ended, number=int(ended or 1))
+                shown.update(tasks[-1], completed=ended, number=int(ended or 1), left="")
                 shown.stop_task(tasks[-1])
-                tasks.append(shown.add_task("", total=total, number=number))
+                tasks.append(shown.add_task("", total=total, number=number, left=""))
                 shown.update(tasks[-BARS - 1], visible=False) if len(tasks) > BARS else None
             so_far = share
             shown.update(
@@ -196,6 +219,7 @@ def _on_terminal() -> Iterator[Progress]:
                 completed=min(done, total),
                 total=total,
                 number=number,
+                left=clock.left(done, of).lstrip(", "),
             )
 
         yield tell

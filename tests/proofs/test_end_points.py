@@ -374,6 +374,18 @@ def test_a_repelling_cycle_off_the_attractor_takes_a_set_of_length_zero():
             assert found.component[last] >= 0
 
 
+@pytest.mark.parametrize(("share", "counts"), [(0.008, True), (0.0099, False)])
+def test_starts_that_leave_over_a_hundredth_open_do_not_count(share, counts):
+    """Just below a hundredth of the arm lies before them, and a part of the cell in which they begin is open too."""
+    found = attraction(cover(parameter_box(ls.load("paper-designed")), 256))
+    foot, end = found.cover.box.lo.a, found.cover.box.lo.arm_length
+    before = share * (end - foot).sum() / foot.size
+    starts = {str(side): float(a + before).hex() for side, a in enumerate(foot)}
+    shares, proved = found.shares_from({"starts": {"from": starts}})
+    assert (shares["open"] <= 0.01) is proved is counts
+    assert shares["open"] > share
+
+
 def test_pieces_of_a_tolerance_claim_the_fewest_starts():
     def claim(starts, share, **section):
         return Claim("goal", "proved", "", {"kind": "stays_on_arm", "starts": starts} | section, starts=starts,

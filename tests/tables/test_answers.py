@@ -383,7 +383,7 @@ def test_a_step_that_counts_anew_has_a_bar_of_its_own(monkeypatch):
         def __exit__(self, *_):
             pass
 
-        def add_task(self, description, total, number):
+        def add_task(self, description, total, number, left):
             task = SimpleNamespace(description=description, total=total, completed=0, number=number)
             self.tasks.append(task)
             return len(self.tasks) - 1
@@ -400,6 +400,18 @@ def test_a_step_that_counts_anew_has_a_bar_of_its_own(monkeypatch):
             tell(step, done, of)
     tasks = [(each.description, each.completed, each.total) for each in shown[0].tasks]
     assert tasks == [("b", 2, 2), ("cells", 5, 9)]
+
+
+def test_the_time_left_goes_with_the_share_that_is_done(monkeypatch):
+    """A quarter in 20 s: 60 s are left; a count that begins anew is timed anew; below 10 s nothing is said."""
+    now = [100.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    clock = progress._Clock()
+    said = []
+    for after, done, of in ((0, 0, 8), (20, 2, 8), (580, 3, 8), (10, 7, 8), (5, 0, 4), (4, 1, 4), (1, 3, 4)):
+        now[0] += after
+        said.append(clock.left(done, of))
+    assert said == ["", ", about 60 s left", ", about 17 min left", ", about 87 s left", "", ", about 12 s left", ""]
 
 
 def test_outside_of_a_notebook_a_function_is_as_silent_as_it_was(impatient, capfd):

@@ -161,7 +161,7 @@ def discrepancy(
     throws: Annotated[int, limits(min=1)] = 100_000,
     seed: Seed = 0,
 ) -> Answer:
-    """Ask whether the feeder works on the machine: how far friction, rebound, ... move a landing, and what survives.
+    """Ask whether the feeder works on the machine: how far friction and rebound move a landing, and what survives.
 
     Exit 1 where the effects are not covered by what is proved of the minimal model, or the goal does not survive them.
 
