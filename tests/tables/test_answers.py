@@ -470,5 +470,5 @@ def test_a_notebook_shows_a_bar_and_tables():
     assert "centre of mass" in outputs[1][0]["data"]["text/plain"]
     texts = [each["data"].get("text/html", "7") for each in outputs[2]]
     assert texts == ["", "7"]  # the bar is gone at the end
-    assert outputs[3][0]["text"] == "('<steps>', 0, 4) True\n"
+    assert outputs[3][0]["text"] == "('<steps>', 0, 4, '') True\n"
     assert "<td>3</td>" in outputs[4][0]["data"]["text/html"]
