@@ -82,7 +82,9 @@ class _Clock:
         seconds = (now - self.begun) * (1.0 - share) / share if share else 0.0
         if seconds < WORTH:
             return ""
-        return f", about {seconds:.0f} s left" if seconds < 100.0 else f", about {seconds / 60.0:.0f} min left"
+        return (
+            f", about {seconds:.0f} s left" if seconds < 100.0 else f", about {seconds / 60.0:.0f} min left"
+        )
 
 
 class _Lines:

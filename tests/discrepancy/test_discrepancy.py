@@ -22,24 +22,32 @@ from tests.cli.command import documented, run
 
 # friction, kappa, surface height, arm's length, corners of the plate: ten feeders whose parts hardly slide
 TEN = [
-    (0.6, 52.5, -1.7, 60, (1.14, 1.01, -0.79, 2.07)),
-    (0.8, 54.2, -0.4, 28, (1.21, 1.09, -0.72, 2.21)),
-    (0.7, 50.7, -1.4, 28, (1.0, 1.02, -0.73, 2.17)),
-    (0.75, 50.8, -0.8, 60, (1.23, 1.08, -0.65, 2.07)),
-    (0.7, 38.6, -0.6, 40, (1.29, 0.85, -0.63, 1.87)),
-    (0.7, 12.0, -0.4, 28, (1.03, 0.91, -0.57, 2.24)),
-    (0.65, 56.7, -1.1, 28, (1.05, 0.97, -0.73, 2.24)),
-    (0.7, 25.9, -1.2, 28, (1.0, 1.06, -0.43, 2.22)),
-    (0.8, 18.0, -1.5, 28, (1.07, 0.92, -0.74, 2.13)),
-    (0.6, 32.7, -1.4, 28, (1.0, 1.05, -0.72, 2.21)),
+    (0.6, 52.5, -1.7, 60, (-1.14, 1.14, 1.01, -0.79, 2.07)),
+    (0.8, 54.2, -0.4, 28, (-1.14, 1.21, 1.09, -0.72, 2.21)),
+    (0.7, 50.7, -1.4, 28, (-1.14, 1.0, 1.02, -0.73, 2.17)),
+    (0.75, 50.8, -0.8, 60, (-1.14, 1.23, 1.08, -0.65, 2.07)),
+    (0.7, 38.6, -0.6, 40, (-1.14, 1.29, 0.85, -0.63, 1.87)),
+    (0.7, 12.0, -0.4, 28, (-1.14, 1.03, 0.91, -0.57, 2.24)),
+    (0.65, 56.7, -1.1, 28, (-1.14, 1.05, 0.97, -0.73, 2.24)),
+    (0.7, 25.9, -1.2, 28, (-1.14, 1.0, 1.06, -0.43, 2.22)),
+    (0.8, 18.0, -1.5, 28, (-1.14, 1.07, 0.92, -0.74, 2.13)),
+    (0.6, 32.7, -1.4, 28, (-1.14, 1.0, 1.05, -0.72, 2.21)),
+]
+# throws that stick, whose other end cannot be held, and that roll on
+ROLLING = [
+    (0.45, 8.8, -0.7, 28, (-1.32, 1.32, 0.58, -0.53, 0.98)),
+    (0.45, 9.7, -0.8, 28, (-0.65, 0.65, 0.3, -0.63, 2.96)),
+    (0.35, 10.4, -0.4, 28, (-0.6, 0.6, 0.77, -0.42, 2.63)),
+    (0.35, 39.2, -0.7, 28, (-1.18, 1.18, 0.38, -0.49, 0.88)),
+    (0.5, 24.0, -0.3, 28, (-1.42, 1.42, 1.04, -1.03, 0.91)),
 ]
 EFFECTS = ("slip", "roll", "landing")
 
 
 def feeder(row, **world):
     """Build one of the ten."""
-    friction, kappa, height, length, (right, top_right, top_left, top) = row
-    corners = [(-1.14, 0.0), (right, 0.0), (top_right, top), (top_left, top)]
+    friction, kappa, height, length, (left, right, top_right, top_left, top) = row
+    corners = [(left, 0.0), (right, 0.0), (top_right, top), (top_left, top)]
     return ls.load(
         {
             "name": "plate",
@@ -89,6 +97,12 @@ def hold(scene, effects, cells=4000, starts=4000):
 def test_enclosures_hold_simulated_landings(row):
     """With friction and rolling: 1e5 throws for each of ten feeders."""
     assert hold(feeder(row), EFFECTS, starts=25_000)[Compared.SAME] > 0.2
+
+
+@pytest.mark.parametrize("row", ROLLING)
+def test_enclosures_hold_where_the_other_end_slides_and_the_part_rolls(row):
+    """Where the part may roll on nothing is claimed."""
+    assert hold(feeder(row), ("slip", "roll"), starts=20_000)[Compared.SAME] > 0.0
 
 
 @pytest.mark.parametrize(

@@ -411,7 +411,15 @@ def test_the_time_left_goes_with_the_share_that_is_done(monkeypatch):
     for after, done, of in ((0, 0, 8), (20, 2, 8), (580, 3, 8), (10, 7, 8), (5, 0, 4), (4, 1, 4), (1, 3, 4)):
         now[0] += after
         said.append(clock.left(done, of))
-    assert said == ["", ", about 60 s left", ", about 17 min left", ", about 87 s left", "", ", about 12 s left", ""]
+    assert said == [
+        "",
+        ", about 60 s left",
+        ", about 17 min left",
+        ", about 87 s left",
+        "",
+        ", about 12 s left",
+        "",
+    ]
 
 
 def test_outside_of_a_notebook_a_function_is_as_silent_as_it_was(impatient, capfd):

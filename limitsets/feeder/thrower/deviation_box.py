@@ -134,11 +134,13 @@ def _by_slip(slip: Any, part: FullSideBox, x: Interval, phi: Interval) -> tuple[
     state, lo, hi = SAME, math.inf, -math.inf
     if not flips.lo > 0.0:
         energy = kinetic + b.kappa * (above - b.d)
-        state, slide = _slid_on(mu, part, b.side, True, Interval(max(energy.lo, 0.0), energy.hi))
+        state, slide = _slid_on(mu, part, b.side, True, Interval(max(energy.lo, 0.0), max(energy.hi, 0.0)))
         lo, hi = min(lo, slide.lo), max(hi, slide.hi)
     if (state == SAME) & (not flips.hi <= 0.0):
         energy = kinetic + b.kappa * (above - after.d)
-        state, slide = _slid_on(mu, part, b.side + 1, False, Interval(max(energy.lo, 0.0), energy.hi))
+        state, slide = _slid_on(
+            mu, part, b.side + 1, False, Interval(max(energy.lo, 0.0), max(energy.hi, 0.0))
+        )
         lo, hi = min(lo, slide.lo), max(hi, slide.hi)
     return state, Interval(lo, hi)
 
