@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from limitsets.parameters.atlas import atlas as atlas
     from limitsets.parameters.continuation import continuation as continuation
     from limitsets.parameters.design import design as design, robust_design as robust_design
-    from limitsets.parameters.discrepancy import discrepancy as discrepancy
     from limitsets.parameters.fitting import fit as fit
     from limitsets.parameters.margins.single import margin as margin
     from limitsets.parameters.noise import noise_statistics as noise_statistics
@@ -156,7 +155,6 @@ __all__ = [
     "critical_points",
     "cycles",
     "design",
-    "discrepancy",
     "dump",
     "engine",
     "entropy",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from limitsets.feeder.thrower.deviation_box import Compared, deviations
 from limitsets.feeder.thrower.effects.landing import Landing
 from limitsets.feeder.thrower.effects.roll import Roll
 from limitsets.feeder.thrower.effects.slip import Slip
+from limitsets.parameters.discrepancy.discrepancy_result import best_of
+from limitsets.parameters.discrepancy.measuring import Moved
 from limitsets.parameters.discrepancy.model_discrepancy import _Comparison
 from limitsets.proofs.auditing.findings import with_effects
 from limitsets.proofs.prover.parameters import parameter_box
@@ -127,7 +130,7 @@ def test_enclosures_hold_where_another_corner_lands_and_parts_roll(name, effects
 def test_orbits_with_friction_stay_on_the_cells_that_are_covered(row):
     """The theorem: on the covered cells an orbit with effects is one of the minimal model with noise."""
     comparison = _Comparison(feeder(row), EFFECTS, 1000, 0)
-    rows, deviation = comparison.limit_set()
+    rows, deviation = comparison.compare("limit-set", lambda attracting: attracting.cells)
     assert rows[0].how == "proved"
     assert 0.0 < rows[0].most <= deviation
     cells = comparison.attraction(deviation).cells
@@ -188,11 +191,28 @@ def test_a_covered_scene_says_so():
     assert 0.05 < best.most <= covered < 0.07
     assert 0.27 < compared.margin.proved < 0.28
     assert compared.enough
-    moves = (
-        "friction and rolling and another corner that lands first move a landing by up to 0.0607 in (proved)"
-    )
+    moves = "friction, rolling and another corner that lands first move a landing by up to 0.0607 in (proved)"
     assert compared.sentence.startswith(f"{moves}; the goal survives 0.27")
     assert compared.left_out["pivot"] == "called for, but not asked for"
+    starts = compared.row("starts")
+    assert starts.how == "proved"
+    assert starts.most <= compared.covered["starts"] < compared.margin.proved
+    assert 0.9 < starts.share < 1.0  # those next to the joint are lost with any noise
+    assert "starts are not covered" not in compared.sentence
+    moved_more = replace(compared, covered={"limit-set": 1.01 * compared.margin.proved})
+    assert moved_more.enough is False
+    assert "limitsets design --robust" in moved_more.advice[-1]
+
+
+def test_what_is_proved_of_a_part_of_the_cells_gives_way_to_samples():
+    """A proof that leaves some cells open says nothing of the place."""
+    ends = {"lo": -0.1, "hi": 0.2, "changed": 0.0, "share": 1.0}
+    proved = Moved("starts", ("slip",), "proved", unknown=0.0, **ends)
+    partly = Moved("starts", ("slip",), "proved", unknown=0.1, **ends)
+    sampled = Moved("starts", ("slip",), "sampled", unknown=0.0, throws=10, **ends)
+    assert best_of([proved, sampled]) is proved
+    assert best_of([partly, sampled]) is sampled
+    assert best_of([sampled]).most == 0.2
 
 
 @pytest.mark.parametrize(

@@ -174,8 +174,10 @@ def discrepancy(
     out : DIR
         Write report.md, discrepancy.json and a figure there.
     """
+    from limitsets.parameters.discrepancy import discrepancy as of_scene
+
     chosen = run.opened(scene)
-    compared = ls.discrepancy(chosen, effect or None, throws=throws, seed=seed, progress=run.tell)
+    compared = of_scene(chosen, effect or None, throws=throws, seed=seed, progress=run.tell)
     if run.out is not None:
         run.files = report.machine_page.write_machine(compared, run.out, run.form, html=run.html)
     code = (

@@ -23,12 +23,12 @@ def alarms_of(compared: Discrepancy) -> list[str]:
     >>> import limitsets as ls
     >>> text = ls.load("paper-designed").as_dict() | {"world": {"friction": 1.3}}
     >>> alarms_of(ls.discrepancy(text, ["slip"]))[0]
-    'with these effects 72.4 % of the starts arrive, without them 100 %'
+    'no: with these effects 72.4 % of the starts arrive, without them 100 %'
     """
     lines = []
     if compared.effects and compared.arrive["effects"].share < compared.arrive["minimal"].share:
         with_them, without = (percent(compared.arrive[name].share) for name in ("effects", "minimal"))
-        lines.append(f"with these effects {with_them} of the starts arrive, without them {without}")
+        lines.append(f"no: with these effects {with_them} of the starts arrive, without them {without}")
     if compared.effects and "limit-set" not in compared.covered:
         lines.append("what is proved of the minimal model does not cover these effects")
     elif compared.effects and "starts" not in compared.covered:
@@ -66,10 +66,19 @@ def machine_page(compared: Discrepancy, figures: Mapping[str, str] | None = None
         ["parts per minute", *(_per_minute(each, rate) for _, each in columns)],
         ["the goal survives, of landing.x at every throw (proved)", survives, *("-" for _ in columns[1:])],
     ]
-    places = ("place", "how", f"moved by [{unit}]", "another side", "nothing known", f"covered to [{unit}]")
+    places = (
+        "place",
+        "of the arm",
+        "how",
+        f"moved by [{unit}]",
+        "another side",
+        "nothing known",
+        f"covered to [{unit}]",
+    )
     moved = [
         (
             each.place,
+            percent(each.share),
             f"sampled, {each.throws} throws" if each.throws else each.how,
             f"{each.lo:.4g} to {each.hi:.4g}" if each.lo <= each.hi else "-",
             percent(each.changed),

@@ -27,7 +27,7 @@ from limitsets.feeder.thrower.effects.landing import Landing
 from limitsets.feeder.thrower.effects.roll import Roll
 from limitsets.feeder.thrower.effects.slip import Slip
 from limitsets.feeder.thrower.flight_box import turn_box
-from limitsets.feeder.thrower.full_box import full_ways
+from limitsets.feeder.thrower.full_box import absent, full_ways
 from limitsets.feeder.thrower.impact import margin, pose, swing
 from limitsets.feeder.thrower.motion import (
     NOTHING,
@@ -84,11 +84,6 @@ def _stays(mu: Interval, part: FullSideBox, k: int, near: Interval, far: Interva
 
 
 @proof_kernel
-def _without(roll: Any) -> bool:
-    return roll is None
-
-
-@proof_kernel
 def _slid_on(mu: Interval, part: FullSideBox, k: int, left: bool, kinetic: Interval) -> tuple[int, Interval]:
     """By how much a part slides on that comes down on side k about one end; UNKNOWN where it may not stay there."""
     b, before = box_of(part, k), box_of(part, k - 1)
@@ -96,7 +91,7 @@ def _slid_on(mu: Interval, part: FullSideBox, k: int, left: bool, kinetic: Inter
     near, far = Interval(b.a.lo, b.a.hi), Interval(right.lo, right.hi)
     if not left:
         near, far = far, near
-    if not (_without(entry_of(part.effects, Roll)) or _stays(mu, part, k, near, far, kinetic)):
+    if not (absent(entry_of(part.effects, Roll)) or _stays(mu, part, k, near, far, kinetic)):
         return UNKNOWN, Interval(0.0, 0.0)
     excess = b.d - mu * near
     if excess.hi <= 0.0:
@@ -116,7 +111,9 @@ def _sticks(
     press = omega * right - falling
     along = abs(b.h + b.d - omega * above)
     held = mu * (b.rho2 + above**2) - abs(right * above)
-    return (press.lo > 0.0) & ((mu * press - along).lo >= 0.0) & (held.lo >= 0.0)
+    return ((mu * press - along).lo >= 0.0) & (
+        held.lo >= 0.0
+    )  # the first holds of an impulse that presses only
 
 
 @proof_kernel
@@ -154,7 +151,7 @@ def _compared(slip: Any, part: FullSideBox, x: Interval) -> tuple[int, Interval]
         state, jog, phi, _, _ = sure_throw_box(b, x)
     if state == NOTHING:
         return UNKNOWN, none
-    left = _without(entry_of(part.effects, Landing)) or phi.hi <= corner_box(part, b.side).lo
+    left = absent(entry_of(part.effects, Landing)) or phi.hi <= corner_box(part, b.side).lo
     if slip is not None:
         return _by_slip(slip, part, x, phi) if left else (UNKNOWN, none)
     ways = full_ways(part, x, state, phi, jog)

@@ -200,8 +200,9 @@ came_down.on(FullSideBox, _came_down)
 
 
 @proof_kernel
-def _without(landing: Any) -> bool:
-    return landing is None
+def absent(effect: Any) -> bool:
+    """Whether an effect is not simulated."""
+    return effect is None
 
 
 @proof_kernel
@@ -217,7 +218,7 @@ def landed(landing: Any, part: FullSideBox, x: Interval, phi: Interval, jog: Int
     """
     side = part.own.side
     border = corner_box(part, side)
-    if _without(landing) or phi.hi <= border.lo:
+    if absent(landing) or phi.hi <= border.lo:
         return came_down(part, side, x, phi, jog, 0)
     count = 0
     if not phi.lo > border.hi:

@@ -72,13 +72,14 @@ class Discrepancy(Tabled):
         """The answer in one sentence."""
         if not self.effects:
             return "the scene calls for no effect that can be simulated"
-        by = " and ".join(dict.fromkeys(BY.get(name, name) for name in self.effects))
+        causes = [*dict.fromkeys(BY.get(name, name) for name in self.effects)]
+        by = " and ".join(filter(None, (", ".join(causes[:-1]), causes[-1])))
         arrive = f"simulated with these effects {_percent(self.arrive['effects'].share)} of the starts arrive"
         worst = self.row("limit-set")
         if worst is None:
             return f"the minimal model is not proved to keep any start: {by} cannot be compared with it; {arrive}"
         how = f"sampled, {worst.throws:.0e} throws".replace("e+0", "e") if worst.throws else worst.how
-        moves = "move" if " and " in by else "moves"
+        moves = "moves" if len(causes) == 1 else "move"
         said = f"{by} {moves} a landing by up to {_above(worst.most)} {self.scene.unit} ({how})"
         if "limit-set" not in self.covered:
             return f"{said}{_other_sides(worst)}: not covered; {arrive}"
@@ -103,7 +104,7 @@ class Discrepancy(Tabled):
         if self.enough is False and self.margin is not None:
             lines.append(
                 f"the goal is proved for deviations up to {bound(self.margin.proved, self.margin.unit)} only: "
-                "limitsets design --margin looks for a scene that survives more"
+                "limitsets design --robust looks for a scene with wider margins"
             )
         return lines
 
@@ -114,6 +115,7 @@ class Discrepancy(Tabled):
             "place",
             "effects",
             "how",
+            Column("of the arm", show=_percent),
             Column("least", unit, ".4g"),
             Column("greatest", unit, ".4g"),
             Column("other side", show=_percent),
@@ -125,6 +127,7 @@ class Discrepancy(Tabled):
                 each.place,
                 ", ".join(each.effects),
                 each.how,
+                each.share,
                 *((each.lo, each.hi) if each.lo <= each.hi else (None, None)),
                 each.changed,
                 each.unknown,
@@ -168,16 +171,16 @@ def _wanted(finding: Finding, world: Any, unit: str) -> str:
     """Say which fact of the world would keep an assumption, or what else would; empty for nothing to say."""
     worst, name = math.inf if finding.worst is None else finding.worst, finding.about.name
     key = finding.about.effect, finding.about.what
-    slower = "a slower throw, or a surface that holds the corner"
+    holds = "only a surface that holds the corner does"
     if key in (("slip", "friction"), ("pivot", "friction"), ("release", "friction")):
         if math.isfinite(worst):
             return f"{name}: friction of {rounded(worst, '.3g', up=True)} is needed, and there is {world.friction:g}"
         return f"{name}: no friction is enough; a slower throw, or a surface that holds the corner"
     if key == ("pivot", "press"):
-        return f"{name}: the arm would have to pull; {slower}"
+        return f"{name}: the arm would have to pull, {holds}"
     if key == ("bounce", "height"):
-        return f"{name}: a bounce rises by {_above(worst)} {unit}; a softer surface, or a slower throw"
-    return f"{name}: see limitsets audit" if finding.about.effect in ("landing", "roll") else ""
+        return f"{name}: a bounce rises by {_above(worst)} {unit}; a softer surface lessens it"
+    return ""
 
 
 def _survived(margin: Margin) -> str:

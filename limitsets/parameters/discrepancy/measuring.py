@@ -50,6 +50,8 @@ class Moved:
     changed, unknown : float
         Share of the cells' length from which it comes to another side, and of which nothing is known: not enclosed, or
         outside the model.
+    share : float
+        Share of the arm, of all sides together, that the cells take up.
     throws : int
         How many throws were simulated; 0 for a proof.
     """
@@ -61,6 +63,7 @@ class Moved:
     hi: float
     changed: float
     unknown: float
+    share: float
     throws: int = 0
 
     @property
@@ -75,7 +78,7 @@ class Moved:
 
     def to_json(self) -> dict[str, Any]:
         """Give it as a plain table for JSON."""
-        words = ("place", "effects", "how", "lo", "hi", "changed", "unknown", "throws")
+        words = ("place", "effects", "how", "lo", "hi", "changed", "unknown", "share", "throws")
         return as_table(**picked(self, *words))
 
 
@@ -107,7 +110,10 @@ def enclosed(place: str, cells: CellSet, box: ParameterBox, scene: Scene, effect
             middle = first + 0.5 * (last - first)
             first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
     changed, unknown = (lengths[kind] / total for kind in (Compared.CHANGED, Compared.UNKNOWN))
-    return Moved(place, effects, "proved", lo=least, hi=greatest, changed=changed, unknown=unknown)
+    share = total / _arm(scene)
+    return Moved(
+        place, effects, "proved", lo=least, hi=greatest, changed=changed, unknown=unknown, share=share
+    )
 
 
 def sampled(
@@ -130,7 +136,7 @@ def sampled(
         moved = (with_them.x - without.x)[~outside & ~other]
         least, greatest = min(least, moved.min(initial=np.inf)), max(greatest, moved.max(initial=-np.inf))
         made, changed, unknown = made + count, changed + int(other.sum()), unknown + int(outside.sum())
-    ends = {"lo": float(least), "hi": float(greatest)}
+    ends = {"lo": float(least), "hi": float(greatest), "share": total / _arm(scenes[0])}
     return Moved(
         place, effects, "sampled", **ends, changed=changed / made, unknown=unknown / made, throws=made
     )
@@ -184,6 +190,11 @@ def along_arm(scenes: tuple[Scene, Scene], side: int, count: int = 600) -> tuple
     without, with_them = (images(scene.map, x, side) for scene in scenes)
     same = (with_them.side == without.side) & (with_them.code > OUTSIDE_MODEL)
     return x, np.where(same, with_them.x - without.x, np.nan)
+
+
+def _arm(scene: Scene) -> float:
+    """Return the length of all sides' places of rest together [length]."""
+    return float((scene.domain.hi - scene.domain.lo).sum())
 
 
 def _by_side(cells: CellSet) -> dict[int, tuple[Array, Array]]:
