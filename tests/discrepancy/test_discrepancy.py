@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from limitsets.feeder.thrower.effects.roll import Roll
 from limitsets.feeder.thrower.effects.slip import Slip
 from limitsets.parameters.discrepancy.discrepancy_result import best_of
 from limitsets.parameters.discrepancy.measuring import Moved
-from limitsets.parameters.discrepancy.model_discrepancy import _Comparison
+from limitsets.parameters.discrepancy.model_discrepancy import _Comparison, _ranked
 from limitsets.proofs.auditing.findings import with_effects
 from limitsets.proofs.prover.parameters import parameter_box
 from limitsets.systems.cells import CellSet
@@ -202,6 +203,14 @@ def test_a_covered_scene_says_so():
     moved_more = replace(compared, covered={"limit-set": 1.01 * compared.margin.proved})
     assert moved_more.enough is False
     assert "limitsets design --robust" in moved_more.advice[-1]
+
+
+@pytest.mark.parametrize(("thin", "cells"), [(False, [0, 1]), (True, [0])])
+def test_almost_every_start_is_not_enough(thin, cells):
+    """A set of length zero for each sequence of deviations is none for deviations that depend on the start."""
+    basin = SimpleNamespace(rank=np.array([0, 1, -1]), thin=np.array([False, thin, False]))
+    cover = SimpleNamespace(grid=ls.grid([(0.0, 3.0)], cells=3))
+    assert _ranked(SimpleNamespace(cover=cover, basin=basin)).numbers().tolist() == cells
 
 
 def test_what_is_proved_of_a_part_of_the_cells_gives_way_to_samples():

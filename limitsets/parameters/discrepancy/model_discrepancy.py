@@ -101,8 +101,13 @@ class _Comparison:
 
 
 def _ranked(attracting: Attraction) -> CellSet:
-    """Return the cells all of whose starts come to the attracting cells."""
-    return CellSet(attracting.cover.grid, attracting.basin.rank >= 0)
+    """Return the cells all of whose starts come to the attracting cells.
+
+    If only almost every start does, for a given sequence of deviations, these are the attracting cells alone: the
+    deviations by effects depend on the start.
+    """
+    basin = attracting.basin
+    return CellSet(attracting.cover.grid, basin.rank == 0 if basin.thin.any() else basin.rank >= 0)
 
 
 @arguments_checked
