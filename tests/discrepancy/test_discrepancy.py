@@ -12,6 +12,7 @@ import pytest
 
 import limitsets as ls
 from limitsets.base import AnswerError, SceneError
+from limitsets.face.report.machine_page import alarms_of
 from limitsets.feeder.thrower.deviation_box import Compared, deviations
 from limitsets.feeder.thrower.effects.landing import Landing
 from limitsets.feeder.thrower.effects.roll import Roll
@@ -192,7 +193,9 @@ def test_a_covered_scene_says_so():
     assert 0.05 < best.most <= covered < 0.07
     assert 0.27 < compared.margin.proved < 0.28
     assert compared.enough
-    moves = "friction, rolling and another corner that lands first move a landing by up to 0.0607 in (proved)"
+    moves = (
+        "friction, rolling and another corner that lands first move a landing by up to 0.06069 in (proved)"
+    )
     assert compared.sentence.startswith(f"{moves}; the goal survives 0.27")
     assert compared.left_out["pivot"] == "called for, but not asked for"
     starts = compared.row("starts")
@@ -200,6 +203,11 @@ def test_a_covered_scene_says_so():
     assert starts.most <= compared.covered["starts"] < compared.margin.proved
     assert 0.9 < starts.share < 1.0  # those next to the joint are lost with any noise
     assert "starts are not covered" not in compared.sentence
+    by_samples = replace(compared, rows=tuple(each for each in compared.rows if each.throws))
+    assert [any("samples" in line for line in alarms_of(each)) for each in (compared, by_samples)] == [
+        False,
+        True,
+    ]
     moved_more = replace(compared, covered={"limit-set": 1.01 * compared.margin.proved})
     assert moved_more.enough is False
     assert "limitsets design --robust" in moved_more.advice[-1]

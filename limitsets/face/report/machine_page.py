@@ -33,6 +33,8 @@ def alarms_of(compared: Discrepancy) -> list[str]:
         lines.append("what is proved of the minimal model does not cover these effects")
     elif compared.effects and "starts" not in compared.covered:
         lines.append("the limit set is covered; starts elsewhere on the arm are not")
+    if any(row is not None and row.throws for row in map(compared.row, compared.covered)):
+        lines.append("the effects are covered by samples, which prove nothing")
     if compared.enough is False and compared.margin is not None:
         proved = bound(compared.margin.proved, compared.margin.unit)
         lines.append(f"landings are moved farther than the goal is proved to survive, {proved}")

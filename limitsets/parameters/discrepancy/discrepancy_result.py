@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
 from limitsets.base import Column, Table, Tabled, as_table, picked, rounded
@@ -80,7 +79,7 @@ class Discrepancy(Tabled):
             return f"the minimal model is not proved to keep any start: {by} cannot be compared with it; {arrive}"
         how = f"sampled, {worst.throws:.0e} throws".replace("e+0", "e") if worst.throws else worst.how
         moves = "moves" if len(causes) == 1 else "move"
-        said = f"{by} {moves} a landing by up to {_above(worst.most)} {self.scene.unit} ({how})"
+        said = f"{by} {moves} a landing by up to {bound(worst.most, self.scene.unit, up=True)} ({how})"
         if "limit-set" not in self.covered:
             return f"{said}{_other_sides(worst)}: not covered; {arrive}"
         survives = "the scene has no goal" if self.margin is None else _survived(self.margin)
@@ -162,11 +161,6 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.3g} %"
 
 
-def _above(length: float) -> str:
-    """Write a length with three digits, not less than it is."""
-    return f"{Context(prec=3, rounding=ROUND_CEILING).create_decimal(Decimal(repr(length))).normalize():f}"
-
-
 def _wanted(finding: Finding, world: Any, unit: str) -> str:
     """Say which fact of the world would keep an assumption, or what else would; empty for nothing to say."""
     worst, name = math.inf if finding.worst is None else finding.worst, finding.about.name
@@ -175,11 +169,11 @@ def _wanted(finding: Finding, world: Any, unit: str) -> str:
     if key in (("slip", "friction"), ("pivot", "friction"), ("release", "friction")):
         if math.isfinite(worst):
             return f"{name}: friction of {rounded(worst, '.3g', up=True)} is needed, and there is {world.friction:g}"
-        return f"{name}: no friction is enough; a slower throw, or a surface that holds the corner"
+        return f"{name}: no friction is enough, {holds}"
     if key == ("pivot", "press"):
         return f"{name}: the arm would have to pull, {holds}"
     if key == ("bounce", "height"):
-        return f"{name}: a bounce rises by {_above(worst)} {unit}; a softer surface lessens it"
+        return f"{name}: a bounce rises by {bound(worst, unit, up=True)}; a softer surface lessens it"
     return ""
 
 
